@@ -10,6 +10,7 @@
 
 #include "common/base/file.h"
 #include "common/base/profile.h"
+#include "common/base/units.h"
 #include "common/client/client_token.h"
 #include "common/groom/groom_asset.h"
 #include "common/log/line_writer.h"
@@ -33,7 +34,6 @@ namespace {
 constexpr int kExitBadInput = 2;
 constexpr int kExitFailure = 1;
 constexpr long kPollNs = 100'000'000;
-constexpr double kNsPerS = 1e9;
 /// Between two looks at what a service manager is told.
 constexpr int64_t kServiceNs = 500'000'000;
 

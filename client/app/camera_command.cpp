@@ -17,12 +17,12 @@ constexpr double kMinFovDeg = 2.0, kMaxFovDeg = 160.0;
 constexpr const char* kSceneView = "scene";
 
 /// Around the head, from its face on; left and right are the head's own.
-struct View {
+struct NamedView {
   const char* name;
   double yaw_deg;
   double pitch_deg;
 };
-constexpr std::array<View, 5> kViews{{{"front", 0.0, 0.0},
+constexpr std::array<NamedView, 5> kViews{{{"front", 0.0, 0.0},
                                       {"left", 90.0, 0.0},
                                       {"right", -90.0, 0.0},
                                       {"back", 180.0, 0.0},
@@ -36,7 +36,7 @@ float to_rad(double degrees) {
 
 void declare_camera(CLI::App& app, CameraOptions& options) {
   std::vector<std::string> names{kSceneView};
-  for (const View& view : kViews) names.emplace_back(view.name);
+  for (const NamedView& view : kViews) names.emplace_back(view.name);
   app.add_option("view", options.view, "As the scene says, or from this side of the head")
       ->check(CLI::IsMember(names));
   app.add_option("--session", options.session, "Of this viewer, as listed by sessions (default: of all)");
@@ -63,7 +63,7 @@ Result<CameraDesc> camera_of(const CameraOptions& options, const CameraDesc& sce
                       "--distance-m, --target-m, --fov-deg");
   CameraDesc camera = scene_camera;
   Polar polar = to_polar(camera.offset_m);
-  for (const View& view : kViews)
+  for (const NamedView& view : kViews)
     if (options.view == view.name) polar = {polar.distance_m, to_rad(view.yaw_deg), to_rad(view.pitch_deg)};
   if (options.yaw_deg) polar.yaw_rad = to_rad(*options.yaw_deg);
   if (options.pitch_deg) polar.pitch_rad = to_rad(*options.pitch_deg);

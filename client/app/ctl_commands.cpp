@@ -39,11 +39,6 @@ constexpr int64_t kInputsIntervalNs = 2'000'000'000;
 constexpr size_t kMaxInputLineChars = 1'000;
 constexpr size_t kMaxShownValues = 6;  // of one input, so that the lines of two fit into their budget
 
-int fail(const Error& error, int exit_code = kBadInputExit) {
-  std::cerr << "strandcast-ctl: " << error.to_string() << '\n';
-  return exit_code;
-}
-
 Result<Address> address_of(const CtlTarget& target) {
   ASSIGN_OR_RETURN(Address address, parse_address(target.connect));
   address.is_tls = address.is_tls || target.is_tls || !target.tls_authorities.empty();
@@ -112,6 +107,11 @@ Status add_wind(const FeedOptions& options, FeedPlan& plan) {
 }
 
 }  // namespace
+
+int ctl_failure(const Error& error, int exit_code) {
+  std::cerr << "strandcast-ctl: " << error.to_string() << '\n';
+  return exit_code;
+}
 
 Result<FeedPlan> make_feed_plan(const FeedOptions& options) {
   FeedPlan plan;
@@ -243,13 +243,13 @@ Result<std::vector<std::unique_ptr<ViewerClient>>> connect_sources(const CtlTarg
 /// As a program of motion capture would.
 int run_mocap_feed(const FeedOptions& options, const FeedPlan& plan, const std::atomic<bool>& stop) {
   const auto encoding = find_mocap_encoding(options.as);
-  if (!encoding) return fail(encoding.error());
+  if (!encoding) return ctl_failure(encoding.error());
   // What names no port gets the protocol's own.
   auto to = parse_address(options.to);
-  if (!to) return fail(to.error());
+  if (!to) return ctl_failure(to.error());
   if (to->to_string() != options.to) to->port = encoding->port;
   auto sender = DatagramSender::open(*to);
-  if (!sender) return fail(sender.error());
+  if (!sender) return ctl_failure(sender.error());
   std::cerr << fmt::format("sending {} to {}: motion {}, {} packets per second\n", encoding->name,
                            to->to_string(), options.motion, options.rate_hz);
   const auto send = [&](double time_s, const Pose& pose, const std::optional<glm::vec3>& wind_mps) {
@@ -267,20 +267,21 @@ int run_mocap_feed(const FeedOptions& options, const FeedPlan& plan, const std::
 int run_feed(const CtlTarget& target, const FeedOptions& options, const std::atomic<bool>& stop) {
   // Files first: a typing error must not need a server to be found.
   const auto plan = make_feed_plan(options);
-  if (!plan) return fail(plan.error());
+  if (!plan) return ctl_failure(plan.error());
   if (!options.as.empty()) return run_mocap_feed(options, *plan, stop);
   if (options.rate_hz > kMaxFeedRateHz)
-    return fail(make_error(ErrorCode::BadInput, "--rate {:g} is more than a server takes: {:g} at most",
-                           options.rate_hz, kMaxFeedRateHz));
+    return ctl_failure(make_error(ErrorCode::BadInput,
+                                  "--rate {:g} is more than a server takes: {:g} at most", options.rate_hz,
+                                  kMaxFeedRateHz));
   const auto heads = connect_sources(target);
-  if (!heads) return fail(heads.error());
+  if (!heads) return ctl_failure(heads.error());
   const std::vector<std::string>& names = heads->front()->welcome().heads;
   std::cerr << fmt::format("feeding {}{}: motion {}, wind {}, {} samples per second\n", target.connect,
                            heads->size() > 1 ? fmt::format(" ({})", fmt::join(names, ", ")) : "",
                            options.motion, options.wind, options.rate_hz);
   const auto done = feed(*heads, *plan, stop, progress_listener());
   if (isatty(STDERR_FILENO) != 0) std::cerr << '\n';
-  if (!done) return fail(done.error(), kRefusedExit);
+  if (!done) return ctl_failure(done.error(), kRefusedExit);
   if (done->motion_s < 0.99 * done->elapsed_s * plan->speed)
     std::cout << fmt::format(
         "slow motion: {:.1f} s of the motion in {:.1f} s, as slowly as the simulation (--live feeds in real "
@@ -300,7 +301,7 @@ int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>
   auto client = connect(target, Role::Source);
   if (!client && (client.error().code == ErrorCode::BadInput || client.error().code == ErrorCode::NotFound))
     client = connect(target, Role::Viewer);
-  if (!client) return fail(client.error());
+  if (!client) return ctl_failure(client.error());
   LineBudget lines;
   const auto print = [&lines](const std::string& line) {
     if (!lines.take(now_ns())) return;
@@ -333,7 +334,8 @@ int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>
         told_detail = status->detail;
       }
       if (const auto* notice = std::get_if<Notice>(&event)) print(notice->text);
-      if (const auto* closed = std::get_if<ClosedEvent>(&event)) return fail(closed->error, kRefusedExit);
+      if (const auto* closed = std::get_if<ClosedEvent>(&event))
+        return ctl_failure(closed->error, kRefusedExit);
     }
   }
   return kDoneExit;
@@ -353,15 +355,16 @@ MessageMaker always(const ClientMessage& message) {
 /// Sends one message and takes the answer; a notice is printed.
 int ask(const CtlTarget& target, Role role, const MessageMaker& make, const TakeAnswer& take) {
   auto client = connect(target, role);
-  if (!client) return fail(client.error());
+  if (!client) return ctl_failure(client.error());
   const auto message = make((*client)->welcome());
-  if (!message) return fail(message.error());
-  if (const auto sent = (*client)->send(*message); !sent) return fail(sent.error(), kRefusedExit);
+  if (!message) return ctl_failure(message.error());
+  if (const auto sent = (*client)->send(*message); !sent) return ctl_failure(sent.error(), kRefusedExit);
   const int64_t begin_ns = now_ns();
   while (now_ns() - begin_ns < std::chrono::nanoseconds(kAnswerTimeout).count()) {
-    if (const auto why = stopped(target)) return fail(*why, kRefusedExit);
+    if (const auto why = stopped(target)) return ctl_failure(*why, kRefusedExit);
     for (const ClientEvent& event : (*client)->wait(milliseconds(100))) {
-      if (const auto* closed = std::get_if<ClosedEvent>(&event)) return fail(closed->error, kRefusedExit);
+      if (const auto* closed = std::get_if<ClosedEvent>(&event))
+        return ctl_failure(closed->error, kRefusedExit);
       if (const auto* list = std::get_if<SessionList>(&event)) return take(*list);
       if (const auto* scene = std::get_if<SceneText>(&event)) return take(*scene);
       const auto* notice = std::get_if<Notice>(&event);
@@ -370,7 +373,7 @@ int ask(const CtlTarget& target, Role role, const MessageMaker& make, const Take
       return notice->is_error ? kRefusedExit : kDoneExit;
     }
   }
-  return fail(
+  return ctl_failure(
       make_error(ErrorCode::Timeout, "the server did not answer within {} ms", kAnswerTimeout.count()),
       kRefusedExit);
 }
@@ -397,8 +400,8 @@ int run_save(const CtlTarget& target, const std::filesystem::path& path) {
     const auto* text = std::get_if<SceneText>(&answer);
     if (text == nullptr) return kDoneExit;
     const auto scene = scene_of(*text);
-    if (!scene) return fail(scene.error(), kRefusedExit);
-    if (const auto saved = save_scene(path, to_text(*scene)); !saved) return fail(saved.error());
+    if (!scene) return ctl_failure(scene.error(), kRefusedExit);
+    if (const auto saved = save_scene(path, to_text(*scene)); !saved) return ctl_failure(saved.error());
     std::cout << fmt::format("saved {}: strandcast-server --scene {}\n", path.string(), path.string());
     return kDoneExit;
   });
@@ -406,20 +409,21 @@ int run_save(const CtlTarget& target, const std::filesystem::path& path) {
 
 int run_check(const CtlTarget& target, uint64_t frames, double timeout_s) {
   auto config = client_config_for(target, Role::Viewer);
-  if (!config) return fail(config.error());
+  if (!config) return ctl_failure(config.error());
   config->hello.step_ns = measured_step_ns();  // it decodes what viewers here get
   const auto check = check_stream(*config, frames, timeout_s);
   if (!check)
-    return fail(check.error(), check.error().code == ErrorCode::Timeout ? kRefusedExit : kBadInputExit);
+    return ctl_failure(check.error(),
+                       check.error().code == ErrorCode::Timeout ? kRefusedExit : kBadInputExit);
   std::cout << check->to_string() << '\n';
   return check->is_good() ? kDoneExit : kRefusedExit;
 }
 
 int run_health(const CtlTarget& target) {
   const auto address = address_of(target);
-  if (!address) return fail(address.error());
+  if (!address) return ctl_failure(address.error());
   const auto answer = http_get(*address, "/healthz", kHealthTimeout, {target.tls_authorities, {}});
-  if (!answer) return fail(answer.error());
+  if (!answer) return ctl_failure(answer.error());
   constexpr unsigned kHttpOk = 200;
   print_lines(answer->body);
   return answer->status == kHttpOk ? kDoneExit : kRefusedExit;

@@ -19,6 +19,9 @@ inline constexpr int kDoneExit = 0;
 inline constexpr int kRefusedExit = 1;
 inline constexpr int kBadInputExit = 2;
 
+/// Says on standard error what failed, behind the program\'s name; returns the exit code.
+int ctl_failure(const Error& error, int exit_code = kBadInputExit);
+
 /// Where the server is and how to be let in.
 struct CtlTarget {
   std::string connect;

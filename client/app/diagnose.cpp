@@ -9,6 +9,7 @@
 #include "client/app/viewer_session.h"
 #include "client/app/way_out.h"
 #include "client/window/window.h"
+#include "common/base/units.h"
 #include "common/base/version.h"
 #include "common/render/render_device.h"
 #include "common/strands/strand_codec.h"
@@ -19,7 +20,7 @@ namespace {
 using std::chrono::milliseconds;
 using Clock = std::chrono::steady_clock;
 
-constexpr milliseconds kPumpWait{20};
+constexpr milliseconds kDiagnosePumpWait{20};
 constexpr double kFarMs = 150.0;  // of a round trip: turning the server's pictures feels late
 
 class Examination {
@@ -144,7 +145,7 @@ class Examination {
     const auto enough = Clock::now() + kDiagnosisWatch;
     Status pumped;
     while (!stop_ && pumped && Clock::now() < (session.has_picture() ? enough : end))
-      pumped = session.pump(kPumpWait);
+      pumped = session.pump(kDiagnosePumpWait);
     say_stream(session, pumped);
     say_clock(session);
     say_link(session);
@@ -182,7 +183,6 @@ class Examination {
   }
 
   void say_link(ViewerSession& session) {
-    constexpr double kMbitPerByte = 8e-6;
     const ConnectionCounters net = session.client().counters();
     const ClockOffset clock = session.client().clock();
     const double round_trip_ms = clock.has_value() ? 2.0 * static_cast<double>(clock.error_ns()) * 1e-6 : 0.0;

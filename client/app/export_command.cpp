@@ -5,6 +5,7 @@
 #include <memory>
 #include <utility>
 
+#include "client/app/ctl_commands.h"
 #include "client/app/live_states.h"
 #include "client/app/recorded_states.h"
 #include "client/export/export_strands.h"
@@ -14,11 +15,6 @@ namespace {
 
 constexpr int kUsualFps = 30;
 constexpr double kMostSeconds = 86'400.0;
-
-int fail(const Error& error) {
-  std::cerr << "strandcast-ctl: " << error.to_string() << '\n';
-  return kBadInputExit;
-}
 
 std::string size_text(uint64_t bytes) {
   constexpr double kBytesPerMb = 1e6;
@@ -109,11 +105,11 @@ Result<ExportOptions> export_options(const ExportCommand& command) {
 
 int run_export(const CtlTarget& target, const ExportCommand& command, const std::atomic<bool>& stop) {
   const auto options = export_options(command);
-  if (!options) return fail(options.error());
+  if (!options) return ctl_failure(options.error());
   const auto source = open_source(target, command, stop);
-  if (!source) return fail(source.error());
+  if (!source) return ctl_failure(source.error());
   const auto report = export_strands(**source, *options, stop);
-  if (!report) return fail(report.error());
+  if (!report) return ctl_failure(report.error());
   print(*options, *report);
   return kDoneExit;
 }

@@ -6,15 +6,14 @@
 #include <utility>
 
 #include "common/base/profile.h"
+#include "common/base/units.h"
 
 namespace strandcast {
 namespace {
 
 using std::chrono::milliseconds;
-
-constexpr int64_t kSecondNs = 1'000'000'000;
 constexpr int64_t kSkipBehindNs =
-    kSecondNs / 4;                         // further behind than this: go on from now, do not send a burst
+    kSInNs / 4;                            // further behind than this: go on from now, do not send a burst
 constexpr milliseconds kLongestSleep{50};  // so that a stop is noticed
 constexpr milliseconds kFlushWait{250};    // less than a stop is given
 
@@ -36,9 +35,9 @@ class Feeder {
   Feeder(Way& way, const FeedPlan& plan) : way_(way), plan_(plan) {}
 
   Result<FeedProgress> run(const std::atomic<bool>& stop, const FeedListener& listener) {
-    const auto period_ns = static_cast<int64_t>(static_cast<double>(kSecondNs) / plan_.rate_hz);
+    const auto period_ns = static_cast<int64_t>(static_cast<double>(kSInNs) / plan_.rate_hz);
     const int64_t begin_ns = now_ns();
-    int64_t next_report_ns = begin_ns + kSecondNs;
+    int64_t next_report_ns = begin_ns + kSInNs;
     for (int64_t index = 0;; ++index) {
       int64_t sample_ns = begin_ns + index * period_ns;
       if (const int64_t behind_ns = now_ns() - sample_ns; behind_ns > kSkipBehindNs) {
@@ -58,7 +57,7 @@ class Feeder {
       way_.send(plan_, sample_ns, progress_);
       RETURN_IF_ERROR(way_.read_events(plan_, progress_));
       if (now_ns() < next_report_ns) continue;
-      next_report_ns += kSecondNs;
+      next_report_ns += kSInNs;
       if (listener) listener(progress_);
     }
     way_.flush();

@@ -5,12 +5,11 @@
 #include <map>
 
 #include "common/base/quantile.h"
+#include "common/base/units.h"
 #include "common/replay/clock_offset.h"
 
 namespace strandcast {
 namespace {
-
-constexpr double kMsPerNs = 1e-6;
 
 /// The server's word is not to be trusted with an overflow.
 int64_t sane(int64_t time_ns) {

@@ -2,6 +2,7 @@
 
 #include <iostream>
 
+#include "client/app/ctl_commands.h"
 #include "client/app/frame_trace.h"
 #include "client/app/step_speed.h"
 #include "client/app/view_options.h"
@@ -12,11 +13,6 @@ namespace strandcast {
 namespace {
 
 using std::chrono::milliseconds;
-
-int fail(const Error& error, int exit_code) {
-  std::cerr << "strandcast-ctl: " << error.to_string() << '\n';
-  return exit_code;
-}
 
 /// A folder that cannot be written to is better known before than after.
 Status open_files(const LatencyOptions& options, FrameTrace& trace) {
@@ -36,21 +32,22 @@ Status save(const LatencyOptions& options, FrameTrace& trace, const std::vector<
 
 int run_latency(const CtlTarget& target, const LatencyOptions& options, const std::atomic<bool>& stop) {
   auto config = client_config_for(target, Role::Viewer);
-  if (!config) return fail(config.error(), kBadInputExit);
+  if (!config) return ctl_failure(config.error(), kBadInputExit);
   const auto mode = parse_mode(options.mode);
-  if (!mode) return fail(mode.error(), kBadInputExit);
+  if (!mode) return ctl_failure(mode.error(), kBadInputExit);
   config->hello.mode = *mode;
   config->hello.step_ns = measured_step_ns();
   const auto trace = std::make_shared<FrameTrace>();
-  if (const Status opened = open_files(options, *trace); !opened) return fail(opened.error(), kBadInputExit);
+  if (const Status opened = open_files(options, *trace); !opened)
+    return ctl_failure(opened.error(), kBadInputExit);
   auto session = ViewerSession::open(*config);
-  if (!session) return fail(session.error(), kBadInputExit);
+  if (!session) return ctl_failure(session.error(), kBadInputExit);
   trace->want_states(true);
   (*session)->set_trace(trace);
   const int64_t end_ns = now_ns() + static_cast<int64_t>(options.seconds * 1e9);
   while (!stop && now_ns() < end_ns)
     if (const Status pumped = (*session)->pump(milliseconds(20)); !pumped)
-      return fail(pumped.error(), kRefusedExit);
+      return ctl_failure(pumped.error(), kRefusedExit);
   const std::vector<StageTimes> stages = stage_times(trace->frames());
   std::cout << to_table(stages);
   const ClockOffset clock = (*session)->client().clock();
@@ -59,12 +56,14 @@ int run_latency(const CtlTarget& target, const LatencyOptions& options, const st
       static_cast<double>(clock.error_ns()) * 1e-6, (*session)->status().sim_ms,
       (*session)->status().encode_ms);
   if (!options.out.empty()) {
-    if (const Status saved = save(options, *trace, stages); !saved) return fail(saved.error(), kBadInputExit);
+    if (const Status saved = save(options, *trace, stages); !saved)
+      return ctl_failure(saved.error(), kBadInputExit);
     std::cout << fmt::format("saved {} and {}\n", (options.out / "latency.csv").string(),
                              (options.out / "frames.csv").string());
   }
   if (trace->frames().empty())
-    return fail(make_error(ErrorCode::Timeout, "no frame came in {:g} s", options.seconds), kRefusedExit);
+    return ctl_failure(make_error(ErrorCode::Timeout, "no frame came in {:g} s", options.seconds),
+                       kRefusedExit);
   return kDoneExit;
 }
 

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <utility>
 
+#include "common/base/units.h"
+
 namespace strandcast {
 
 inline constexpr uint32_t kMaxForeignLinesPerS = 20;
@@ -14,9 +16,8 @@ class LineBudget {
   /// Whether a line may be written at `time_ns`, which does not run backwards: no second, wherever it begins,
   /// has more lines than the limit.
   bool take(int64_t time_ns) {
-    constexpr int64_t kSecondNs = 1'000'000'000;
     int64_t& oldest_ns = written_ns_[count_ % kMaxForeignLinesPerS];
-    if (count_ >= kMaxForeignLinesPerS && time_ns - oldest_ns < kSecondNs) {
+    if (count_ >= kMaxForeignLinesPerS && time_ns - oldest_ns < kSInNs) {
       ++left_out_;
       return false;
     }

@@ -5,8 +5,8 @@
 namespace strandcast {
 namespace {
 
-constexpr std::chrono::milliseconds kPumpWait{20};
-constexpr double kStallTimeoutS = 15.0;
+constexpr std::chrono::milliseconds kStatesPumpWait{20};
+constexpr double kNoStateTimeoutS = 15.0;
 
 }  // namespace
 
@@ -17,9 +17,9 @@ Result<std::unique_ptr<LiveStates>> LiveStates::open(const ClientConfig& config,
   const int64_t begin_ns = now_ns();
   while (states->waiting_.empty() || states->session_->asset() == nullptr) {
     if (stop) return make_error(ErrorCode::Unavailable, "stopped before the first state had come");
-    if (static_cast<double>(now_ns() - begin_ns) * 1e-9 > kStallTimeoutS)
-      return make_error(ErrorCode::Timeout, "the server sent no state for {} s", kStallTimeoutS);
-    RETURN_IF_ERROR(states->session_->pump(kPumpWait));
+    if (static_cast<double>(now_ns() - begin_ns) * 1e-9 > kNoStateTimeoutS)
+      return make_error(ErrorCode::Timeout, "the server sent no state for {} s", kNoStateTimeoutS);
+    RETURN_IF_ERROR(states->session_->pump(kStatesPumpWait));
   }
   const LookDesc& look = states->session_->look().look;
   states->scene_ = {states->session_->shared_asset(), look.strand_radius_m, look.tip_scale};
@@ -35,9 +35,10 @@ Result<std::shared_ptr<const Snapshot>> LiveStates::next() {
   const int64_t begin_ns = now_ns();
   while (waiting_.empty()) {
     if (stop_) return std::shared_ptr<const Snapshot>();
-    if (static_cast<double>(now_ns() - begin_ns) * 1e-9 > kStallTimeoutS)
-      return make_error(ErrorCode::Timeout, "no new state for {} s (is the server paused?)", kStallTimeoutS);
-    RETURN_IF_ERROR(session_->pump(kPumpWait));
+    if (static_cast<double>(now_ns() - begin_ns) * 1e-9 > kNoStateTimeoutS)
+      return make_error(ErrorCode::Timeout, "no new state for {} s (is the server paused?)",
+                        kNoStateTimeoutS);
+    RETURN_IF_ERROR(session_->pump(kStatesPumpWait));
   }
   std::shared_ptr<const Snapshot> state = std::move(waiting_.front());
   waiting_.pop_front();

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/base/units.h"
 #include "common/scene/scene_fields.h"
 #include "common/scene/scene_file.h"
 
@@ -17,7 +18,6 @@ namespace {
 
 using scene_fields::Range;
 
-constexpr double kMmPerM = 1e3;
 constexpr const char* kOwnColors = "custom";
 
 /// How a field is shown where its name, its group and its range do not say it well.

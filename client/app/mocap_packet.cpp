@@ -7,6 +7,8 @@
 #include <numbers>
 #include <string_view>
 
+#include "common/base/units.h"
+
 namespace strandcast {
 namespace {
 
@@ -60,7 +62,6 @@ class Packet {
 // ---- opentrack: six doubles, cm and degrees; +X to the head's left, +Z behind it
 
 std::vector<std::byte> encode_opentrack(const MocapMoment& moment) {
-  constexpr double kCmPerM = 100.0;
   const glm::dvec3 p = kCmPerM * moment.world_from_head.position_m;
   const HeadAngles angles = angles_of(moment.world_from_head.rotation);
   Packet packet;

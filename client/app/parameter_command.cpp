@@ -2,6 +2,7 @@
 
 #include <iostream>
 
+#include "client/app/ctl_commands.h"
 #include "client/app/line_budget.h"
 #include "common/base/profile.h"
 
@@ -10,18 +11,13 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kAnswerTimeout{5'000};
-
-int fail(const Error& error, int exit_code) {
-  std::cerr << "strandcast-ctl: " << error.to_string() << '\n';
-  return exit_code;
-}
+constexpr milliseconds kParametersTimeout{5'000};
 
 /// One list that answers a request; changes that come meanwhile are in the next answer anyway.
 Result<ParameterList> ask(ViewerClient& client, const ParameterRequest& request,
                           const std::atomic<bool>& stop) {
   RETURN_IF_ERROR(client.send(request));
-  const int64_t end_ns = now_ns() + std::chrono::nanoseconds(kAnswerTimeout).count();
+  const int64_t end_ns = now_ns() + std::chrono::nanoseconds(kParametersTimeout).count();
   while (now_ns() < end_ns) {
     if (stop) return make_error(ErrorCode::Unavailable, "stopped before the server had answered");
     for (ClientEvent& event : client.wait(milliseconds(50))) {
@@ -66,12 +62,12 @@ std::string to_line(const ParameterInfo& parameter) {
 
 int run_params(const CtlTarget& target, const ParameterOptions& options, const std::atomic<bool>& stop) {
   auto config = client_config_for(target, Role::Viewer);
-  if (!config) return fail(config.error(), kBadInputExit);
+  if (!config) return ctl_failure(config.error(), kBadInputExit);
   config->hello.gets_no_stream = true;
   auto client = ViewerClient::connect(*config);
-  if (!client) return fail(client.error(), kBadInputExit);
+  if (!client) return ctl_failure(client.error(), kBadInputExit);
   const auto listed = print_all(**client, options, stop);
-  if (!listed) return fail(listed.error(), kRefusedExit);
+  if (!listed) return ctl_failure(listed.error(), kRefusedExit);
   if (*listed == 0) {
     std::cerr << fmt::format("strandcast-ctl: no parameter begins with '{}'\n", options.prefix);
     return kRefusedExit;
@@ -80,7 +76,8 @@ int run_params(const CtlTarget& target, const ParameterOptions& options, const s
   LineBudget lines;
   while (options.is_watching && !stop && std::cout) {
     for (const ClientEvent& event : (*client)->wait(milliseconds(100))) {
-      if (const auto* closed = std::get_if<ClosedEvent>(&event)) return fail(closed->error, kRefusedExit);
+      if (const auto* closed = std::get_if<ClosedEvent>(&event))
+        return ctl_failure(closed->error, kRefusedExit);
       const auto* list = std::get_if<ParameterList>(&event);
       if (list == nullptr || !list->is_change) continue;
       for (const ParameterInfo& parameter : list->parameters)

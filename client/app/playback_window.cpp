@@ -8,17 +8,12 @@
 #include "client/app/strand_drawer.h"
 #include "client/window/orbit_camera.h"
 #include "client/window/window.h"
+#include "common/base/units.h"
 
 namespace strandcast {
 namespace {
 
 using std::chrono::milliseconds;
-
-constexpr int64_t kNsPerMs = 1'000'000;
-constexpr int64_t kDisplayNs = 1000 * kNsPerMs / 60;  // no display needs more
-constexpr int64_t kPanelNs = 250 * kNsPerMs;
-constexpr int64_t kMessageNs = 4000 * kNsPerMs;
-constexpr milliseconds kLongestWait{50};
 /// Strands between states are told to the drawing thread on a lattice far finer than any that is streamed.
 constexpr float kShownLatticeM = 1e-5f;
 
@@ -111,7 +106,7 @@ class Playback {
   milliseconds time_to_wait() const {
     if (!clock_.is_playing()) return kLongestWait;
     const int64_t left_ns = kDisplayNs - (now_ns() - presented_ns_);
-    return std::clamp(milliseconds(left_ns / kNsPerMs + 1), milliseconds(0), kLongestWait);
+    return std::clamp(milliseconds(left_ns / kMsInNs + 1), milliseconds(0), kLongestWait);
   }
 
   bool is_picture_due(const WindowActions& actions) {

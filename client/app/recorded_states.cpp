@@ -4,12 +4,12 @@
 #include <cmath>
 #include <utility>
 
+#include "common/base/units.h"
 #include "common/scene/scene_file.h"
 
 namespace strandcast {
 namespace {
 
-constexpr double kNsPerS = 1e9;
 constexpr uint32_t kMostDamagedInARow = 1'000;  // then nothing more is to be had of the file
 
 /// What holds at this time: the last that began no later, or the first.

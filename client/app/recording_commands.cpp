@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "client/app/ctl_commands.h"
+#include "common/base/units.h"
 #include "common/record/recording_check.h"
 #include "common/record/recording_reader.h"
 #include "common/scene/scene_file.h"
@@ -12,14 +13,7 @@
 namespace strandcast {
 namespace {
 
-constexpr double kNsPerS = 1e9;
 constexpr double kBytesPerMb = 1e6;
-constexpr double kMmPerM = 1e3;
-
-int fail(const Error& error) {
-  std::cerr << "strandcast-ctl: " << error.to_string() << '\n';
-  return kBadInputExit;
-}
 
 std::string date_text(int64_t unix_time_ns) {
   const auto seconds = static_cast<std::time_t>(unix_time_ns / 1'000'000'000);
@@ -94,7 +88,7 @@ void print_contents(const RecordingContents& contents, const RecordingInfo& info
 
 int run_recording_info(const std::filesystem::path& path) {
   const auto reader = RecordingReader::open(path, RecordedPart::Messages);
-  if (!reader) return fail(reader.error());
+  if (!reader) return ctl_failure(reader.error());
   const RecordingStart& start = (*reader)->start();
   const RecordingInfo& info = (*reader)->info();
   const auto scene = parse_scene(start.scene_text, "the recording's scene", {});
@@ -123,7 +117,7 @@ int run_recording_info(const std::filesystem::path& path) {
 
 int run_recording_check(const std::filesystem::path& path) {
   const auto check = check_recording(path);
-  if (!check) return fail(check.error());
+  if (!check) return ctl_failure(check.error());
   std::cout << fmt::format("{}: {}\n", path.string(), check_text(*check));
   print_problems(*check);
   if (check->is_sound())
@@ -138,7 +132,7 @@ int run_recording_check(const std::filesystem::path& path) {
 int run_recover(const std::filesystem::path& from, std::filesystem::path to) {
   if (to.empty()) to = std::filesystem::path(from).replace_extension(".recovered.mcap");
   const auto recovery = recover_recording(from, to);
-  if (!recovery) return fail(recovery.error());
+  if (!recovery) return ctl_failure(recovery.error());
   std::cout << fmt::format("{}: {} chunks kept, {} damaged ones left out, {} bytes cut off\n", to.string(),
                            recovery->kept_chunks, recovery->left_out_chunks, recovery->cut_bytes);
   std::cout << check_text(recovery->check) << '\n';
@@ -148,7 +142,7 @@ int run_recover(const std::filesystem::path& from, std::filesystem::path to) {
 
 int run_compare(const std::filesystem::path& a, const std::filesystem::path& b) {
   const auto compared = compare_recordings(a, b);
-  if (!compared) return fail(compared.error());
+  if (!compared) return ctl_failure(compared.error());
   for (const std::string& note : compared->notes) std::cout << note << '\n';
   std::cout << fmt::format("{} states have equal hashes\n", compared->equal_states);
   if (compared->compared_frames > 0)

@@ -4,10 +4,11 @@
 #include <cmath>
 #include <utility>
 
+#include "common/base/units.h"
+
 namespace strandcast {
 namespace {
 
-constexpr double kNsPerS = 1e9;
 constexpr size_t kKeptStates = 64;              // behind a moment: arrow keys go back without decoding
 constexpr int64_t kDecodeOnNs = 1'000'000'000;  // farther ahead a keyframe is nearer
 constexpr uint64_t kKeptBytes = 64ull << 20;

@@ -17,7 +17,7 @@ namespace {
 /// A software renderer's threads take this over; panels and decoding go first.
 constexpr int kDrawingThreadNice = 5;
 /// More pictures than a display shows are drawn for nobody.
-constexpr int64_t kDisplayNs = 1'000'000'000 / 60;
+constexpr int64_t kDrawnAtMostNs = 1'000'000'000 / 60;
 /// Where to begin: what a processor draws in time on most machines, and what a GPU does.
 constexpr size_t kFirstSoftwareStep = 3;
 constexpr size_t kFirstHardwareStep = 0;
@@ -278,9 +278,9 @@ void StrandDrawer::turn(const Job& job) {
     if (const Status status = draw(job, std::move(strands), step); !status) return fail(status.error());
   // Pictures as fast as a display shows them, a sharper one once all stands, or nothing more.
   if (is_playing)
-    due_ns_ = begin_ns + kDisplayNs;
+    due_ns_ = begin_ns + kDrawnAtMostNs;
   else if (!drawn_ || drawn_->step > 0)
-    due_ns_ = std::max(plan_.standing_from_ns(), begin_ns + kDisplayNs);
+    due_ns_ = std::max(plan_.standing_from_ns(), begin_ns + kDrawnAtMostNs);
 }
 
 Status StrandDrawer::draw(const Job& job, std::vector<HeadStrands> strands, size_t step) {

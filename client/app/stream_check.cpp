@@ -10,7 +10,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPumpWait{5};
+constexpr milliseconds kCheckPumpWait{5};
 
 /// A viewer that keeps the hashes of the ticks it decoded.
 struct HashingViewer {
@@ -61,7 +61,7 @@ Result<StreamCheck> check_stream(const ClientConfig& config, uint64_t frames, do
   };
   while (!is_done()) {
     if (const auto why = config.cancel ? config.cancel() : std::nullopt) return *why;
-    RETURN_IF_ERROR(first.session->pump(kPumpWait));
+    RETURN_IF_ERROR(first.session->pump(kCheckPumpWait));
     if (second.session) RETURN_IF_ERROR(second.session->pump(milliseconds(0)));
     // Half way in, so that the second one starts from a keyframe of its own in the middle of the chain.
     if (!second.session && first.session->decoded_frames() >= std::max<uint64_t>(frames / 2, 1)) {

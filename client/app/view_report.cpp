@@ -6,11 +6,10 @@
 #include <cmath>
 
 #include "common/base/file.h"
+#include "common/base/units.h"
 
 namespace strandcast {
 namespace {
-
-constexpr double kBitsPerByte = 8.0;
 
 class Builder {
  public:

@@ -4,12 +4,13 @@
 #include <exception>
 #include <utility>
 
+#include "common/base/units.h"
+
 namespace strandcast {
 namespace {
 
 /// Longest sleep while nothing arrives: how late a change of playout is noticed.
-constexpr std::chrono::milliseconds kPumpWait{20};
-constexpr double kMsPerNs = 1e-6;
+constexpr std::chrono::milliseconds kThreadPumpWait{20};
 
 }  // namespace
 
@@ -55,7 +56,7 @@ void ViewerThread::fail(const std::string& what) {
 void ViewerThread::receive() {
   while (!is_stopping_) {
     if (live_->has_session()) live_->session().replay().set_playout(playout_);
-    if (live_->pump(kPumpWait)) ++session_number_;
+    if (live_->pump(kThreadPumpWait)) ++session_number_;
     publish();
   }
 }

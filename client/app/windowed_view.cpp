@@ -11,6 +11,7 @@
 #include "client/app/viewer_thread.h"
 #include "client/window/orbit_camera.h"
 #include "client/window/window.h"
+#include "common/base/units.h"
 #include "common/log/log.h"
 #include "common/render/hair_size.h"
 #include "common/scene/scene_file.h"
@@ -19,19 +20,13 @@ namespace strandcast {
 namespace {
 
 using std::chrono::milliseconds;
-
-constexpr int64_t kNsPerMs = 1'000'000;
-constexpr int64_t kMessageNs = 4000 * kNsPerMs;  // how long a notice stays on the panel
-constexpr int64_t kCameraSendNs = 33 * kNsPerMs;
-constexpr int64_t kReportNs = 1000 * kNsPerMs;
-constexpr int64_t kGrownReportNs = 100 * kNsPerMs;  // when the hair is larger by so much:
+constexpr int64_t kCameraSendNs = 33 * kMsInNs;
+constexpr int64_t kReportNs = 1000 * kMsInNs;
+constexpr int64_t kGrownReportNs = 100 * kMsInNs;  // when the hair is larger by so much:
 constexpr double kGrownHair = 1.1;
-constexpr double kLeastHairPx = 0.1;                  // 0 says nothing
-constexpr int64_t kDisplayNs = 1000 * kNsPerMs / 60;  // no display needs more
-constexpr int64_t kPanelNs = 250 * kNsPerMs;          // how often its numbers change
-constexpr int64_t kWayNs = 1000 * kNsPerMs;           // medians of so long
-constexpr int64_t kSceneWaitNs = 5000 * kNsPerMs;
-constexpr milliseconds kLongestWait{50};  // how late a stop is noticed
+constexpr double kLeastHairPx = 0.1;        // 0 says nothing
+constexpr int64_t kWayNs = 1000 * kMsInNs;  // medians of so long
+constexpr int64_t kSceneWaitNs = 5000 * kMsInNs;
 constexpr const char* kDebugViewPath = "debug_view";
 constexpr const char* kLookAnswer = "look={";  // the slider says it already
 
@@ -342,7 +337,7 @@ class WindowedView {
   milliseconds time_to_wait() const {
     if (!is_due_ || !is_visible()) return kLongestWait;
     const int64_t left_ns = kDisplayNs - (now_ns() - presented_ns_);
-    return std::clamp(milliseconds(left_ns / kNsPerMs + 1), milliseconds(0), kLongestWait);
+    return std::clamp(milliseconds(left_ns / kMsInNs + 1), milliseconds(0), kLongestWait);
   }
 
   void present(int64_t woke_ns) {
@@ -354,7 +349,7 @@ class WindowedView {
                      has_form ? std::optional(form(time_ns)) : std::nullopt);
     if (image_ != nullptr && state_->server_clock_offset_ns)
       trace_->note_presented(image_mode_, image_sim_time_ns_, now_ns() + *state_->server_clock_offset_ns);
-    answer_timer_.add_ms(static_cast<double>(now_ns() - woke_ns) / kNsPerMs);
+    answer_timer_.add_ms(static_cast<double>(now_ns() - woke_ns) / kMsInNs);
   }
 
   /// The look, and below it what this window alone shows.

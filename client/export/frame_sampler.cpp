@@ -4,13 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "common/base/units.h"
+
 namespace strandcast {
-namespace {
-
-constexpr double kNsPerS = 1e9;
-
-}  // namespace
-
 FrameSampler::FrameSampler(const SampleRange& range, StrandFill fill)
     : range_(range), first_ns_(range.first_ns) {
   blend_.set_fill(std::move(fill));

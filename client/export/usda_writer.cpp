@@ -77,7 +77,8 @@ class UsdaWriter : public StrandWriter {
     text += "    startTimeCode = 1\n    endTimeCode = ";
     end_time_at_ = text.size();
     // How many frames there will be is known at the end.
-    text += std::string(20, ' ') + "\n";
+    text.append(20, ' ');
+    text += '\n';
     text +=
         fmt::format("    timeCodesPerSecond = {}\n    framesPerSecond = {}\n", options_.fps, options_.fps);
     text += ")\n\ndef Xform \"Hair\" (\n    kind = \"component\"\n)\n{\n";

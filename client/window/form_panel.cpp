@@ -12,16 +12,16 @@ namespace {
 
 // In letters' heights.
 constexpr float kFormLetters = 24.0f;
-constexpr float kMarginLetters = 0.8f;
+constexpr float kFormMarginLetters = 0.8f;
 constexpr float kTitleShare = 0.42f;  // of the width
-constexpr float kPanelAlpha = 0.85f;
+constexpr float kFormAlpha = 0.85f;
 constexpr double kMaxAzimuthDeg = 180.0;
 // Straight up and down has no azimuth to come back to.
 constexpr double kMaxElevationDeg = 89.0;
 constexpr double kWholeDigits = 100.0;  // numbers from here on need no decimals
 const ImVec4 kTitleColor(0.92f, 0.93f, 0.95f, 1.0f);
 const ImVec4 kNoteColor(0.62f, 0.85f, 1.0f, 1.0f);
-const ImVec4 kLabelColor(0.62f, 0.66f, 0.72f, 1.0f);
+const ImVec4 kFormLabelColor(0.62f, 0.66f, 0.72f, 1.0f);
 
 constexpr ImGuiWindowFlags kFormFlags =
     ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
@@ -153,7 +153,7 @@ void draw_saving(const FormState& form, FormActions& actions) {
     ImGui::SameLine();
     if (ImGui::Button(form.undo.c_str())) actions.wants_undo = true;
   }
-  draw_note(kLabelColor, form.save_note);
+  draw_note(kFormLabelColor, form.save_note);
   if (!form.share.empty() && ImGui::Button(form.share.c_str())) actions.wants_share = true;
 }
 
@@ -176,13 +176,13 @@ void draw_sections(const FormState& form, float width, FormActions& actions) {
 PanelSize draw_form_panel(const FormState& form, FormActions& actions) {
   const ImVec2 area = ImGui::GetIO().DisplaySize;
   const float letter = ImGui::GetFontSize();
-  const float margin = kMarginLetters * letter;
+  const float margin = kFormMarginLetters * letter;
   const float width = std::min(kFormLetters * letter, area.x - 2.0f * margin);
   const float most_height = area.y - 2.0f * margin;
   if (width <= 0.0f || most_height <= 0.0f) return {};
   ImGui::SetNextWindowPos({area.x - margin, margin}, ImGuiCond_Always, {1.0f, 0.0f});
   ImGui::SetNextWindowSizeConstraints({width, 0.0f}, {width, most_height});
-  ImGui::SetNextWindowBgAlpha(kPanelAlpha);
+  ImGui::SetNextWindowBgAlpha(kFormAlpha);
   PanelSize size;
   if (ImGui::Begin("form", nullptr, kFormFlags | ImGuiWindowFlags_AlwaysAutoResize)) {
     draw_note(kTitleColor, form.title);

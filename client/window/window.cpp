@@ -12,6 +12,7 @@
 
 #include "client/window/form_panel.h"
 #include "client/window/hud_panel.h"
+#include "common/base/units.h"
 #include "common/log/log.h"
 
 namespace strandcast {
@@ -234,7 +235,6 @@ Status Window::check_display() {
 }
 
 WindowActions Window::wait(std::chrono::milliseconds timeout) {
-  constexpr double kSPerMs = 1e-3;
   if (timeout.count() > 0)
     glfwWaitEventsTimeout(static_cast<double>(timeout.count()) * kSPerMs);
   else

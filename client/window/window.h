@@ -13,9 +13,16 @@
 #include "client/window/hud.h"
 #include "common/base/picture_size.h"
 #include "common/base/result.h"
+#include "common/base/units.h"
 #include "common/pictures/image_codec.h"
 
 namespace strandcast {
+
+// How a window with hair goes along.
+inline constexpr int64_t kDisplayNs = kSInNs / 60;            // no display needs more
+inline constexpr int64_t kPanelNs = 250 * kMsInNs;            // how often the numbers of a panel change
+inline constexpr int64_t kMessageNs = 4'000 * kMsInNs;        // how long a notice stays on it
+inline constexpr std::chrono::milliseconds kLongestWait{50};  // how late a stop is noticed
 
 /// What the person asked for since the last call.
 struct WindowActions {

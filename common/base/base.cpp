@@ -14,6 +14,24 @@
 
 namespace strandcast {
 
+Error::Error() = default;
+Error::Error(ErrorCode kind, std::string sentence, std::string where)
+    : code(kind), message(std::move(sentence)), place(std::move(where)) {}
+Error::Error(const Error&) = default;
+Error::Error(Error&&) noexcept = default;
+Error& Error::operator=(const Error&) = default;
+Error& Error::operator=(Error&&) noexcept = default;
+Error::~Error() = default;
+
+std::string Error::to_string() const {
+  return place.empty() ? message : place + ": " + message;
+}
+
+Error at(std::string place, Error error) {
+  error.place = error.place.empty() ? std::move(place) : place + ", " + error.place;
+  return error;
+}
+
 const char* to_string(ErrorCode code) {
   switch (code) {
     case ErrorCode::BadInput:

@@ -29,8 +29,17 @@ struct Error {
   std::string message;  // one sentence naming the offending value and what is allowed
   std::string place;    // file, byte offset or line:column, field path; may be empty
 
+  // Out of line: every function that returns a Result takes one apart.
+  Error();
+  Error(ErrorCode kind, std::string sentence, std::string where = {});
+  Error(const Error&);
+  Error(Error&&) noexcept;
+  Error& operator=(const Error&);
+  Error& operator=(Error&&) noexcept;
+  ~Error();
+
   /// "place: message", or the message alone when there is no place.
-  std::string to_string() const { return place.empty() ? message : place + ": " + message; }
+  std::string to_string() const;
 };
 
 /// Makes an Error with a formatted message and no place.
@@ -40,10 +49,7 @@ Error make_error(ErrorCode code, fmt::format_string<Args...> format, Args&&... a
 }
 
 /// The same error with `place` put in front of the place it already names.
-inline Error at(std::string place, Error error) {
-  error.place = error.place.empty() ? std::move(place) : place + ", " + error.place;
-  return error;
-}
+Error at(std::string place, Error error);
 
 template <class T>
 class [[nodiscard]] Result {

@@ -98,4 +98,11 @@ std::string excerpt(std::string_view text, size_t limit) {
   return one_line(text, limit + 1) == begin ? begin : begin + "...";
 }
 
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t";
+  const size_t begin = text.find_first_not_of(kBlank);
+  if (begin == std::string_view::npos) return {};
+  return text.substr(begin, text.find_last_not_of(kBlank) - begin + 1);
+}
+
 }  // namespace strandcast

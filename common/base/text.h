@@ -24,4 +24,7 @@ std::string one_line(std::string_view text, size_t limit);
 /// Likewise, with "..." behind it when there is more: what an error quotes.
 std::string excerpt(std::string_view text, size_t limit);
 
+/// Without the blanks and tabs around it.
+std::string_view trimmed(std::string_view text);
+
 }  // namespace strandcast

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/units.h"
+
 namespace strandcast::chaos {
 namespace {
-
-constexpr double kUsPerS = 1e6;
 
 /// Uniform in [0, 1), the same on every machine.
 double unit(std::mt19937_64& random) {

@@ -18,12 +18,11 @@
 #include <utility>
 
 #include "common/base/profile.h"
+#include "common/base/units.h"
 #include "common/chaos/chaos_pipe.h"
 
 namespace strandcast::chaos {
 namespace {
-
-constexpr int64_t kNsPerUs = 1'000;
 /// Kernel buffers on both sides of the relay: small, so that what is queued is queued where it is measured.
 constexpr int kSocketBufferBytes = 64 << 10;
 constexpr size_t kReadBytes = 64u << 10;
@@ -34,7 +33,7 @@ constexpr int64_t kAcceptPauseUs = 100'000;
 constexpr uint64_t kSeedStep = 0x9e3779b97f4a7c15ull;
 
 int64_t now_us() {
-  return now_ns() / kNsPerUs;
+  return now_ns() / kUsInNs;
 }
 
 /// A file descriptor that closes itself.
@@ -345,7 +344,7 @@ class ChaosRelay::State {
         }
       }
     }
-    const timespec limit{0, std::max<int64_t>(sleep_us, 0) * kNsPerUs};
+    const timespec limit{0, std::max<int64_t>(sleep_us, 0) * kUsInNs};
     ppoll(waits.data(), waits.size(), &limit, nullptr);
     uint64_t ignored = 0;
     while (read(wake_.get(), &ignored, sizeof ignored) > 0) continue;

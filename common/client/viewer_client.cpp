@@ -6,6 +6,13 @@
 
 namespace strandcast {
 
+ClientConfig::ClientConfig() = default;
+ClientConfig::ClientConfig(const ClientConfig&) = default;
+ClientConfig::ClientConfig(ClientConfig&&) noexcept = default;
+ClientConfig& ClientConfig::operator=(const ClientConfig&) = default;
+ClientConfig& ClientConfig::operator=(ClientConfig&&) noexcept = default;
+ClientConfig::~ClientConfig() = default;
+
 const char* to_string(ConnectStep step) {
   switch (step) {
     case ConnectStep::FindHost:

@@ -41,6 +41,14 @@ struct ClientConfig {
   std::function<std::optional<Error>()> cancel;
   /// Told by the connection's own thread what it begins with. Empty: nobody is told.
   std::function<void(ConnectStep)> on_step;
+
+  // Out of line: copied and taken apart in many files, which need no copy of that code.
+  ClientConfig();
+  ClientConfig(const ClientConfig&);
+  ClientConfig(ClientConfig&&) noexcept;
+  ClientConfig& operator=(const ClientConfig&);
+  ClientConfig& operator=(ClientConfig&&) noexcept;
+  ~ClientConfig();
 };
 
 inline constexpr std::chrono::milliseconds kCancelPoll{20};

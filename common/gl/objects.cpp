@@ -28,7 +28,7 @@ uint64_t read_count(const std::atomic<int64_t>& count) {
 
 /// Bytes of one sample as the driver stores it; 0 when the storage could not be had.
 uint64_t sample_bytes(uint32_t texture) {
-  constexpr int kBitsPerByte = 8;
+  constexpr int kByteBits = 8;
   uint64_t bits = 0;
   for (const GLenum part : {GL_TEXTURE_RED_SIZE, GL_TEXTURE_GREEN_SIZE, GL_TEXTURE_BLUE_SIZE,
                             GL_TEXTURE_ALPHA_SIZE, GL_TEXTURE_DEPTH_SIZE, GL_TEXTURE_STENCIL_SIZE}) {
@@ -36,7 +36,7 @@ uint64_t sample_bytes(uint32_t texture) {
     glGetTextureLevelParameteriv(texture, 0, part, &part_bits);
     bits += static_cast<uint64_t>(std::max(part_bits, 0));
   }
-  return bits / kBitsPerByte;
+  return bits / kByteBits;
 }
 
 void label_object(GLenum kind, uint32_t name, const std::string& label) {

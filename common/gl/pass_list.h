@@ -11,6 +11,7 @@
 
 #include "common/base/profile.h"
 #include "common/base/result.h"
+#include "common/base/units.h"
 #include "common/gl/pass_plan.h"
 #include "common/gl/timer.h"
 
@@ -176,7 +177,6 @@ Status PassListBase::run_timed(Slot& slot, GpuTimer* device, Work&& work) {
     slot.last_ms += device->end_ms();
     return status;
   }
-  constexpr double kMsPerNs = 1e-6;
   const int64_t begin_ns = now_ns();
   Status status = work();
   slot.last_ms += static_cast<double>(now_ns() - begin_ns) * kMsPerNs;

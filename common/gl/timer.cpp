@@ -3,6 +3,7 @@
 #include <epoxy/gl.h>
 
 #include "common/base/profile.h"
+#include "common/base/units.h"
 
 namespace strandcast::gl {
 namespace {
@@ -31,7 +32,6 @@ void GpuTimer::begin() {
 }
 
 double GpuTimer::end_ms() {
-  constexpr double kMsPerNs = 1e-6;
   if (is_software_) {
     glFinish();
     return static_cast<double>(now_ns() - begin_ns_) * kMsPerNs;

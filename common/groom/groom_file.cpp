@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/base/text.h"
+#include "common/base/units.h"
 #include "common/groom/hair_loader.h"
 #include "common/groom/ply_loader.h"
 #include "common/groom/resample.h"
@@ -164,7 +165,6 @@ Result<StatedGroom> load_parts(const GroomFileOptions& options) {
 }
 
 std::string unit_text(float unit_m) {
-  constexpr float kMmPerM = 1e3f;
   return unit_m < 0.5f ? fmt::format("{:.4g} mm", unit_m * kMmPerM) : fmt::format("{:.4g} m", unit_m);
 }
 

@@ -33,7 +33,7 @@ uint64_t expected_bytes(const HairHeader& header) {
   return bytes;
 }
 
-Result<HairHeader> read_header(const ByteView& file) {
+Result<HairHeader> read_hair_header(const ByteView& file) {
   if (!file.has(0, kHeaderBytes, 1)) {
     return make_error(ErrorCode::BadInput, "{} bytes, a .hair header alone has {}", file.size_bytes(),
                       kHeaderBytes);
@@ -94,7 +94,7 @@ Result<std::vector<uint32_t>> read_offsets(const ByteView& file, const HairHeade
 }  // namespace
 
 Result<Groom> read_hair(const ByteView& file) {
-  ASSIGN_OR_RETURN(const HairHeader header, read_header(file));
+  ASSIGN_OR_RETURN(const HairHeader header, read_hair_header(file));
   Groom groom;
   ASSIGN_OR_RETURN(groom.offset, read_offsets(file, header));
   const uint64_t segments_bytes = header.has(kSegmentsBit) ? header.strand_count * sizeof(uint16_t) : 0;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/base/quantile.h"
+#include "common/base/units.h"
 #include "common/groom/head_fit.h"
 #include "common/groom/head_spheres.h"
 #include "common/math/point_tree.h"
@@ -75,7 +76,6 @@ HeadMeasure measure_head(const Mesh& head, const std::vector<FittedSphere>& sphe
 }
 
 std::string to_sentence(const HeadMeasure& measure, size_t sphere_count) {
-  constexpr double kMmPerM = 1e3;
   return fmt::format(
       "head: half of the roots lie within {:.1f} mm of the drawn skin, 95 % within {:.1f} mm; {} spheres "
       "collide, half "
@@ -134,7 +134,6 @@ HairInside measure_inside(const BodyInput& body, const Groom& groom) {
 }
 
 std::string to_sentence(const HairInside& inside, size_t capsule_count) {
-  constexpr double kMmPerM = 1e3;
   if (inside.vertex_count == 0)
     return fmt::format("the body has {} capsules; no free vertex of the hair as loaded is inside of it",
                        capsule_count);
@@ -146,7 +145,6 @@ std::string to_sentence(const HairInside& inside, size_t capsule_count) {
 }
 
 std::string to_sentence(const HairInside& inside, const DistanceField& field) {
-  constexpr double kMmPerM = 1e3;
   const glm::uvec3& nodes = field.node_count;
   const std::string size =
       fmt::format("the head collides as a distance field of {} x {} x {} nodes, {:.1f} mm apart", nodes.x,

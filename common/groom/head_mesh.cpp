@@ -15,7 +15,7 @@ namespace {
 constexpr float kCoarse = 0.125f;  // cell width in skull radii
 constexpr float kFine = 0.032f;
 constexpr int kProjections = 4;  // of each vertex onto the surface
-constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+constexpr uint32_t kNoTriangle = std::numeric_limits<uint32_t>::max();
 
 struct Range {
   float low, high;
@@ -54,7 +54,7 @@ class HeadMesher {
     for (int axis = 0; axis < 3; ++axis) line_[axis] = grid_line(axis);
     size_ = glm::ivec3(line_[0].size(), line_[1].size(), line_[2].size());
     distance_.resize(static_cast<size_t>(size_.x) * size_.y * size_.z);
-    vertex_.assign(distance_.size(), kNone);
+    vertex_.assign(distance_.size(), kNoTriangle);
     for_each(size_, [&](const glm::ivec3& at) { distance_[index_of(at)] = head_distance(corner(at)); });
   }
 

@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace strandcast {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// Polar angle from the crown axis down to the hairline, by azimuth (0 = face, pi = neck).
 double hairline_rad(double azimuth_rad) {
@@ -94,8 +93,8 @@ bool solve(std::array<Row, 4>& rows, std::array<double, 4>& solution) {
 Mesh make_scalp_cap(const glm::vec3& center_m, float radius_m, uint32_t vertex_target) {
   // Area of a cap down to polar angle t is 2 pi (1 - cos t); a vertex of a triangle lattice of spacing d
   // covers d^2 sqrt(3)/2.
-  const double mean_polar_rad = hairline_rad(kPi / 2);
-  const double area = 2.0 * kPi * (1.0 - std::cos(mean_polar_rad));
+  const double mean_polar_rad = hairline_rad(std::numbers::pi / 2);
+  const double area = 2.0 * std::numbers::pi * (1.0 - std::cos(mean_polar_rad));
   const double spacing = std::sqrt(area / std::max(vertex_target, 7u) / (std::sqrt(3.0) / 2.0));
   const auto ring_total =
       std::max(1u, static_cast<uint32_t>(mean_polar_rad / (spacing * std::sqrt(3.0) / 2.0) + 0.5));
@@ -111,11 +110,11 @@ Mesh make_scalp_cap(const glm::vec3& center_m, float radius_m, uint32_t vertex_t
   Ring inner{0, 1};
   for (uint32_t ring = 1; ring <= ring_total; ++ring) {
     const double part = static_cast<double>(ring) / ring_total;
-    const double around = 2.0 * kPi * std::sin(part * mean_polar_rad);
+    const double around = 2.0 * std::numbers::pi * std::sin(part * mean_polar_rad);
     const Ring outer{static_cast<uint32_t>(mesh.position_m.size()),
                      std::max(5u, static_cast<uint32_t>(around / spacing + 0.5))};
     for (uint32_t i = 0; i < outer.count; ++i) {
-      const double azimuth_rad = 2.0 * kPi * i / outer.count;
+      const double azimuth_rad = 2.0 * std::numbers::pi * i / outer.count;
       add_vertex(part * hairline_rad(azimuth_rad), azimuth_rad);
     }
     stitch_rings(inner, outer, mesh.triangle);

@@ -29,7 +29,7 @@ constexpr uint32_t kMinRoots = 64;
 /// as much for how far the hair hangs from it.
 constexpr double kClearlyBetter = 0.5;
 /// Roots that lie on that side of the head, and how far from the middle roots of a head are, in radii.
-constexpr double kOnTop = 0.1, kNearestRoot = 0.7, kFurthestRoot = 1.35;
+constexpr double kOnTop = 0.1, kNearestPlacedRoot = 0.7, kFurthestPlacedRoot = 1.35;
 enum class RootReach { Head, Everywhere };
 /// The hairline is looked at in so many directions round the head.
 constexpr size_t kSectors = 8;
@@ -52,7 +52,7 @@ std::vector<glm::dvec3> root_directions(const Groom& groom, RootReach reach) {
     const glm::dvec3 offset = glm::dvec3(root) - glm::dvec3(head.center_m);
     const double length = glm::length(offset), radii = length / static_cast<double>(head.radius_m);
     if (!std::isfinite(length) || !(length > 0.0)) continue;
-    if (reach == RootReach::Head && !(radii > kNearestRoot && radii < kFurthestRoot)) continue;
+    if (reach == RootReach::Head && !(radii > kNearestPlacedRoot && radii < kFurthestPlacedRoot)) continue;
     directions.push_back(offset / length);
   }
   return directions;

@@ -30,11 +30,6 @@ const TypeName& named(PlyType type) {
   return kTypes[static_cast<size_t>(type)];
 }
 
-template <class... Args>
-Error line_error(const TextScan& scan, ErrorCode code, fmt::format_string<Args...> format, Args&&... args) {
-  return at(fmt::format("line {}", scan.line()), make_error(code, format, std::forward<Args>(args)...));
-}
-
 Result<PlyType> read_type(TextScan& scan) {
   const std::string_view word = scan.next_word();
   for (const TypeName& known : kTypes)

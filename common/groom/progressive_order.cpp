@@ -15,21 +15,21 @@ namespace {
 constexpr float kRadiusStep = 0.75f;
 // 0.75^64 is 1e-8 of the extent, where float coordinates coincide anyway.
 constexpr int kMaxLevels = 64;
-constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+constexpr uint32_t kNoStrand = std::numeric_limits<uint32_t>::max();
 
 /// Taken points in hashed cells as wide as the radius. Taken points keep a distance of one radius, so a cell
 /// holds few.
 class TakenGrid {
  public:
   TakenGrid(std::span<const glm::vec3> points, const glm::vec3& corner, float radius)
-      : points_(points), corner_(corner), cell_(radius), next_(points.size(), kNone) {}
+      : points_(points), corner_(corner), cell_(radius), next_(points.size(), kNoStrand) {}
 
   /// Starts again with smaller cells and the given points.
   void rebuild(float radius, const std::vector<uint32_t>& taken) {
     cell_ = radius;
     size_t slots = 64;
     while (slots < taken.size() * 4) slots *= 2;
-    first_.assign(slots, kNone);
+    first_.assign(slots, kNoStrand);
     count_ = 0;
     for (const uint32_t index : taken) insert(index);
   }
@@ -72,7 +72,7 @@ class TakenGrid {
   }
 
   float distance_in(const Cell& cell, const glm::vec3& point) const {
-    for (uint32_t index = first_[slot_of(cell)]; index != kNone; index = next_[index]) {
+    for (uint32_t index = first_[slot_of(cell)]; index != kNoStrand; index = next_[index]) {
       const float distance = glm::distance(points_[index], point);
       if (distance < cell_) return distance;
     }
@@ -82,9 +82,9 @@ class TakenGrid {
   void grow() {
     std::vector<uint32_t> all;
     for (uint32_t index : first_) {
-      for (; index != kNone; index = next_[index]) all.push_back(index);
+      for (; index != kNoStrand; index = next_[index]) all.push_back(index);
     }
-    first_.assign(first_.size() * 4, kNone);
+    first_.assign(first_.size() * 4, kNoStrand);
     for (const uint32_t index : all) link(index);
   }
 

@@ -12,6 +12,7 @@
 #include <string>
 #include <string_view>
 
+#include "common/base/result.h"
 #include "common/base/text.h"
 
 namespace strandcast {
@@ -76,6 +77,12 @@ std::optional<T> parse_number(std::string_view word) {
 inline std::string quoted(std::string_view word) {
   constexpr size_t kMaxQuotedChars = 40;
   return fmt::format("'{}'", excerpt(word, kMaxQuotedChars));
+}
+
+/// An error with the number of the line that the scan is at.
+template <class... Args>
+Error line_error(const TextScan& scan, ErrorCode code, fmt::format_string<Args...> format, Args&&... args) {
+  return at(fmt::format("line {}", scan.line()), make_error(code, format, std::forward<Args>(args)...));
 }
 
 }  // namespace strandcast

@@ -126,7 +126,7 @@ Result<TfxHeader> read_header_v3(const ByteView& file) {
   return header;
 }
 
-Result<TfxHeader> read_header(const ByteView& file) {
+Result<TfxHeader> read_tfx_header(const ByteView& file) {
   if (!file.has(0, 1, kFloatBytes)) {
     return make_error(ErrorCode::BadInput, "{} bytes are too few for a .tfx file", file.size_bytes());
   }
@@ -193,7 +193,7 @@ Status read_root_uv(const ByteView& file, const TfxHeader& header, Groom& groom)
 }  // namespace
 
 Result<Groom> read_tfx_binary(const ByteView& file) {
-  ASSIGN_OR_RETURN(const TfxHeader header, read_header(file));
+  ASSIGN_OR_RETURN(const TfxHeader header, read_tfx_header(file));
   if (header.positions().offset == 0) {
     return make_error(ErrorCode::BadInput,
                       "the offset of the vertex positions is 0, they start at {} or later",

@@ -7,11 +7,6 @@
 namespace strandcast {
 namespace {
 
-template <class... Args>
-Error line_error(const TextScan& scan, ErrorCode code, fmt::format_string<Args...> format, Args&&... args) {
-  return at(fmt::format("line {}", scan.line()), make_error(code, format, std::forward<Args>(args)...));
-}
-
 Result<uint32_t> read_count(TextScan& scan, const char* what) {
   const std::string_view word = scan.next_word();
   const auto value = parse_number<uint32_t>(word);
@@ -60,7 +55,7 @@ Status read_version(TextScan& scan) {
 
 /// Reads up to and including the line "is sorted", or up to "numStrands" where that line is missing; the scan
 /// then stands on the first strand line.
-Result<TextHeader> read_header(TextScan& scan) {
+Result<TextHeader> read_text_header(TextScan& scan) {
   RETURN_IF_ERROR(read_version(scan));
   TextHeader header;
   bool has_count = false;
@@ -139,7 +134,7 @@ Status read_strand(TextScan& scan, uint32_t strand, Groom& groom) {
 
 Result<Groom> read_tfx_text(std::string_view text) {
   TextScan scan(text);
-  ASSIGN_OR_RETURN(const TextHeader header, read_header(scan));
+  ASSIGN_OR_RETURN(const TextHeader header, read_text_header(scan));
   Groom groom;
   groom.offset.push_back(0);
   for (uint32_t strand = 0; strand < header.strand_count; ++strand) {

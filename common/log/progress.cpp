@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "common/base/profile.h"
+#include "common/base/units.h"
 
 namespace strandcast {
 namespace {
@@ -16,7 +17,6 @@ namespace {
 // On a terminal the line is rewritten; in a log one line in a few seconds is enough.
 constexpr int64_t kTerminalIntervalNs = 100'000'000;
 constexpr int64_t kLogIntervalNs = 5'000'000'000;
-constexpr double kNsPerS = 1e9;
 
 }  // namespace
 

@@ -6,13 +6,13 @@
 
 #include "common/base/file.h"
 #include "common/base/quantile.h"
+#include "common/base/units.h"
 #include "common/motion/text_cursor.h"
 
 namespace strandcast {
 namespace {
 
 constexpr double kMaxTimeS = 1e12;  // doubles still resolve a tenth of a millisecond
-constexpr double kSecondsPerMillisecond = 1e-3;
 constexpr size_t kMaxNumberChars = 64;
 constexpr double kGapSteps = 2.5;  // of the usual step: a longer one is a gap
 
@@ -95,7 +95,7 @@ Result<Columns> parse_header(const TextCursor& cursor, std::string_view line) {
   if (!time) time = find_column(names, "time_s");
   if (!time) {
     time = find_column(names, "logger_ms");
-    columns.seconds_per_unit = kSecondsPerMillisecond;
+    columns.seconds_per_unit = kSPerMs;
   }
   if (!time)
     return cursor.fail(ErrorCode::BadInput,

@@ -15,9 +15,9 @@ extern "C" {
 namespace strandcast {
 namespace {
 
-constexpr double kTicksPerS = 1000.0;
-constexpr int kNoKeyframes = 1 << 20;  // pictures between two
-constexpr int kFinestQuantizer = 12;   // of 0..51
+constexpr double kH264TicksPerS = 1000.0;
+constexpr int kNoKeyframes = 1 << 20;     // pictures between two
+constexpr int kFinestH264Quantizer = 12;  // of 0..51
 constexpr int64_t kUnlimitedBits = 1'000'000'000;
 constexpr int64_t kMaxDecodedPixels = int64_t{kMaxPictureWidth + 16} * (kMaxPictureHeight + 16);
 
@@ -79,8 +79,8 @@ Result<ContextPtr> open_encoder(const VideoConfig& config, VideoRate rate) {
   context->width = static_cast<int>(config.width);
   context->height = static_cast<int>(config.height);
   context->pix_fmt = AV_PIX_FMT_YUV420P;
-  context->framerate = {static_cast<int>(std::lround(config.rate_hz * kTicksPerS)),
-                        static_cast<int>(kTicksPerS)};
+  context->framerate = {static_cast<int>(std::lround(config.rate_hz * kH264TicksPerS)),
+                        static_cast<int>(kH264TicksPerS)};
   context->time_base = av_inv_q(context->framerate);
   context->gop_size = kNoKeyframes;
   context->max_b_frames = 0;
@@ -89,7 +89,7 @@ Result<ContextPtr> open_encoder(const VideoConfig& config, VideoRate rate) {
   context->flags |= AV_CODEC_FLAG_LOW_DELAY;
   context->color_range = AVCOL_RANGE_MPEG;
   context->colorspace = AVCOL_SPC_SMPTE170M;
-  context->qmin = kFinestQuantizer;
+  context->qmin = kFinestH264Quantizer;
   set_rate(*context, config.bits_per_s, rate);
   AVDictionary* options = nullptr;
   for (const auto& [key, value] : kEncoderOptions) av_dict_set(&options, key, value, 0);

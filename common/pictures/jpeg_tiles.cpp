@@ -14,8 +14,8 @@
 namespace strandcast {
 namespace {
 
-constexpr size_t kChannels = 4;
-constexpr size_t kTilePixelBytes = size_t{kTileSide} * kTileSide * kChannels;
+constexpr size_t kTileChannels = 4;
+constexpr size_t kTilePixelBytes = size_t{kTileSide} * kTileSide * kTileChannels;
 /// A JPEG is at most 65,535 pixels high.
 constexpr size_t kBatchTiles = 256;
 constexpr uint8_t kMarker = 0xff;
@@ -87,11 +87,11 @@ bool has_marker(std::span<const std::byte> scan) {
 void blit(std::span<const uint8_t> tile, uint32_t index, Image& canvas) {
   const uint32_t columns = tiles_along(canvas.width);
   const uint32_t left = index % columns * kTileSide, top = index / columns * kTileSide;
-  const size_t row_bytes = std::min(kTileSide, canvas.width - left) * kChannels;
+  const size_t row_bytes = std::min(kTileSide, canvas.width - left) * kTileChannels;
   const uint32_t rows = std::min(kTileSide, canvas.height - top);
   for (uint32_t y = 0; y < rows; ++y)
-    std::memcpy(canvas.rgba.data() + ((size_t{top} + y) * canvas.width + left) * kChannels,
-                tile.data() + size_t{y} * kTileSide * kChannels, row_bytes);
+    std::memcpy(canvas.rgba.data() + ((size_t{top} + y) * canvas.width + left) * kTileChannels,
+                tile.data() + size_t{y} * kTileSide * kTileChannels, row_bytes);
 }
 
 }  // namespace
@@ -134,18 +134,18 @@ Result<CodedTile> TileEncoder::encode(const Image& image, uint32_t index, uint8_
   const uint32_t columns = tiles_along(image.width);
   const uint32_t left = index % columns * kTileSide, top = index / columns * kTileSide;
   const uint32_t columns_left = image.width - left, rows_left = image.height - top;
-  const uint8_t* source = image.rgba.data() + (size_t{top} * image.width + left) * kChannels;
-  size_t pitch = size_t{image.width} * kChannels;
+  const uint8_t* source = image.rgba.data() + (size_t{top} * image.width + left) * kTileChannels;
+  size_t pitch = size_t{image.width} * kTileChannels;
   if (columns_left < kTileSide || rows_left < kTileSide) {
     padded_.resize(kTilePixelBytes);
     for (uint32_t y = 0; y < kTileSide; ++y) {
       const uint8_t* row = source + std::min(y, rows_left - 1) * pitch;
       for (uint32_t x = 0; x < kTileSide; ++x)
-        std::memcpy(padded_.data() + (size_t{y} * kTileSide + x) * kChannels,
-                    row + std::min(x, columns_left - 1) * kChannels, kChannels);
+        std::memcpy(padded_.data() + (size_t{y} * kTileSide + x) * kTileChannels,
+                    row + std::min(x, columns_left - 1) * kTileChannels, kTileChannels);
     }
     source = padded_.data();
-    pitch = size_t{kTileSide} * kChannels;
+    pitch = size_t{kTileSide} * kTileChannels;
   }
   jpeg_.resize(tjBufSize(kTileSide, kTileSide, TJSAMP_444));
   unsigned char* bytes = jpeg_.data();
@@ -252,7 +252,7 @@ Status TileDecoder::decode(std::span<const std::byte> payload, Scope scope, Imag
   if (scope == Scope::Whole) {
     canvas.width = width;
     canvas.height = height;
-    canvas.rgba.resize(size_t{width} * height * kChannels);
+    canvas.rgba.resize(size_t{width} * height * kTileChannels);
   }
   for (size_t i = 0; i < places.size(); ++i)
     blit(std::span(pixels).subspan(i * kTilePixelBytes, kTilePixelBytes), places[i], canvas);

@@ -15,10 +15,10 @@
 namespace strandcast {
 namespace {
 
-constexpr int kCpuUsed = -12;             // negative: a fixed speed, not one that follows the load
-constexpr uint32_t kFinestQuantizer = 4;  // of 0..63
+constexpr int kCpuUsed = -12;                // negative: a fixed speed, not one that follows the load
+constexpr uint32_t kFinestVp8Quantizer = 4;  // of 0..63
 constexpr uint32_t kCoarsestQuantizer = 63;
-constexpr double kTicksPerS = 1000.0;
+constexpr double kVp8TicksPerS = 1000.0;
 /// What a keyframe may take, in percent of what an average frame does; about what it needs to look alike.
 constexpr uint32_t kKeyframePercent = 500;
 constexpr auto kBufferMs = static_cast<unsigned>(1e3 * kVideoBufferS);
@@ -57,7 +57,8 @@ Error vpx_error(const char* what, vpx_codec_ctx_t* codec, ErrorCode code) {
 class Vp8Encoder : public VideoEncoder {
  public:
   explicit Vp8Encoder(const VideoConfig& config)
-      : VideoEncoder(config), frame_ticks_(std::max<int64_t>(std::llround(kTicksPerS / config.rate_hz), 1)) {}
+      : VideoEncoder(config),
+        frame_ticks_(std::max<int64_t>(std::llround(kVp8TicksPerS / config.rate_hz), 1)) {}
 
   Status start() {
     if (vpx_codec_enc_config_default(vpx_codec_vp8_cx(), &vpx_, 0) != VPX_CODEC_OK)
@@ -65,7 +66,7 @@ class Vp8Encoder : public VideoEncoder {
     vpx_.g_w = config().width;
     vpx_.g_h = config().height;
     vpx_.g_threads = 1;
-    vpx_.g_timebase = {1, static_cast<int>(kTicksPerS)};
+    vpx_.g_timebase = {1, static_cast<int>(kVp8TicksPerS)};
     vpx_.g_pass = VPX_RC_ONE_PASS;
     vpx_.g_lag_in_frames = 0;
     vpx_.g_error_resilient = 0;
@@ -74,7 +75,7 @@ class Vp8Encoder : public VideoEncoder {
     vpx_.rc_dropframe_thresh = 0;
     vpx_.rc_resize_allowed = 0;
     vpx_.rc_target_bitrate = kilobits(config().bits_per_s);
-    vpx_.rc_min_quantizer = kFinestQuantizer;
+    vpx_.rc_min_quantizer = kFinestVp8Quantizer;
     vpx_.rc_max_quantizer = kCoarsestQuantizer;
     vpx_.rc_buf_sz = kBufferMs;
     vpx_.rc_buf_initial_sz = kBufferInitialMs;
@@ -115,7 +116,7 @@ class Vp8Encoder : public VideoEncoder {
 
   Status set_rate(VideoRate rate) {
     const unsigned target = kilobits(config().bits_per_s);
-    const uint32_t coarsest = rate == VideoRate::Finest ? kFinestQuantizer : kCoarsestQuantizer;
+    const uint32_t coarsest = rate == VideoRate::Finest ? kFinestVp8Quantizer : kCoarsestQuantizer;
     if (target == vpx_.rc_target_bitrate && coarsest == vpx_.rc_max_quantizer) return {};
     vpx_.rc_target_bitrate = target;
     vpx_.rc_max_quantizer = coarsest;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/base/output_file.h"
+#include "common/base/units.h"
 #include "common/pictures/video_codec.h"
 
 namespace strandcast {
@@ -16,8 +17,7 @@ namespace {
 
 constexpr double kUsualBitsPerPixel = 0.15;
 constexpr double kKeyframeS =
-    2.0;  // a keyframe, with which a cluster begins, so often: players seek to these
-constexpr double kMsPerS = 1e3;
+    2.0;                          // a keyframe, with which a cluster begins, so often: players seek to these
 constexpr size_t kSizeBytes = 8;  // of sizes that are known later
 
 enum Id : uint32_t {
@@ -113,8 +113,7 @@ struct WebmWriter::State {
                            number(kDocTypeVersion, 4) + number(kDocTypeReadVersion, 2))));
     RETURN_IF_ERROR(file->append(id_bytes(kSegment) + size_bytes(0)));
     segment_at = file->size_bytes();
-    constexpr uint64_t kNsPerMs = 1'000'000;
-    const std::string info = number(kTimestampScale, kNsPerMs) + element(kMuxingApp, "strandcast") +
+    const std::string info = number(kTimestampScale, kMsInNs) + element(kMuxingApp, "strandcast") +
                              element(kWritingApp, "strandcast") + real(kDuration, 0.0);
     RETURN_IF_ERROR(file->append(element(kInfo, info)));
     duration_at = file->size_bytes() - sizeof(double);

@@ -8,7 +8,7 @@
 namespace strandcast {
 namespace {
 
-constexpr size_t kChannels = 4;
+constexpr size_t kRgbaBytes = 4;
 
 /// Parts of red, green and blue, times 65536: ITU-R BT.601 with 219 levels of luma from 16 on, and 224 of
 /// colour around 128.
@@ -32,22 +32,22 @@ uint8_t weigh(const Weights& weights, std::array<int32_t, 3> rgb, int32_t base, 
 
 void fill_luma(const Image& image, const YuvPlane& plane) {
   for (size_t y = 0; y < image.height; ++y) {
-    const uint8_t* pixel = image.rgba.data() + y * image.width * kChannels;
+    const uint8_t* pixel = image.rgba.data() + y * image.width * kRgbaBytes;
     uint8_t* sample = plane.data + static_cast<ptrdiff_t>(y) * plane.stride_bytes;
-    for (size_t x = 0; x < image.width; ++x, pixel += kChannels)
+    for (size_t x = 0; x < image.width; ++x, pixel += kRgbaBytes)
       sample[x] = weigh(kLuma, {pixel[0], pixel[1], pixel[2]}, kLumaBase, 0);
   }
 }
 
 void fill_colours(const Image& image, const YuvPlanes& planes) {
   for (size_t y = 0; y < image.height; y += 2) {
-    const uint8_t* upper = image.rgba.data() + y * image.width * kChannels;
-    const uint8_t* lower = y + 1 < image.height ? upper + size_t{image.width} * kChannels : upper;
+    const uint8_t* upper = image.rgba.data() + y * image.width * kRgbaBytes;
+    const uint8_t* lower = y + 1 < image.height ? upper + size_t{image.width} * kRgbaBytes : upper;
     uint8_t* blue = planes.blue.data + static_cast<ptrdiff_t>(y / 2) * planes.blue.stride_bytes;
     uint8_t* red = planes.red.data + static_cast<ptrdiff_t>(y / 2) * planes.red.stride_bytes;
     for (size_t x = 0; x < image.width; x += 2) {
-      const size_t left = x * kChannels;
-      const size_t right = x + 1 < image.width ? left + kChannels : left;
+      const size_t left = x * kRgbaBytes;
+      const size_t right = x + 1 < image.width ? left + kRgbaBytes : left;
       std::array<int32_t, 3> sum{};
       for (size_t c = 0; c < sum.size(); ++c)
         sum[c] = upper[left + c] + upper[right + c] + lower[left + c] + lower[right + c];
@@ -65,12 +65,12 @@ void fill_planes(const Image& image, const YuvPlanes& planes) {
 }
 
 Image make_image(const YuvPlanes& planes, uint32_t width, uint32_t height) {
-  Image image{width, height, std::vector<uint8_t>(size_t{width} * height * kChannels)};
+  Image image{width, height, std::vector<uint8_t>(size_t{width} * height * kRgbaBytes)};
   // In memory R, G, B, A; libyuv names formats by their words.
   libyuv::I420ToABGR(planes.luma.data, static_cast<int>(planes.luma.stride_bytes), planes.blue.data,
                      static_cast<int>(planes.blue.stride_bytes), planes.red.data,
                      static_cast<int>(planes.red.stride_bytes), image.rgba.data(),
-                     static_cast<int>(width * kChannels), static_cast<int>(width), static_cast<int>(height));
+                     static_cast<int>(width * kRgbaBytes), static_cast<int>(width), static_cast<int>(height));
   return image;
 }
 

@@ -18,7 +18,7 @@ constexpr float kBandCells = 1.5f;
 constexpr float kFarCells = 1e6f;
 constexpr float kMostSteps = 127.0f;
 // Coordinates of a head's mesh that count.
-constexpr float kFarM = 1e4f;
+constexpr float kFarHeadM = 1e4f;
 // Round the hair lies what it throws shadows on, and what throws them on it: this share of its extent further
 // out.
 constexpr float kRoomShare = 0.35f;
@@ -44,7 +44,8 @@ std::vector<Corners> usable_triangles(const Mesh& mesh, const HeadOccupancy& gri
     bool is_usable = true;
     for (int k = 0; k < 3; ++k) {
       const glm::vec3& p = mesh.position_m[corner[k]];
-      is_usable = is_usable && std::abs(p.x) < kFarM && std::abs(p.y) < kFarM && std::abs(p.z) < kFarM;
+      is_usable =
+          is_usable && std::abs(p.x) < kFarHeadM && std::abs(p.y) < kFarHeadM && std::abs(p.z) < kFarHeadM;
       key += hash_bytes(std::as_bytes(std::span(&p, 1)));
       at[k] = glm::dvec3(p - grid.origin_m) / static_cast<double>(grid.cell_m);
     }
@@ -264,11 +265,11 @@ std::vector<float> mesh_distances(const Mesh& mesh, const HeadOccupancy& grid) {
 
 HeadOccupancy make_head_occupancy(const Mesh& mesh, const OccupancyRequest& request) {
   // No more than what there is.
-  glm::vec3 low(kFarM), high(-kFarM);
+  glm::vec3 low(kFarHeadM), high(-kFarHeadM);
   for (const glm::uvec3& corner : mesh.triangle)
     for (int k = 0; k < 3; ++k) {
       const glm::vec3& p = mesh.position_m[corner[k]];
-      if (!(std::abs(p.x) < kFarM && std::abs(p.y) < kFarM && std::abs(p.z) < kFarM)) continue;
+      if (!(std::abs(p.x) < kFarHeadM && std::abs(p.y) < kFarHeadM && std::abs(p.z) < kFarHeadM)) continue;
       low = glm::min(low, p);
       high = glm::max(high, p);
     }
@@ -326,9 +327,9 @@ HeadOccupancy make_head_occupancy(const SceneAsset& asset, const std::optional<F
   if (asset.head.triangle.empty() || asset.rest_position_m.empty()) return {};
   OccupancyRequest request;
   request.ball = skull;
-  glm::vec3 low(kFarM), high(-kFarM);
+  glm::vec3 low(kFarHeadM), high(-kFarHeadM);
   for (const glm::vec3& p : asset.rest_position_m) {
-    if (!(std::abs(p.x) < kFarM && std::abs(p.y) < kFarM && std::abs(p.z) < kFarM)) continue;
+    if (!(std::abs(p.x) < kFarHeadM && std::abs(p.y) < kFarHeadM && std::abs(p.z) < kFarHeadM)) continue;
     low = glm::min(low, p);
     high = glm::max(high, p);
   }

@@ -18,11 +18,11 @@ constexpr float kRoom = 1.2f;
 constexpr int kSizeStep = 8;
 // Workers that sum have a lattice each.
 constexpr uint32_t kMaxSummingWorkers = 4;
-constexpr size_t kStrandsPerRange = 64;
+constexpr size_t kSplatStrandsPerRange = 64;
 // Points that fit_lattice() looks at.
 constexpr size_t kPointsSeen = 65536;
 // Further out, or no number: says nothing about where the hair is.
-constexpr float kFarM = 1e4f;
+constexpr float kFarLatticeM = 1e4f;
 
 glm::vec3 any_across(const glm::vec3& axis) {
   const glm::vec3 other = std::abs(axis.y) < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0);
@@ -62,7 +62,8 @@ struct Bounds {
   glm::vec3 high{-1e30f};
 
   void add(const glm::vec3& p, const LatticeFrame& frame) {
-    if (!(std::abs(p.x) < kFarM && std::abs(p.y) < kFarM && std::abs(p.z) < kFarM)) return;
+    if (!(std::abs(p.x) < kFarLatticeM && std::abs(p.y) < kFarLatticeM && std::abs(p.z) < kFarLatticeM))
+      return;
     const glm::vec3 q = along_axes(p, frame);
     low = glm::min(low, q);
     high = glm::max(high, q);
@@ -185,7 +186,7 @@ void LightLattice::sum_strands(const StrandPoints& points, const LightStrands& s
         const StrandPoint& b = points.point[i + 1];
         const glm::vec3 step(b.x - a.x, b.y - a.y, b.z - a.z);
         const float length_m = std::sqrt(glm::dot(step, step));
-        if (!(length_m < kFarM)) continue;
+        if (!(length_m < kFarLatticeM)) continue;
         const float along = (static_cast<float>(i - first) + 0.5f) * along_step;
         const float cover = std::min((1.0f - along) * fade + 0.1f, 1.0f);
         const float amount = per_m * length_m * cover * (1.0f + (strands.tip_scale - 1.0f) * along * along);
@@ -201,7 +202,7 @@ void LightLattice::sum_strands(const StrandPoints& points, const LightStrands& s
       }
     }
   };
-  workers.at(Priority::Drawing, summing).for_ranges(points.strand_count(), kStrandsPerRange, sum_range);
+  workers.at(Priority::Drawing, summing).for_ranges(points.strand_count(), kSplatStrandsPerRange, sum_range);
   summed_.clear();
   for (uint32_t worker = 0; worker < summing; ++worker)
     if (is_used[worker] != 0) summed_.push_back(sums_[worker].data());

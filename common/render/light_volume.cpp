@@ -8,9 +8,9 @@ namespace strandcast {
 namespace {
 
 // Mean |sine| between a strand and the light when strands point everywhere.
-constexpr float kMeanCrossing = 0.785398f;
+constexpr float kMeanVolumeCrossing = 0.785398f;
 // Part of the light that one strand takes out; the rest passes or is scattered onwards.
-constexpr float kStrandOpacity = 0.30f;
+constexpr float kVolumeStrandOpacity = 0.30f;
 // The surrounding light also seeps in between strands from directions that are not swept.
 constexpr float kSurroundingShare = 0.45f;
 // Optical depth per metre inside the skull.
@@ -22,8 +22,8 @@ constexpr size_t kMaxSplats = 60'000;
 constexpr float kPiecesPerCell = 2.0f;
 constexpr int kMaxPieces = kMaxLightCells;
 // Coordinates further out, in cells, or not a number say nothing about where the hair is.
-constexpr float kFarCells = 1e6f;
-constexpr int kSizeStep = 4;  // cells; the texture is not made anew for every small movement
+constexpr float kFarVolumeDistance = 1e6f;
+constexpr int kVolumeSizeStep = 4;  // cells; the texture is not made anew for every small movement
 
 struct Sweep {
   glm::vec3 to_light;
@@ -85,12 +85,12 @@ void LightVolume::fit_lattice(const std::vector<glm::vec3>& position_m) {
   }
   const auto cell_of = [&](float value) {
     const float cell = value / desc_.cell_m;
-    return std::abs(cell) < kFarCells ? static_cast<int>(std::floor(cell)) : 0;
+    return std::abs(cell) < kFarVolumeDistance ? static_cast<int>(std::floor(cell)) : 0;
   };
   for (int axis = 0; axis < 3; ++axis) {
     const int first = cell_of(low[axis]) - 1;
     const int count = cell_of(high[axis]) + 2 - first;
-    const int rounded = (count + kSizeStep - 1) / kSizeStep * kSizeStep;
+    const int rounded = (count + kVolumeSizeStep - 1) / kVolumeSizeStep * kVolumeSizeStep;
     // A volume that is too long keeps its middle.
     const int kept = std::min(rounded, kMaxLightCells);
     size_[axis] = kept;
@@ -106,7 +106,7 @@ void LightVolume::add_strands(const std::vector<glm::vec3>& position_m) {
   const size_t stride = keys * gaps * usual_pieces / kMaxSplats + 1;
   const float cell_volume = desc_.cell_m * desc_.cell_m * desc_.cell_m;
   const float per_length = desc_.strands_per_key * static_cast<float>(stride) * desc_.strand_width_m *
-                           kMeanCrossing * kStrandOpacity / cell_volume;
+                           kMeanVolumeCrossing * kVolumeStrandOpacity / cell_volume;
   for (uint32_t gap = 0; gap < gaps; ++gap) {
     for (size_t strand = gap % stride; strand < keys; strand += stride) {
       const glm::vec3& a = position_m[gap * keys + strand];

@@ -8,7 +8,7 @@ namespace strandcast {
 namespace {
 
 constexpr double kNearShare = 0.02;  // near plane, of the distance to the target
-constexpr double kFarM = 50.0;       // behind the target
+constexpr double kFarPlaneM = 50.0;  // behind the target
 constexpr double kParallel = 0.999;  // |cosine| from which the view counts as straight up or down
 
 bool is_finite(const glm::vec3& v) {
@@ -38,7 +38,7 @@ Result<View> make_view(const CameraDesc& camera, const glm::dquat& world_from_he
   const double near_m = kNearShare * distance_m;
   const double aspect = static_cast<double>(target_px.x) / target_px.y;
   const glm::dmat4 clip_from_eye =
-      glm::perspective(static_cast<double>(camera.fov_y_rad), aspect, near_m, distance_m + kFarM);
+      glm::perspective(static_cast<double>(camera.fov_y_rad), aspect, near_m, distance_m + kFarPlaneM);
   const glm::dmat4 eye_from_world = glm::lookAt(eye, target, screen_up);
   const glm::dmat3 head_from_world = glm::transpose(glm::mat3_cast(world_from_head_rotation));
 
@@ -50,7 +50,7 @@ Result<View> make_view(const CameraDesc& camera, const glm::dquat& world_from_he
   view.target_px = glm::vec2(target_px);
   view.focal_px = static_cast<float>(0.5 * target_px.y / std::tan(0.5 * camera.fov_y_rad));
   view.near_m = static_cast<float>(near_m);
-  view.far_m = static_cast<float>(distance_m + kFarM);
+  view.far_m = static_cast<float>(distance_m + kFarPlaneM);
   view.target_distance_m = static_cast<float>(distance_m);
   return view;
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/base/quantile.h"
+#include "common/base/units.h"
 
 namespace strandcast {
 namespace {
@@ -12,7 +13,6 @@ namespace {
 constexpr double kLatenessQuantile = 0.95;
 /// A stream that has become slower shows in as many frames.
 constexpr size_t kRecentFrames = 8;
-constexpr double kNsPerS = 1e9;
 
 }  // namespace
 

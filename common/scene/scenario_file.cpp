@@ -21,7 +21,7 @@ namespace {
 namespace pb = google::protobuf;
 using scene_fields::Range;
 
-constexpr int kMaxNesting = 8;
+constexpr int kMaxScenarioNesting = 8;
 constexpr size_t kMaxWordBytes = 64;
 constexpr size_t kMaxTextBytes = 4'096;  // an assignment may set a whole group
 constexpr uint32_t kMaxSteps = 100'000;
@@ -401,7 +401,7 @@ Result<Scenario> parse_scenario(const std::string& text, const std::string& plac
   pb::TextFormat::Parser parser;
   parser.RecordErrorsTo(&errors);
   parser.WriteLocationsTo(&tree);
-  parser.SetRecursionLimit(kMaxNesting);
+  parser.SetRecursionLimit(kMaxScenarioNesting);
   if (!parser.ParseFromString(text, &message)) return errors.error(place);
   Findings findings{place, {}};
   Scenario scenario = ScenarioReader(folder).read(Part(message, &tree, findings));

@@ -2,6 +2,22 @@
 
 namespace strandcast {
 
+LookDesc::LookDesc() = default;
+LookDesc::LookDesc(const LookDesc&) = default;
+LookDesc::LookDesc(LookDesc&&) noexcept = default;
+LookDesc& LookDesc::operator=(const LookDesc&) = default;
+LookDesc& LookDesc::operator=(LookDesc&&) noexcept = default;
+LookDesc::~LookDesc() = default;
+bool LookDesc::operator==(const LookDesc&) const = default;
+
+SceneDesc::SceneDesc() = default;
+SceneDesc::SceneDesc(const SceneDesc&) = default;
+SceneDesc::SceneDesc(SceneDesc&&) noexcept = default;
+SceneDesc& SceneDesc::operator=(const SceneDesc&) = default;
+SceneDesc& SceneDesc::operator=(SceneDesc&&) noexcept = default;
+SceneDesc::~SceneDesc() = default;
+bool SceneDesc::operator==(const SceneDesc&) const = default;
+
 SceneDesc built_in_scene() {
   SceneDesc scene;
   // A light breeze from the front left: strong enough to see, too weak to lift the hair off the head.

@@ -187,7 +187,14 @@ struct LookDesc {
   glm::vec3 skin_color{0.55f, 0.38f, 0.29f};
   RenderMethodsDesc methods;
 
-  bool operator==(const LookDesc&) const = default;
+  // Out of line: copied and taken apart in many files, which need no copy of that code.
+  LookDesc();
+  LookDesc(const LookDesc&);
+  LookDesc(LookDesc&&) noexcept;
+  LookDesc& operator=(const LookDesc&);
+  LookDesc& operator=(LookDesc&&) noexcept;
+  ~LookDesc();
+  bool operator==(const LookDesc&) const;
 };
 
 /// Camera about the head: it follows the head's position, not its rotation.
@@ -241,7 +248,14 @@ struct SceneDesc {
   // Further heads, at most kMaxHeads - 1: whole scenes with names of their own, without heads.
   std::vector<SceneDesc> heads = {};
 
-  bool operator==(const SceneDesc&) const = default;
+  // Out of line: copied and taken apart in many files, which need no copy of that code.
+  SceneDesc();
+  SceneDesc(const SceneDesc&);
+  SceneDesc(SceneDesc&&) noexcept;
+  SceneDesc& operator=(const SceneDesc&);
+  SceneDesc& operator=(SceneDesc&&) noexcept;
+  ~SceneDesc();
+  bool operator==(const SceneDesc&) const;
 };
 
 /// The scene that runs when no file is given: 2,000 procedural strands x 16, head, gentle gusts.

@@ -17,7 +17,7 @@ namespace {
 
 namespace pb = google::protobuf;
 
-constexpr size_t kMaxShownChars = 200;  // of an assignment, in error messages
+constexpr size_t kMaxOverrideChars = 200;  // of an assignment, in error messages
 
 /// Keeps the first message of the parser instead of printing it.
 class FirstError : public pb::io::ErrorCollector {
@@ -172,7 +172,7 @@ std::string_view override_path(std::string_view assignment) {
 }
 
 Status apply_override(pb::Message& scene, const std::string& assignment) {
-  const std::string place = fmt::format("--set {}", excerpt(assignment, kMaxShownChars));
+  const std::string place = fmt::format("--set {}", excerpt(assignment, kMaxOverrideChars));
   if (assignment.size() > kMaxOverrideBytes)
     return at(place, make_error(ErrorCode::LimitExceeded, "the override has {} bytes, the limit is {}",
                                 assignment.size(), kMaxOverrideBytes));

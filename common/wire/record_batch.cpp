@@ -11,24 +11,24 @@ namespace {
 constexpr std::byte kItemTag{0x0a};   // field 1, of bytes
 constexpr std::byte kOrderTag{0x12};  // field 2, packed
 constexpr std::byte kSpanTag{0x19};   // field 3, fixed64
-constexpr uint64_t kVarintBits = 7;
-constexpr uint64_t kVarintMore = 1u << kVarintBits;
+constexpr uint64_t kBatchVarintBits = 7;
+constexpr uint64_t kBatchVarintMore = 1u << kBatchVarintBits;
 constexpr uint64_t kMostVarintShift = 63;
 
 void put_varint(uint64_t value, std::vector<std::byte>& bytes) {
-  for (; value >= kVarintMore; value >>= kVarintBits)
-    bytes.push_back(static_cast<std::byte>(value % kVarintMore + kVarintMore));
+  for (; value >= kBatchVarintMore; value >>= kBatchVarintBits)
+    bytes.push_back(static_cast<std::byte>(value % kBatchVarintMore + kBatchVarintMore));
   bytes.push_back(static_cast<std::byte>(value));
 }
 
 /// Reads what put_varint() wrote; nothing where it is too long or cut off.
 std::optional<uint64_t> take_varint(ByteReader& reader) {
   uint64_t value = 0;
-  for (uint64_t shift = 0; shift < kMostVarintShift; shift += kVarintBits) {
+  for (uint64_t shift = 0; shift < kMostVarintShift; shift += kBatchVarintBits) {
     const uint64_t byte = reader.take<uint8_t>();
     if (!reader.ok()) return std::nullopt;
-    value |= (byte % kVarintMore) << shift;
-    if (byte < kVarintMore) return value;
+    value |= (byte % kBatchVarintMore) << shift;
+    if (byte < kBatchVarintMore) return value;
   }
   return std::nullopt;
 }

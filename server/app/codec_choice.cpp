@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/base/quantile.h"
+#include "common/base/units.h"
 #include "common/base/worker_pool.h"
 #include "common/math/pose.h"
 #include "common/strands/strand_codec.h"
@@ -83,7 +84,6 @@ double states_per_second(const SceneDesc& scene) {
 }
 
 CodecChoice choose_codec(const EncodeCost& cost) {
-  constexpr double kMsPerS = 1e3;
   const double room_ms = kEncodeShare * cost.processors * kMsPerS / cost.states_hz;
   const bool is_kept = cost.cpu_ms <= room_ms;
   const std::string measured = fmt::format(

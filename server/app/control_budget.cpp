@@ -2,10 +2,11 @@
 
 #include <algorithm>
 
+#include "common/base/units.h"
+
 namespace strandcast {
 
 bool ControlBudget::take(SessionId session, int64_t time_ns) {
-  constexpr double kSPerNs = 1e-9;
   Bucket& bucket = buckets_.try_emplace(session, Bucket{kControlBurst, time_ns}).first->second;
   const double passed_s = static_cast<double>(time_ns - bucket.time_ns) * kSPerNs;
   bucket.left = std::min(kControlBurst, bucket.left + passed_s * kControlsPerS);

@@ -4,12 +4,11 @@
 #include <utility>
 
 #include "common/base/profile.h"
+#include "common/base/units.h"
 #include "server/net/metrics.h"
 
 namespace strandcast {
 namespace {
-
-constexpr double kMsPerNs = 1e-6;
 
 double ms_between(int64_t from_ns, int64_t to_ns) {
   return static_cast<double>(to_ns - from_ns) * kMsPerNs;

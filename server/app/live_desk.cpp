@@ -5,6 +5,7 @@
 
 #include "common/base/profile.h"
 #include "common/base/text.h"
+#include "common/base/units.h"
 #include "common/log/log.h"
 
 namespace strandcast {
@@ -95,7 +96,6 @@ Result<std::unique_ptr<LiveDesk>> LiveDesk::open(std::vector<Target> targets,
       for (size_t other = 0; other < first; ++other)
         if (is_same_place(ports[inputs[other].socket], port)) input.socket = inputs[other].socket;
       if (input.socket == ports.size()) ports.push_back(port);
-      constexpr double kNsPerMs = 1e6;
       targets[head].inputs->set_delay(input.id, static_cast<int64_t>(live.delay_ms * kNsPerMs));
       inputs.push_back(std::move(input));
     }

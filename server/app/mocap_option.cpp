@@ -8,14 +8,14 @@
 namespace strandcast {
 namespace {
 
-constexpr size_t kMaxShownChars = 100;
+constexpr size_t kMaxOptionChars = 100;
 constexpr uint32_t kMaxPort = 65'535;
 
 Error not_understood(const std::string& text, const char* why) {
   return make_error(ErrorCode::BadInput,
                     "--mocap {}: {}; it is PROTOCOL, PROTOCOL:PORT or PROTOCOL://HOST:PORT, such as vmc, "
                     "opentrack:4242, natnet://10.0.0.5 or vrpn://HOST",
-                    excerpt(text, kMaxShownChars), why);
+                    excerpt(text, kMaxOptionChars), why);
 }
 
 /// The port behind a colon.

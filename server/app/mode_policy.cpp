@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/base/units.h"
 #include "server/net/flow_control.h"
 
 namespace strandcast {
@@ -11,7 +12,6 @@ namespace {
 
 using Limit = ModePrediction::Limit;
 
-constexpr double kMsPerS = 1e3;
 constexpr double kBitsPerMbit = 1e6;
 
 double usable_bytes_per_s(const ModeFacts& facts) {
@@ -33,7 +33,7 @@ void limit_to_work(ModePrediction& prediction, double work_ms, Limit limit) {
 /// What the way takes: half a round trip, the frame itself, and on a link that is full what waits before it.
 double way_ms(const ModeFacts& facts, double frame_bytes, bool is_full) {
   if (facts.capacity_bytes_per_s <= 0.0) return facts.round_trip_ms / 2.0;
-  const double waiting_ms = is_full ? static_cast<double>(kGateDelayNs) / kNsPerMs : 0.0;
+  const double waiting_ms = is_full ? static_cast<double>(kGateDelayNs) / kMsInNs : 0.0;
   return facts.round_trip_ms / 2.0 + frame_bytes / facts.capacity_bytes_per_s * kMsPerS + waiting_ms;
 }
 

@@ -12,6 +12,8 @@
 #include <sstream>
 #include <vector>
 
+#include "common/base/units.h"
+
 namespace strandcast {
 namespace {
 
@@ -20,7 +22,6 @@ std::string metric(const char* name, const char* type, const char* help, double 
 }
 
 double seconds_of(const timeval& time) {
-  constexpr double kSPerUs = 1e-6;
   return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_usec) * kSPerUs;
 }
 

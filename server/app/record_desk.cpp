@@ -8,6 +8,7 @@
 #include "common/base/thread_name.h"
 #include "common/log/log.h"
 #include "server/app/head_files.h"
+#include "server/net/roles.h"
 
 namespace strandcast {
 namespace {
@@ -37,11 +38,6 @@ std::string text_of(const Recorder& recorder, const std::string& end) {
       fmt::format("{}: {:.1f} s, {:.1f} MB", recorder.path().filename().string(), counts.length_s,
                   static_cast<double>(counts.written_bytes) / kBytesPerMb);
   return end.empty() ? text : text + "; it ended by itself: " + end;
-}
-
-int64_t unix_time_s() {
-  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
 }
 
 /// What a tap was told, for a thread that waits for it.

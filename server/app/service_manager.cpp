@@ -15,12 +15,13 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/units.h"
+
 namespace strandcast {
 namespace {
 
 constexpr int kFirstPassed = 3;  // behind standard input, output and error
 constexpr int64_t kMostPassed = 16;
-constexpr int64_t kNsPerUs = 1'000;
 
 /// A whole number of the environment; nothing where it is missing or none.
 std::optional<int64_t> number_of(const char* variable) {
@@ -93,7 +94,7 @@ ServiceManager ServiceManager::of_environment() {
   if (manager.address_.size() > sizeof(sockaddr_un::sun_path)) return manager;
   manager.socket_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   const bool has_watchdog = std::getenv("WATCHDOG_PID") == nullptr || is_for_us("WATCHDOG_PID");
-  if (has_watchdog) manager.watchdog_ns_ = number_of("WATCHDOG_USEC").value_or(0) * kNsPerUs;
+  if (has_watchdog) manager.watchdog_ns_ = number_of("WATCHDOG_USEC").value_or(0) * kUsInNs;
   return manager;
 }
 

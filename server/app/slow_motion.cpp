@@ -5,14 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/units.h"
 #include "common/groom/groom.h"
 #include "server/app/codec_choice.h"
 #include "server/app/server.h"
 
 namespace strandcast {
 namespace {
-
-constexpr double kMsPerS = 1e3;
 
 /// Half as many vertices per strand.
 std::string fewer_vertices(const SceneDesc& scene, uint32_t vertex_count) {

@@ -7,15 +7,12 @@
 
 #include "common/base/check.h"
 #include "common/base/text.h"
+#include "common/base/units.h"
 #include "common/wire/messages.h"
 #include "server/net/strand_class.h"
 
 namespace strandcast {
 namespace {
-
-constexpr double kSPerMs = 1e-3;
-constexpr double kMsPerNs = 1e-6;
-constexpr double kBitsPerByte = 8.0;
 
 double state_ms(const ViewerCodecFacts& facts) {
   return facts.step_ns * kMsPerNs * static_cast<double>(facts.vertices) * facts.substeps * facts.solver_cost;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/base/thread_name.h"
+#include "common/base/units.h"
 #include "common/log/log.h"
 
 namespace strandcast {
@@ -15,8 +16,6 @@ namespace {
 // Strand frames that may wait while a picture is drawn; beyond it a keyframe is cheaper than catching up.
 constexpr size_t kMaxPendingFrames = 256;
 constexpr size_t kMaxPendingBytes = 64u << 20;
-constexpr double kMsPerNs = 1e-6;
-constexpr double kNsPerS = 1e9;
 constexpr int kFrameThreadNice = 10;
 /// Weight of the newest drawing in what a view costs: a first drawing also pays for buffers and shaders.
 constexpr double kNewestCostShare = 0.5;
@@ -30,7 +29,7 @@ bool concerns_view_only(const Error& error) {
   return error.code == ErrorCode::BadInput || error.code == ErrorCode::LimitExceeded;
 }
 
-double pixels_of(const PictureView& view) {
+double drawn_pixels_of(const PictureView& view) {
   return static_cast<double>(view.size.width) * static_cast<double>(view.size.height);
 }
 
@@ -240,7 +239,7 @@ void FrameWorker::update_views(const std::map<uint32_t, PictureView>& views) {
       drawn.encoder.reset();
       drawn.is_whole_wanted = false;
     }
-    if (pixels_of(drawn.view) != pixels_of(view)) drawn.cost_ms = 0.0;
+    if (drawn_pixels_of(drawn.view) != drawn_pixels_of(view)) drawn.cost_ms = 0.0;
     drawn.view = view;
   }
   share_time();
@@ -260,7 +259,7 @@ void FrameWorker::share_time() {
       loads.push_back({0.0, drawn.view.rate_divisor * interval_ms});
     }
     alike[i].push_back(&drawn);
-    const double guess_ms = ms_per_pixel_ * pixels_of(drawn.view);
+    const double guess_ms = ms_per_pixel_ * drawn_pixels_of(drawn.view);
     loads[i].cost_ms = std::max(loads[i].cost_ms, drawn.cost_ms > 0.0 ? drawn.cost_ms : guess_ms);
     loads[i].period_ms = std::min(loads[i].period_ms, drawn.view.rate_divisor * interval_ms);
   }
@@ -276,7 +275,7 @@ void FrameWorker::share_time() {
 void FrameWorker::note_cost(const std::vector<uint32_t>& classes, double cost_ms) {
   for (const uint32_t picture_class : classes) {
     Drawn& drawn = drawn_[picture_class];
-    ms_per_pixel_ = cost_ms / pixels_of(drawn.view);
+    ms_per_pixel_ = cost_ms / drawn_pixels_of(drawn.view);
     drawn.cost_ms = drawn.cost_ms == 0.0
                         ? cost_ms
                         : kNewestCostShare * cost_ms + (1.0 - kNewestCostShare) * drawn.cost_ms;

@@ -6,13 +6,13 @@
 #include <utility>
 
 #include "common/base/thread_name.h"
+#include "common/base/units.h"
 #include "common/log/log.h"
 #include "common/strands/strand_prefix.h"
 
 namespace strandcast {
 namespace {
 
-constexpr double kMsPerNs = 1e-6;
 constexpr std::chrono::milliseconds kKeyframePatience{
     50};  // for a new state, before the present one is encoded again
 

@@ -4,9 +4,9 @@
 #include <array>
 #include <cstdint>
 
-namespace strandcast {
+#include "common/base/units.h"
 
-inline constexpr int64_t kNsPerSecond = 1'000'000'000;
+namespace strandcast {
 inline constexpr int64_t kClockWindowS = 10;
 
 /// The fastest sample on its way within the last kClockWindowS tells the offset best: arrival minus sample
@@ -17,7 +17,7 @@ class ClockMap {
  public:
   /// Notes a sample; `arrival_ns` never decreases.
   void add(int64_t sample_ns, int64_t arrival_ns) {
-    const int64_t second = arrival_ns / kNsPerSecond;
+    const int64_t second = arrival_ns / kSInNs;
     Bucket& bucket =
         buckets_[static_cast<size_t>(((second % kClockWindowS) + kClockWindowS) % kClockWindowS)];
     const int64_t difference_ns = arrival_ns - sample_ns;

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/units.h"
+
 namespace strandcast {
 namespace {
-
-constexpr double kSecondsPerNs = 1e-9;
 
 bool is_possible(const Pose& pose) {
   if (!is_finite(pose)) return false;
@@ -36,7 +36,7 @@ bool is_teleport(const Pose& a, const Pose& b, double duration_s) {
 }
 
 bool is_teleport(const TimedSample<HeadSample>& a, const TimedSample<HeadSample>& b) {
-  const double apart_s = static_cast<double>(b.time_ns - a.time_ns) * kSecondsPerNs;
+  const double apart_s = static_cast<double>(b.time_ns - a.time_ns) * kSPerNs;
   return is_teleport(a.value.pose, b.value.pose, std::max(apart_s, kTeleportShortestS));
 }
 
@@ -70,8 +70,7 @@ bool InputHub::take_allowance(Stream<Value>& stream, uint64_t source_id, int64_t
     found = stream.allowances.emplace(source_id, Allowance{kMaxSampleBurst, arrival_ns}).first;
   }
   Allowance& allowance = found->second;
-  const double gained =
-      static_cast<double>(arrival_ns - allowance.updated_ns) * kSecondsPerNs * kMaxSampleRateHz;
+  const double gained = static_cast<double>(arrival_ns - allowance.updated_ns) * kSPerNs * kMaxSampleRateHz;
   allowance.samples = std::min(kMaxSampleBurst, allowance.samples + gained);
   allowance.updated_ns = arrival_ns;
   if (allowance.samples < 1.0) return false;
@@ -248,9 +247,8 @@ int64_t InputHub::source_time_ns(int64_t arrival_ns) const {
 }
 
 void InputHub::finish_teleport_check(const Pose& before, int64_t server_time_ns, bool has_jumped) {
-  const double passed_s = last_frame_ns_
-                              ? static_cast<double>(server_time_ns - *last_frame_ns_) * kSecondsPerNs
-                              : kTeleportShortestS;
+  const double passed_s =
+      last_frame_ns_ ? static_cast<double>(server_time_ns - *last_frame_ns_) * kSPerNs : kTeleportShortestS;
   const double travel_s = std::clamp(passed_s, kTeleportShortestS, kTeleportLongestS);
   frame_.has_teleported = has_jumped || is_teleport(before, frame_.world_from_head, travel_s);
   if (frame_.has_teleported) ++counters_.teleports;

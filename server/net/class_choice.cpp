@@ -5,12 +5,13 @@
 #include <vector>
 
 #include "common/base/quantile.h"
+#include "common/base/units.h"
 
 namespace strandcast {
 namespace {
 
 /// A change needs time to show: nothing is decided before.
-constexpr int64_t kSettleNs = 500 * kNsPerMs;
+constexpr int64_t kSettleNs = 500 * kMsInNs;
 constexpr double kDrainingShare = 0.95;
 
 /// The first class from `first` on that costs no more than is allowed, or the last.

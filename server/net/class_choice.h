@@ -8,29 +8,30 @@
 #include <deque>
 #include <span>
 
+#include "common/base/units.h"
 #include "server/net/link_estimate.h"
 
 namespace strandcast {
 
 /// Of queue delays: one that stays above kHighDelayNs throughout is trouble.
-inline constexpr int64_t kDelayWindowNs = 500 * kNsPerMs;
+inline constexpr int64_t kDelayWindowNs = 500 * kMsInNs;
 inline constexpr size_t kMinDelaySamples = 3;
 /// Lost chains that count as trouble when they fall within kLossWindowNs.
 inline constexpr size_t kTroublingLosses = 2;
-inline constexpr int64_t kLossWindowNs = 2'000 * kNsPerMs;
+inline constexpr int64_t kLossWindowNs = 2'000 * kMsInNs;
 /// Share of the measured capacity that a class may take on average, and at most while the strands move
 /// quickly, as they did once in kDemandWindowNs.
 inline constexpr double kUsableShare = 0.85;
 inline constexpr double kBurstShare = 1.4;
-inline constexpr int64_t kDemandWindowNs = 15'000 * kNsPerMs;
+inline constexpr int64_t kDemandWindowNs = 15'000 * kMsInNs;
 /// A viewer that decodes for so much of the time between two frames is what they wait for. One that does not
 /// and is late all the same lacks its processor: fewer strands would not help it.
 inline constexpr double kBusyDecodeShare = 0.8;
 /// Quiet time before a better class is tried; before one that failed it doubles with every try.
-inline constexpr int64_t kFirstProbeNs = 3'000 * kNsPerMs;
-inline constexpr int64_t kLongestProbeNs = 60'000 * kNsPerMs;
+inline constexpr int64_t kFirstProbeNs = 3'000 * kMsInNs;
+inline constexpr int64_t kLongestProbeNs = 60'000 * kMsInNs;
 /// Trouble this soon after a change for the better means that the try has failed.
-inline constexpr int64_t kProbationNs = 5'000 * kNsPerMs;
+inline constexpr int64_t kProbationNs = 5'000 * kMsInNs;
 
 class ClassChoice {
  public:

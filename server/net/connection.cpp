@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/base/profile.h"
+#include "common/base/units.h"
 #include "common/log/log.h"
 #include "common/wire/session_path.h"
 #include "server/net/access.h"
@@ -19,10 +20,6 @@ constexpr const char* kWebSocketPath = "/v1";
 constexpr const char* kForwardedFor = "X-Forwarded-For";
 /// Of what a peer wrote, in a line of the log.
 constexpr size_t kMaxQuotedBytes = 100;
-
-std::string_view view(beast::string_view text) {
-  return {text.data(), text.size()};
-}
 
 IpAddress to_ip(const asio::ip::address& address) {
   return address.is_v4() ? IpAddress(address.to_v4().to_bytes()) : IpAddress(address.to_v6().to_bytes());
@@ -171,7 +168,7 @@ void Connection::read_request() {
 void Connection::check_deadline(int64_t time_ns) {
   if (is_finished_) return;
   note_progress(time_ns);
-  if (time_ns - since_ns_ < context_.config.limits.handshake_ms * kNsPerMs) return;
+  if (time_ns - since_ns_ < context_.config.limits.handshake_ms * kMsInNs) return;
   if (is_idle() && stream_.untaken_bytes() == 0) return finish();
   drop(Refusal::Timeout,
        fmt::format("no request answered within {} ms", context_.config.limits.handshake_ms));

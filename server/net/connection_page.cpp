@@ -8,10 +8,6 @@
 namespace strandcast::net {
 namespace {
 
-std::string_view view(beast::string_view text) {
-  return {text.data(), text.size()};
-}
-
 /// For good where the name changes with the content; else it is asked each time whether it is still that.
 constexpr const char* kKeepForGood = "public, max-age=31536000, immutable";
 constexpr const char* kAskEachTime = "no-cache";

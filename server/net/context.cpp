@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "common/base/profile.h"
+#include "common/base/units.h"
 #include "server/net/beast_private.h"
 #include "server/net/connection_private.h"
 #include "server/net/session_private.h"
@@ -60,8 +61,8 @@ Context::Context(const NetConfig& net_config, const std::vector<NetHead>& net_he
       tokens(net_config.tokens),
       heads(net_heads.begin(), net_heads.end()),
       guard({net_config.limits.connections_per_s, net_config.limits.requests_per_s,
-             net_config.limits.wrong_tokens, net_config.limits.wrong_token_window_ms * kNsPerMs,
-             net_config.limits.wrong_token_block_ms * kNsPerMs, net_config.limits.guarded_addresses}),
+             net_config.limits.wrong_tokens, net_config.limits.wrong_token_window_ms * kMsInNs,
+             net_config.limits.wrong_token_block_ms * kMsInNs, net_config.limits.guarded_addresses}),
       refusal_lines({net_config.limits.refusal_lines_per_address, net_config.limits.refusal_lines}),
       session_lines({net_config.limits.session_lines, net_config.limits.session_lines}) {}
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/base/quantile.h"
+#include "common/base/units.h"
 
 namespace strandcast {
 namespace {
@@ -10,7 +11,6 @@ namespace {
 /// Enough that a viewer which had to wait for its processor while it decoded does not seem slow.
 constexpr size_t kDecodes = 31;
 constexpr size_t kLeastDecodes = 5;
-constexpr double kSPerNs = 1e-9;
 
 }  // namespace
 

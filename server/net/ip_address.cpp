@@ -10,14 +10,14 @@ namespace {
 
 constexpr IpAddress::Bytes16 kMappedPrefix = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff};
 constexpr size_t kMappedPrefixBytes = 12;
-constexpr uint32_t kBitsPerByte = 8;
+constexpr uint32_t kByteBits = 8;
 constexpr uint8_t kLoopbackNet = 127;  // 127.0.0.0/8
 
 /// The first `bit_count` bits, zeros behind them.
 IpAddress::Bytes16 masked(const IpAddress::Bytes16& bytes, uint32_t bit_count) {
   IpAddress::Bytes16 result{};
   for (uint32_t i = 0; i < result.size(); ++i) {
-    const uint32_t kept = std::min(kBitsPerByte, bit_count - std::min(bit_count, i * kBitsPerByte));
+    const uint32_t kept = std::min(kByteBits, bit_count - std::min(bit_count, i * kByteBits));
     result[i] = static_cast<uint8_t>(bytes[i] & (0xff00u >> kept));
   }
   return result;

@@ -6,21 +6,21 @@
 #include <vector>
 
 #include "common/base/quantile.h"
+#include "common/base/units.h"
 
 namespace strandcast {
 namespace {
 
-constexpr double kNsPerS = 1e9;
 /// Round trips shorter than this differ by scheduling, not by the link.
-constexpr int64_t kLeastTransferNs = kNsPerMs;
+constexpr int64_t kLeastTransferNs = kMsInNs;
 constexpr size_t kMaxBusySamples = 16;
 /// A rate is taken over at least this: frames and acknowledgements come in bunches.
-constexpr int64_t kBusySpanNs = 50 * kNsPerMs;
+constexpr int64_t kBusySpanNs = 50 * kMsInNs;
 /// A round trip differs by so much for other reasons than the rate: jitter, or a client that looks only now
 /// and then.
-constexpr int64_t kJitterNs = 50 * kNsPerMs;
+constexpr int64_t kJitterNs = 50 * kMsInNs;
 constexpr size_t kMinBusySamples = 3;
-constexpr int64_t kBusyAgeNs = 2'000 * kNsPerMs;
+constexpr int64_t kBusyAgeNs = 2'000 * kMsInNs;
 /// Times of clients are untrusted: differences from ours must fit.
 constexpr int64_t kLatestClientNs = int64_t{1} << 62;
 

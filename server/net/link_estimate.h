@@ -8,17 +8,17 @@
 #include <deque>
 #include <optional>
 
-namespace strandcast {
+#include "common/base/units.h"
 
-inline constexpr int64_t kNsPerMs = 1'000'000;
+namespace strandcast {
 /// A link that shows less delay than this has no queue; with more there may be one.
-inline constexpr int64_t kLowDelayNs = 25 * kNsPerMs;
-inline constexpr int64_t kHighDelayNs = 100 * kNsPerMs;
+inline constexpr int64_t kLowDelayNs = 25 * kMsInNs;
+inline constexpr int64_t kHighDelayNs = 100 * kMsInNs;
 /// A capacity that was seen says nothing about the link after this long.
-inline constexpr int64_t kCapacityAgeNs = 30'000 * kNsPerMs;
-inline constexpr int64_t kBaseWindowNs = 10'000 * kNsPerMs;  // of the shortest round trip
+inline constexpr int64_t kCapacityAgeNs = 30'000 * kMsInNs;
+inline constexpr int64_t kBaseWindowNs = 10'000 * kMsInNs;  // of the shortest round trip
 /// A link that has become longer is believed when its shortest round trip is older than this.
-inline constexpr int64_t kLongerPathNs = 2'000 * kNsPerMs;
+inline constexpr int64_t kLongerPathNs = 2'000 * kMsInNs;
 
 /// A value of some time.
 struct TimedValue {

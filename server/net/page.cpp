@@ -6,16 +6,10 @@
 #include <cctype>
 #include <optional>
 
+#include "common/base/text.h"
+
 namespace strandcast {
 namespace {
-
-constexpr std::string_view kSpaces = " \t";
-
-std::string_view trimmed(std::string_view text) {
-  const size_t begin = text.find_first_not_of(kSpaces);
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(kSpaces) - begin + 1);
-}
 
 /// Cuts off and gives back what stands before the separator, or all of it.
 std::string_view take_part(std::string_view& text, char separator) {

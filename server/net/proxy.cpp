@@ -4,6 +4,8 @@
 #include <array>
 #include <cctype>
 
+#include "common/base/text.h"
+
 namespace strandcast {
 namespace {
 
@@ -45,13 +47,6 @@ Result<std::optional<ProxiedPeer>> take_addresses(std::span<const std::byte> byt
   }
   return std::optional<ProxiedPeer>({address_at<Bytes>(bytes, kProxyFixedBytes),
                                      address_at<Bytes>(bytes, kProxyFixedBytes + kAddressBytes)});
-}
-
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t";
-  const size_t begin = text.find_first_not_of(kBlank);
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(kBlank) - begin + 1);
 }
 
 bool is_port(std::string_view text) {

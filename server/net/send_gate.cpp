@@ -2,10 +2,11 @@
 
 #include <algorithm>
 
+#include "common/base/units.h"
+
 namespace strandcast {
 namespace {
 
-constexpr double kNsPerS = 1e9;
 constexpr int64_t kKeyframeSlackNs = kGateDelayNs / 2;
 
 /// What takes the place of many frames that build on each other.

@@ -7,17 +7,18 @@
 #include <deque>
 #include <optional>
 
+#include "common/base/units.h"
 #include "common/strands/frame_header.h"
 #include "server/net/link_estimate.h"
 
 namespace strandcast {
 
 /// Nothing new is sent while the oldest frame on its way is later than the bare link by more than this,
-inline constexpr int64_t kGateDelayNs = 200 * kNsPerMs;
+inline constexpr int64_t kGateDelayNs = 200 * kMsInNs;
 /// or while what is on its way keeps the link busy for longer than this: the frame itself takes time as well.
-inline constexpr int64_t kGateQueueNs = 170 * kNsPerMs;
+inline constexpr int64_t kGateQueueNs = 170 * kMsInNs;
 /// Nor a keyframe while more than this waits ahead of it: it fills the queue by itself.
-inline constexpr int64_t kStartDelayNs = 50 * kNsPerMs;
+inline constexpr int64_t kStartDelayNs = 50 * kMsInNs;
 /// Before the first acknowledgement nothing is known of a link: it gets one frame, and no more when it is
 /// this large. Three times what TCP itself begins with (RFC 6928).
 inline constexpr size_t kFirstBytes = 44u << 10;
@@ -27,11 +28,11 @@ inline constexpr size_t kMaxInFlightBytes = 4u << 20;  // but one frame always m
 inline constexpr size_t kMaxInFlightFrames = 512;
 /// What a keyframe puts into the queue may take so long to drain; the frames behind it are late by no fault
 /// of theirs.
-inline constexpr int64_t kDrainNs = 3'000 * kNsPerMs;
+inline constexpr int64_t kDrainNs = 3'000 * kMsInNs;
 /// No frame is expected to take longer, however slow the link seemed.
-inline constexpr int64_t kLongestTransferNs = 30'000 * kNsPerMs;
+inline constexpr int64_t kLongestTransferNs = 30'000 * kMsInNs;
 /// Without any acknowledgement one more frame is sent this often.
-inline constexpr int64_t kAskAgainNs = 1'000 * kNsPerMs;
+inline constexpr int64_t kAskAgainNs = 1'000 * kMsInNs;
 
 class SendGate {
  public:

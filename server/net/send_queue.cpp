@@ -58,7 +58,7 @@ SendQueue::Offer SendQueue::offer_chain(std::span<const EncodedFramePtr> chain) 
   if (chain.empty() || !needs_keyframe()) return Offer::Ignored;
   pending_ = chain.front();
   behind_.assign(chain.begin() + 1, chain.end());
-  catch_up_room_ = kCatchUpShare * behind_.size();
+  catch_up_room_ = kCatchUpFrames * behind_.size();
   chain_ = Chain::Following;
   chain_sequence_ = chain.back()->header.sequence;
   return Offer::Queued;

@@ -23,7 +23,7 @@ inline constexpr size_t kMostUnreadAnswers = kMaxQueuedControl / 4;
 inline constexpr size_t kMaxRelayFrames = 60;
 /// While a chain is given, so many new frames may go behind it for each of its own; then it must have gone
 /// out.
-inline constexpr size_t kCatchUpShare = 2;
+inline constexpr size_t kCatchUpFrames = 2;
 
 class SendQueue {
  public:

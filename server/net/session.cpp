@@ -6,6 +6,7 @@
 
 #include "common/base/profile.h"
 #include "common/base/text.h"
+#include "common/base/units.h"
 #include "common/log/log.h"
 
 namespace strandcast::net {
@@ -13,7 +14,7 @@ namespace {
 
 /// How much waits unsent in the kernel, so that a late frame is dropped here and not queued there.
 constexpr int kUnsentBytes = 128 << 10;
-constexpr int64_t kProbeIntervalNs = 1'000 * kNsPerMs;
+constexpr int64_t kProbeIntervalNs = 1'000 * kMsInNs;
 /// Longest sentence of ours put into a Goodbye.
 constexpr size_t kMaxReasonCharacters = 500;
 
@@ -111,7 +112,7 @@ void Session::send(ServerMessage message) {
   if (auto* status = std::get_if<ServerStatus>(&message)) {
     status->dropped_frames = queue_.dropped_frames();
     if (subscription_.mode() != StreamMode::Frames) status->picture_motions.clear();
-    status->queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
+    status->queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kMsInNs;
   }
   guarded([&] {
     if (const auto* camera = std::get_if<CameraChange>(&message)) move_camera(*camera);
@@ -146,7 +147,7 @@ void Session::on_control_frame(websocket::frame_type kind) {
 std::string Session::stall_reason(int64_t time_ns) const {
   const NetLimits& limits = context_.config.limits;
   const auto is_past = [&](int64_t since_ns, int64_t limit_ms) {
-    return time_ns - since_ns >= limit_ms * kNsPerMs;
+    return time_ns - since_ns >= limit_ms * kMsInNs;
   };
   if (is_writing_ && is_past(progress_ns_, limits.stalled_ms))
     return fmt::format("takes nothing for {} ms", limits.stalled_ms);
@@ -240,7 +241,7 @@ void Session::start_close() {
 
 void Session::check_deadlines(int64_t time_ns) {
   const NetLimits& limits = context_.config.limits;
-  const int64_t in_state_ms = (time_ns - state_since_ns_) / kNsPerMs;
+  const int64_t in_state_ms = (time_ns - state_since_ns_) / kMsInNs;
   if (state_ == State::Closing) {
     if (in_state_ms >= limits.close_ms) abort();
     return;

@@ -4,16 +4,11 @@
 #include <utility>
 
 #include "common/base/profile.h"
+#include "common/base/units.h"
 #include "common/log/log.h"
 #include "server/net/session_private.h"
 
 namespace strandcast::net {
-namespace {
-
-constexpr int64_t kNsPerUs = 1'000;
-
-}  // namespace
-
 void Session::begin_media(const Hello& hello, const EncodedFramePtr& asset) {
   queue_.set_asset(asset);
   has_asset_ = asset != nullptr;
@@ -25,7 +20,7 @@ void Session::begin_media(const Hello& hello, const EncodedFramePtr& asset) {
     flow_.start_over(now_ns());
   }
   if (hello.acknowledges) flow_.expect_acks();
-  flow_.remember_capacity_for(context_.config.limits.link_memory_ms * kNsPerMs);
+  flow_.remember_capacity_for(context_.config.limits.link_memory_ms * kMsInNs);
   socket_.control_callback(
       [this](websocket::frame_type kind, beast::string_view) { on_control_frame(kind); });
   probe(now_ns());
@@ -43,7 +38,7 @@ void Session::start_again(int64_t time_ns) {
 
 /// A relay keeps what it had: the keyframe is for those who join there.
 void Session::ask_for_anchor(int64_t time_ns) {
-  const int64_t interval_ns = context_.config.limits.keyframe_interval_ms * kNsPerMs;
+  const int64_t interval_ns = context_.config.limits.keyframe_interval_ms * kMsInNs;
   if (!subscription_.gets(StreamMode::Strands) ||
       (anchor_asked_ns_ != 0 && time_ns - anchor_asked_ns_ < interval_ns))
     return;
@@ -111,7 +106,7 @@ void Session::ask_for_keyframe(int64_t time_ns) {
       is_changing || (queue_.needs_picture() && !subscription_.changes_to(StreamMode::Strands));
   if (state_ != State::Joined || !(needs_picture || queue_.needs_keyframe())) return;
   if (!is_changing && !flow_.may_start(time_ns)) return;
-  const int64_t interval_ns = context_.config.limits.keyframe_interval_ms * kNsPerMs;
+  const int64_t interval_ns = context_.config.limits.keyframe_interval_ms * kMsInNs;
   if (keyframe_asked_ns_ != 0 && time_ns - keyframe_asked_ns_ < interval_ns) return;
   keyframe_asked_ns_ = time_ns;
   context_.count(&NetCounters::keyframe_requests);
@@ -122,8 +117,7 @@ void Session::ask_for_keyframe(int64_t time_ns) {
 }
 
 void Session::on_ack(const FrameAck& ack, int64_t time_ns) {
-  flow_.on_ack(ack.stream_id, ack.sequence, time_ns,
-               {ack.receive_time_ns, int64_t{ack.decode_us} * kNsPerUs});
+  flow_.on_ack(ack.stream_id, ack.sequence, time_ns, {ack.receive_time_ns, int64_t{ack.decode_us} * kUsInNs});
   adapt(time_ns);
   ask_for_keyframe(time_ns);
   pump();
@@ -132,7 +126,7 @@ void Session::on_ack(const FrameAck& ack, int64_t time_ns) {
 std::string Session::describe_link(int64_t time_ns) const {
   return fmt::format("link {:.2f} Mbit/s, {:.0f} ms of data on its way",
                      flow_.capacity_bytes_per_s(time_ns) * 8e-6,
-                     static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs);
+                     static_cast<double>(flow_.queue_delay_ns()) / kMsInNs);
 }
 
 /// Moves to another step of the ladder of pictures when the link says so.
@@ -217,16 +211,16 @@ void Session::follow_strand_classes(const std::string& reason) {
 }
 
 void Session::report_link(int64_t time_ns) {
-  const bool is_due = time_ns - link_reported_ns_ >= context_.config.limits.link_interval_ms * kNsPerMs;
+  const bool is_due = time_ns - link_reported_ns_ >= context_.config.limits.link_interval_ms * kMsInNs;
   if (subscription_.is_empty() || !(is_due || is_mode_request_waiting_)) return;
   link_reported_ns_ = time_ns;
   LinkState link;
   link.mode = subscription_.mode();
   link.strand_class = subscription_.strands.strand_class;
   link.capacity_bytes_per_s = flow_.capacity_bytes_per_s(time_ns);
-  link.queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
+  link.queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kMsInNs;
   context_.queue_delays.add_ms(link.queue_delay_ms);
-  link.round_trip_ms = static_cast<double>(flow_.base_ns()) / kNsPerMs;
+  link.round_trip_ms = static_cast<double>(flow_.base_ns()) / kMsInNs;
   link.strand_bytes_per_s = head().strands.bytes_per_s(subscription_.strands.codec);
   const LinkAnswer answer = head().handler.on_link(id_, link, time_ns);
   is_mode_request_waiting_ = answer.is_request_waiting;

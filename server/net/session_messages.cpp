@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/base/profile.h"
+#include "common/base/units.h"
 #include "common/log/log.h"
 #include "server/net/overloaded_private.h"
 #include "server/net/session_private.h"
@@ -200,7 +201,7 @@ SessionInfo Session::info(int64_t time_ns) const {
   info.role = hello_.role;
   info.mode = subscription_.mode();
   info.sent_bytes = sent_bytes_;
-  info.queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
+  info.queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kMsInNs;
   info.connected_s = static_cast<double>(time_ns - state_since_ns_) * 1e-9;
   return info;
 }

@@ -7,6 +7,7 @@
 #include "common/base/hash.h"
 #include "common/base/profile.h"
 #include "common/base/thread_name.h"
+#include "common/base/units.h"
 #include "common/log/log.h"
 #include "common/strands/strand_codec.h"
 #include "server/record/recorded_step.h"
@@ -15,8 +16,6 @@ namespace strandcast {
 namespace {
 
 constexpr double kBytesPerMb = 1e6;
-constexpr double kNsPerS = 1e9;
-constexpr double kMsPerNs = 1e-6;
 /// While it waits for one.
 constexpr int64_t kNever = -1;
 

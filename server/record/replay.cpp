@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/base/profile.h"
+#include "common/base/units.h"
 #include "common/base/version.h"
 #include "common/record/recording_reader.h"
 #include "common/scene/scene_file.h"
@@ -16,7 +17,6 @@
 namespace strandcast {
 namespace {
 
-constexpr double kNsPerS = 1e9;
 constexpr int64_t kProgressNs = 2'000'000'000;
 constexpr std::chrono::milliseconds kPoll{50};
 constexpr const char* kStatesTopic = "/states";

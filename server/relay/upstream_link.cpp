@@ -12,7 +12,7 @@ namespace strandcast {
 namespace {
 
 /// How often a thread that hears nothing looks whether it is to end.
-constexpr std::chrono::milliseconds kLookInterval{200};
+constexpr std::chrono::milliseconds kLinkLookInterval{200};
 
 }  // namespace
 
@@ -114,7 +114,7 @@ Error UpstreamLink::serve() {
 
 Error UpstreamLink::hear(ViewerClient& client) {
   while (!is_stopping_) {
-    std::optional<ClientEvent> event = client.next(kLookInterval);
+    std::optional<ClientEvent> event = client.next(kLinkLookInterval);
     if (!event) continue;
     if (const auto* closed = std::get_if<ClosedEvent>(&*event)) return closed->error;
     hooks_.on_event(std::move(*event));

@@ -22,11 +22,11 @@
 namespace strandcast {
 namespace {
 
-constexpr double kStepS = 1.0 / 60.0;
+constexpr double kBodyStepS = 1.0 / 60.0;
 // First the body comes up from below, so that no hair begins inside of it.
-constexpr int kRiseSteps = 45, kWarmUpSteps = 60;  // measured after the latter
+constexpr int kRiseSteps = 45, kBodyWarmUpSteps = 60;  // measured after the latter
 constexpr double kBelowM = 0.6;
-constexpr uint32_t kSomeStrands = 7;
+constexpr uint32_t kSomeBodyStrands = 7;
 constexpr uint32_t kPictureSide = 360, kMoments = 4;
 
 /// Where head and joints are at a time.
@@ -70,7 +70,7 @@ Result<BodyMotion> body_motion(const CollisionStudyDesc& desc) {
   });
 }
 
-struct Contestant {
+struct BodyContestant {
   BodyAnswer found;
   SceneDesc scene;
   std::unique_ptr<StepBuilder> builder;
@@ -82,7 +82,7 @@ struct Contestant {
     SceneFeatures features;
     features.has_colliders = true;
     features.has_body = scene.body.acts();
-    const SceneStep& built = builder->build(input, features, index * kStepS);
+    const SceneStep& built = builder->build(input, features, index * kBodyStepS);
     if (built.carried_to_rotation) solver->rebase(*built.carried_to_rotation);
     const double begin_ms = process_cpu_ms();
     for (const StepInput& substep : built.substeps) solver->substep(substep);
@@ -93,7 +93,7 @@ struct Contestant {
 double largest_stretch(const Groom& groom, const SolverState& state) {
   const uint32_t strands = groom.strand_count();
   double largest = 0.0;
-  for (uint32_t s = 0; s < strands; s += kSomeStrands)
+  for (uint32_t s = 0; s < strands; s += kSomeBodyStrands)
     for (uint32_t i = 1; i < groom.uniform_vertex_count(); ++i) {
       const uint32_t at = groom.offset[s] + i;
       const double rest_m =
@@ -132,7 +132,7 @@ Result<double> carried_share(const SolverRow& row, const SolverParameters& param
   ASSIGN_OR_RETURN(auto solver, row.make(parameters, {&executor, features}));
   RETURN_IF_ERROR(solver->load(lying_strands(kStrands, kVertices), {1.0, 0.0, 0.0, 0.0}));
   StepInput input;
-  input.h_s = kStepS;
+  input.h_s = kBodyStepS;
   input.body.planes = {{glm::dvec3(0.0), {0.0, 1.0, 0.0}, glm::dvec3(0.0)}};
   input.body.response = static_cast<BodyResponse>(
       std::find(kBodyResponses.begin(), kBodyResponses.end(), body.response) - kBodyResponses.begin());
@@ -141,7 +141,7 @@ Result<double> carried_share(const SolverRow& row, const SolverParameters& param
   for (int step = 0; step < kLyingSteps; ++step) solver->substep(input);
   SolverState before, after;
   solver->read(before);
-  input.body.planes[0].shift_m = {0.0, 0.0, kBeltMps * kStepS};
+  input.body.planes[0].shift_m = {0.0, 0.0, kBeltMps * kBodyStepS};
   for (int step = 0; step < kBeltSteps; ++step) solver->substep(input);
   solver->read(after);
   double way_m = 0.0;
@@ -149,7 +149,7 @@ Result<double> carried_share(const SolverRow& row, const SolverParameters& param
     const size_t tip = (kVertices - 1) * kStrands + s;
     way_m += static_cast<double>((after.position_m[tip] - before.position_m[tip]).z) / kStrands;
   }
-  return way_m / (kBeltMps * kStepS * kBeltSteps);
+  return way_m / (kBeltMps * kBodyStepS * kBeltSteps);
 }
 
 /// Hair and body in head space, from the front and from the left, into a column of the sheet.
@@ -195,9 +195,9 @@ struct Hair {
   SolverParameters parameters;
 };
 
-Result<Contestant> make_contestant(const SceneDesc& scene, const Hair& hair, Executor& executor,
-                                   const char* response, const glm::dquat& rotation) {
-  Contestant made;
+Result<BodyContestant> make_contestant(const SceneDesc& scene, const Hair& hair, Executor& executor,
+                                       const char* response, const glm::dquat& rotation) {
+  BodyContestant made;
   made.scene = scene;
   made.found.name = response == nullptr ? "no body" : response;
   if (response != nullptr) {
@@ -215,7 +215,7 @@ Result<Contestant> make_contestant(const SceneDesc& scene, const Hair& hair, Exe
 
 /// The motion, with the body come up from below first.
 InputFrame input_at(const BodyMotion& motion, int step) {
-  InputFrame input = motion(std::max(0, step - kWarmUpSteps) * kStepS);
+  InputFrame input = motion(std::max(0, step - kBodyWarmUpSteps) * kBodyStepS);
   input.has_motion = true;
   for (glm::dvec3& place_m : input.joints.place_m)
     place_m.y -= kBelowM * std::max(0.0, 1.0 - static_cast<double>(step) / kRiseSteps);
@@ -223,25 +223,25 @@ InputFrame input_at(const BodyMotion& motion, int step) {
 }
 
 Status move_them(const CollisionStudyDesc& desc, const Hair& hair, const BodyMotion& motion,
-                 std::vector<Contestant>& contestants, CollisionStudy& study) {
+                 std::vector<BodyContestant>& contestants, CollisionStudy& study) {
   uint32_t column = 0;
   SolverState state;
   for (int step = 0; step < desc.body_steps; ++step) {
     const InputFrame input = input_at(motion, step);
-    for (Contestant& contestant : contestants) contestant.step(input, step);
-    if (step < kWarmUpSteps) continue;
+    for (BodyContestant& contestant : contestants) contestant.step(input, step);
+    if (step < kBodyWarmUpSteps) continue;
     const SceneStep& built = contestants[1].builder->step();
     const BodyInput& body = built.substeps.back().body;
     for (const BodyCapsule& capsule : body.capsules)
       study.fastest_mps =
-          std::max(study.fastest_mps, glm::distance(capsule.to_m, capsule.to_before_m) / kStepS *
+          std::max(study.fastest_mps, glm::distance(capsule.to_m, capsule.to_before_m) / kBodyStepS *
                                           static_cast<double>(built.substeps.size()));
     const DepthAt depth_at = [&](const glm::dvec3& place_m, const glm::dvec3&) {
       return -distance_to_body_m(body, place_m);
     };
-    for (Contestant& contestant : contestants) {
+    for (BodyContestant& contestant : contestants) {
       contestant.solver->read(state);
-      record_depths(hair.content.groom, state, input.world_from_head.rotation, kSomeStrands, depth_at,
+      record_depths(hair.content.groom, state, input.world_from_head.rotation, kSomeBodyStrands, depth_at,
                     contestant.depths);
       contestant.found.stretch =
           std::max(contestant.found.stretch, largest_stretch(hair.content.groom, state));
@@ -269,11 +269,11 @@ Status measure_body_answers(const CollisionStudyDesc& desc, Executor& executor,
   ASSIGN_OR_RETURN(const BodyMotion motion, body_motion(desc));
   study.body_name = desc.clip.empty() ? "built in" : desc.clip.filename().string();
   const glm::dquat rotation = motion(0.0).world_from_head.rotation;
-  std::vector<Contestant> contestants;
-  ASSIGN_OR_RETURN(Contestant none, make_contestant(scene, hair, executor, nullptr, rotation));
+  std::vector<BodyContestant> contestants;
+  ASSIGN_OR_RETURN(BodyContestant none, make_contestant(scene, hair, executor, nullptr, rotation));
   contestants.push_back(std::move(none));
   for (const char* response : kBodyResponses) {
-    ASSIGN_OR_RETURN(Contestant made, make_contestant(scene, hair, executor, response, rotation));
+    ASSIGN_OR_RETURN(BodyContestant made, make_contestant(scene, hair, executor, response, rotation));
     contestants.push_back(std::move(made));
   }
   if (desc.has_pictures) {
@@ -286,7 +286,7 @@ Status measure_body_answers(const CollisionStudyDesc& desc, Executor& executor,
   const InputFrame last = input_at(motion, desc.body_steps - 1);
   const double plain_ms = quantile(contestants.front().cpu_ms, 0.5);
   SolverState before, after;
-  for (Contestant& contestant : contestants) {
+  for (BodyContestant& contestant : contestants) {
     BodyAnswer& found = contestant.found;
     found.step_cpu_ms = quantile(contestant.cpu_ms, 0.5);
     found.extra_cpu_ms = found.step_cpu_ms - plain_ms;
@@ -295,7 +295,7 @@ Status measure_body_answers(const CollisionStudyDesc& desc, Executor& executor,
     contestant.solver->read(before);
     contestant.step(last, desc.body_steps + desc.body_rest_steps);
     contestant.solver->read(after);
-    found.rest_speed_mps = speed_rms_mps(before, after, kStepS);
+    found.rest_speed_mps = speed_rms_mps(before, after, kBodyStepS);
     if (contestant.scene.body.acts()) {
       ASSIGN_OR_RETURN(found.carried_share,
                        carried_share(*hair.row, hair.parameters, executor, contestant.scene.body));

@@ -10,9 +10,9 @@ namespace {
 constexpr double kTurns = 5.0;
 constexpr double kCoilRadiusM = 5e-3;
 constexpr double kPitchM = 2e-3;  // per turn
-constexpr double kGravityMps2 = 9.81;
-constexpr double kSettlingDragPerS = 20.0;
-constexpr double kSettlingS = 6.0;
+constexpr double kCurlGravityMps2 = 9.81;
+constexpr double kCurlDragPerS = 20.0;
+constexpr double kCurlSettlingS = 6.0;
 
 std::vector<glm::dvec3> hanging_helix(uint32_t vertex_count) {
   std::vector<glm::dvec3> points;
@@ -39,7 +39,7 @@ AnalyticResult run_curl(const Workbench& workbench, const RunSetting& setting) {
   RunPhysics physics;
   physics.length_m = 0.0;
   for (size_t i = 1; i < helix.size(); ++i) physics.length_m += glm::distance(helix[i], helix[i - 1]);
-  physics.given = {{"air_drag_per_s", kSettlingDragPerS}};
+  physics.given = {{"air_drag_per_s", kCurlDragPerS}};
   const Groom groom = groom_of({helix}, Pinning::Root);
   AnalyticResult result;
   auto run = StrandRun::make(workbench, setting, physics, groom);
@@ -48,12 +48,12 @@ AnalyticResult run_curl(const Workbench& workbench, const RunSetting& setting) {
     return result;
   }
   StepInput input;
-  input.gravity_mps2 = {0.0, -kGravityMps2, 0.0};
-  for (int step = 0; step < kSettlingS * setting.rate_hz; ++step) {
+  input.gravity_mps2 = {0.0, -kCurlGravityMps2, 0.0};
+  for (int step = 0; step < kCurlSettlingS * setting.rate_hz; ++step) {
     run->step(input);
     result.stretch = std::max(result.stretch, largest_run_stretch(groom, run->state()));
   }
-  const double weight_npm = physics.hair.linear_density_kgpm() * kGravityMps2;
+  const double weight_npm = physics.hair.linear_density_kgpm() * kCurlGravityMps2;
   const double length = physics.length_m;
   result.exact =
       weight_npm * kCoilRadiusM * kCoilRadiusM * length / (2.0 * physics.hair.twist_stiffness_nm2());

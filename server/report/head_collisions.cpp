@@ -19,7 +19,7 @@
 namespace strandcast {
 namespace {
 
-constexpr double kStepS = 1.0 / 60.0;
+constexpr double kCollisionStepS = 1.0 / 60.0;
 constexpr double kShakeMps2 = 10.0 * 9.80665, kShakeHz = 5.0;
 constexpr double kYawRad = std::numbers::pi / 6.0, kYawHz = 3.0;
 /// Who is deeper than so outside of the field cannot be in the mesh.
@@ -154,10 +154,10 @@ Status measure_head_collisions(const CollisionStudyDesc& desc, Executor& executo
   progress(fmt::format("{} steps of a shake, {} at rest", desc.shake_steps, desc.rest_steps));
   Pose before = shaken_hard(0.0);
   StepInput input;
-  input.h_s = kStepS;
+  input.h_s = kCollisionStepS;
   SolverState state;
   for (int step = 1; step <= desc.shake_steps + desc.rest_steps; ++step) {
-    const Pose now = shaken_hard(std::min(step, desc.shake_steps) * kStepS);
+    const Pose now = shaken_hard(std::min(step, desc.shake_steps) * kCollisionStepS);
     input.head_shift_m = now.position_m - before.position_m;
     input.world_from_head_rotation = now.rotation;
     before = now;
@@ -177,7 +177,7 @@ Status measure_head_collisions(const CollisionStudyDesc& desc, Executor& executo
     contestant.solver->read(state);
     contestant.step(input);
     contestant.solver->read(last);
-    found.rest_speed_mps = speed_rms_mps(state, last, kStepS);
+    found.rest_speed_mps = speed_rms_mps(state, last, kCollisionStepS);
     record_depths(head.content.groom, last, before.rotation, kEveryStrand, depth_at, contestant.settled);
     found.shaken = contestant.shaken.depth();
     found.settled = contestant.settled.depth();

@@ -7,23 +7,24 @@ namespace strandcast {
 namespace {
 
 constexpr double kSegmentM = 0.02;
-constexpr double kLengthM = kSegmentM * (kPaperChainVertices - 1);
-constexpr glm::dvec3 kGravityMps2(0.0, -10.0, 0.0);
+constexpr double kPaperLengthM = kSegmentM * (kPaperChainVertices - 1);
+constexpr glm::dvec3 kPaperGravityMps2(0.0, -10.0, 0.0);
 // Until shortly before the tip whips round; what comes then depends on everything.
-constexpr double kTimeS = 0.4;
+constexpr double kPaperTimeS = 0.4;
 constexpr uint32_t kExactSubsteps = 64;
 
 using ChainMotion = std::vector<std::vector<glm::vec3>>;  // positions after each step
 
 Result<ChainMotion> fall(const Workbench& workbench, const RunSetting& setting, double& stretch) {
   RunPhysics physics;
-  physics.length_m = kLengthM;
-  const Groom groom = groom_of({straight_run(kPaperChainVertices, kLengthM, {1.0, 0.0, 0.0})}, Pinning::Root);
+  physics.length_m = kPaperLengthM;
+  const Groom groom =
+      groom_of({straight_run(kPaperChainVertices, kPaperLengthM, {1.0, 0.0, 0.0})}, Pinning::Root);
   ASSIGN_OR_RETURN(StrandRun run, StrandRun::make(workbench, setting, physics, groom));
   StepInput input;
-  input.gravity_mps2 = kGravityMps2;
+  input.gravity_mps2 = kPaperGravityMps2;
   ChainMotion motion;
-  for (int step = 0; step < kTimeS * kPaperChainRateHz; ++step) {
+  for (int step = 0; step < kPaperTimeS * kPaperChainRateHz; ++step) {
     run.step(input);
     stretch = std::max(stretch, largest_run_stretch(groom, run.state()));
     motion.push_back(run.state().position_m);
@@ -61,7 +62,7 @@ AnalyticResult run_paper_chain(const Workbench& workbench, const RunSetting& set
     }
   }
   const double count = static_cast<double>(motion->size()) * (kPaperChainVertices - 1);
-  result.value = result.error = std::sqrt(sum / count) / kLengthM;
+  result.value = result.error = std::sqrt(sum / count) / kPaperLengthM;
   result.exact = 0.0;
   return result;
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "common/base/quantile.h"
+#include "common/base/units.h"
 #include "common/groom/groom_asset.h"
 #include "common/render/render_device.h"
 #include "server/app/explain.h"
@@ -35,7 +36,6 @@ constexpr std::array kFactPasses{
     FactPass{"has_distance_field", "scene/distance_field"},
 };
 constexpr RenderSize kPictureSize{320, 240};
-constexpr double kMmPerM = 1e3;
 constexpr double kKilobyte = 1e3;
 
 /// The motion from its first pose on, upright there.
@@ -231,7 +231,6 @@ Result<FollowedRun> run_followed(const PruningDesc& desc, const FollowedDesc& pa
       squares += error_mm * error_mm;
     }
   }
-  constexpr double kMbitPerByte = 8e-6;
   const double per_s = desc.scene.step_rate_hz * kMbitPerByte / std::max(1, desc.steps - 1);
   run.all_mbit_per_s = all_bytes * per_s;
   run.mbit_per_s = some_bytes * per_s;

@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <array>
-#include <ctime>
 
 #include "common/groom/groom_asset.h"
 #include "common/render/tiles/tile_renderer.h"
 #include "common/scene/shadow_methods.h"
 #include "common/scene/strand_methods.h"
 #include "server/report/csv_file.h"
+#include "server/report/process_time.h"
 #include "server/scene/scene_content.h"
 
 namespace strandcast {
@@ -20,12 +20,6 @@ namespace {
 // The truth has so many samples per pixel side, and as many cells of light as fit.
 constexpr uint32_t kTruthFactor = 4;
 constexpr uint32_t kTruthCells = 128;
-
-double process_cpu_ms() {
-  timespec cpu{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &cpu);
-  return 1e3 * static_cast<double>(cpu.tv_sec) + 1e-6 * static_cast<double>(cpu.tv_nsec);
-}
 
 double median(std::vector<double> values) {
   std::sort(values.begin(), values.end());

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "common/base/units.h"
+
 namespace strandcast {
 namespace {
 
@@ -13,8 +15,6 @@ constexpr uint32_t kHardwareStrands = 16'384;
 constexpr uint32_t kReferenceStrands = 2;  // nothing to share between them
 constexpr int kWarmUpSubsteps = 3;
 constexpr int kTimedSubsteps = 8;
-constexpr double kUsPerMs = 1e3;
-constexpr double kMsPerNs = 1e-6;
 
 }  // namespace
 

@@ -88,7 +88,7 @@ double root_p95_deg(const Groom& groom, const std::vector<glm::vec3>& position_i
 }
 
 /// Where the head is: the motion seen from its first pose, upright there, eased in.
-Pose head_at(const StreamMotion& motion, double time_s) {
+Pose eased_head_at(const StreamMotion& motion, double time_s) {
   const double t = std::max(time_s, 0.0);
   const double eased_s = t < kEaseS ? 0.5 * t * t / kEaseS : t - 0.5 * kEaseS;
   const Pose first = motion.head_at(0.0);
@@ -215,7 +215,7 @@ Result<ScalpRun> run_scalp(const ScalpRunDesc& desc, const gl::ShaderLibrary& sh
     const double time_s = static_cast<double>(step) / scene.step_rate_hz;
     InputFrame input;
     input.has_motion = true;
-    input.world_from_head = head_at(desc.motion, time_s);
+    input.world_from_head = eased_head_at(desc.motion, time_s);
     for (const StepInput& substep : builder.build(input, features, time_s).substeps) solver->substep(substep);
     if (step == 0 || step % interval != 0) continue;
     solver->read(state);

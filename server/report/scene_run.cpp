@@ -1,5 +1,6 @@
 #include "server/report/scene_run.h"
 
+#include "common/base/units.h"
 #include "common/groom/groom_asset.h"
 #include "server/sim/followed_solver.h"
 #include "server/sim/solver_registry.h"
@@ -55,7 +56,6 @@ Status SceneRun::step(const Pose& world_from_head) {
 }
 
 Result<std::shared_ptr<const Snapshot>> SceneRun::publish() {
-  constexpr double kNsPerS = 1e9;
   StageTurn turn(*builder_, *solver_, *publisher_);
   turn.publish.tick = tick_;
   turn.publish.sim_time_ns = std::llround(static_cast<double>(tick_) / scene_.step_rate_hz * kNsPerS);

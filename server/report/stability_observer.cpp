@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace strandcast {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 constexpr size_t kFewestSamples = 16;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -25,8 +24,8 @@ double upper_band_acceleration_mps2(const std::vector<glm::dvec3>& position_m, d
   std::vector<glm::dvec3> windowed(count);
   double window_power = 0.0;
   for (size_t i = 0; i < count; ++i) {
-    const double window =
-        0.5 * (1.0 - std::cos(2.0 * kPi * (static_cast<double>(i) + 0.5) / static_cast<double>(count)));
+    const double window = 0.5 * (1.0 - std::cos(2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) /
+                                                static_cast<double>(count)));
     const glm::dvec3 change = position_m[i + 2] - 2.0 * position_m[i + 1] + position_m[i];
     windowed[i] = change * (window / (step_s * step_s));
     window_power += window * window;
@@ -36,7 +35,8 @@ double upper_band_acceleration_mps2(const std::vector<glm::dvec3>& position_m, d
   for (size_t bin = count / 4 + 1; bin <= count / 2; ++bin) {
     glm::dvec3 real(0.0), imaginary(0.0);
     for (size_t i = 0; i < count; ++i) {
-      const double angle = 2.0 * kPi * static_cast<double>((bin * i) % count) / static_cast<double>(count);
+      const double angle =
+          2.0 * std::numbers::pi * static_cast<double>((bin * i) % count) / static_cast<double>(count);
       real += windowed[i] * std::cos(angle);
       imaginary += windowed[i] * std::sin(angle);
     }

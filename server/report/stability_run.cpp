@@ -12,8 +12,8 @@
 namespace strandcast {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
 SolverParameters known_parameters(const SolverRow& row, const SolverParameters& given) {
   SolverParameters known;
@@ -22,7 +22,7 @@ SolverParameters known_parameters(const SolverRow& row, const SolverParameters& 
   return known;
 }
 
-Pose head_at(const StabilityTrial& trial, double time_s) {
+Pose trial_head_at(const StabilityTrial& trial, double time_s) {
   return trial.head ? trial.head(std::min(time_s, trial.moving_s)) : Pose();
 }
 
@@ -31,7 +31,7 @@ void spoil(BadInput bad_input, StepInput& input) {
     input.world_from_head_rotation = {0.0, 0.0, 0.0, 0.0};
     return;
   }
-  const double value = bad_input == BadInput::Infinite ? kInfinity : kNan;
+  const double value = bad_input == BadInput::Infinite ? kUnbounded : kNoNumber;
   input.world_from_head_rotation = {value, value, value, value};
   for (glm::dvec3* vector :
        {&input.head_shift_m, &input.gravity_mps2, &input.groom_gravity_in_head_mps2, &input.wind_mps})
@@ -41,8 +41,8 @@ void spoil(BadInput bad_input, StepInput& input) {
 
 /// The input of a step from `begin_s` to begin_s + h.
 StepInput input_of(const StabilityTrial& trial, double begin_s, double h_s) {
-  const Pose before = head_at(trial, begin_s);
-  const Pose after = head_at(trial, begin_s + h_s);
+  const Pose before = trial_head_at(trial, begin_s);
+  const Pose after = trial_head_at(trial, begin_s + h_s);
   StepInput input;
   input.h_s = h_s;
   input.world_from_head_rotation = after.rotation;
@@ -164,7 +164,7 @@ Result<StabilityOutcome> StabilityRunner::run(const SolverRow& row, const Stabil
     outcome.note += fmt::format("{}{}", outcome.note.empty() ? "" : "; ", fmt::join(notes, "; "));
   }
   ASSIGN_OR_RETURN(Solver * solver, solver_for(row, complete));
-  const glm::dquat first_rotation = head_at(trial, 0.0).rotation;
+  const glm::dquat first_rotation = trial_head_at(trial, 0.0).rotation;
   RETURN_IF_ERROR(solver->load(*trial.groom, first_rotation));
   SolverState state;
   solver->read(state);
@@ -175,7 +175,7 @@ Result<StabilityOutcome> StabilityRunner::run(const SolverRow& row, const Stabil
   StabilityObserver observer(trial, first_rotation);
   observer.begin(state);
   run_steps(trial, *solver, observer);
-  const auto values = observer.values(head_at(trial, trial.moving_s + trial.still_s).rotation);
+  const auto values = observer.values(trial_head_at(trial, trial.moving_s + trial.still_s).rotation);
   for (size_t i = 0; i < kStabilityMeasureCount; ++i) {
     const auto measure = static_cast<StabilityMeasure>(i);
     if (!trial.measures(measure)) continue;

@@ -4,17 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "common/base/hash.h"
 
 namespace strandcast {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kStepS = 1.0 / 60.0;
+constexpr double kTrialStepS = 1.0 / 60.0;
 constexpr double kStandardGravityMps2 = 9.80665;
 const glm::dvec3 kUp(0.0, 1.0, 0.0);
-const glm::dvec3 kSideways(1.0, 0.0, 0.0);
+const glm::dvec3 kTrialSideways(1.0, 0.0, 0.0);
 
 using Curve = std::vector<glm::vec3>;
 
@@ -90,7 +89,7 @@ std::vector<double> uneven_segments_m(double short_m) {
 
 std::shared_ptr<const Groom> upright_groom() {
   constexpr double kTiltRad = 1e-3;  // so that it knows where to fall
-  return groom_of({bent_curve(kUp, kSideways, even_segments_m(16), kTiltRad)});
+  return groom_of({bent_curve(kUp, kTrialSideways, even_segments_m(16), kTiltRad)});
 }
 
 std::shared_ptr<const Groom> standard_groom() {
@@ -120,13 +119,14 @@ Pose turned(double angle_rad, const glm::dvec3& axis) {
 /// To and fro with this largest acceleration.
 Pose shake(double time_s, double acceleration_mps2) {
   constexpr double kShakeHz = 4.0;
-  const double rate = 2.0 * kPi * kShakeHz;
-  return {kSideways * (acceleration_mps2 / (rate * rate)) * std::sin(rate * time_s), {1.0, 0.0, 0.0, 0.0}};
+  const double rate = 2.0 * std::numbers::pi * kShakeHz;
+  return {kTrialSideways * (acceleration_mps2 / (rate * rate)) * std::sin(rate * time_s),
+          {1.0, 0.0, 0.0, 0.0}};
 }
 
 /// Up and down by one radian with this largest rate.
 Pose nod(double time_s, double rate_radps) {
-  return turned(std::sin(rate_radps * time_s), kSideways);
+  return turned(std::sin(rate_radps * time_s), kTrialSideways);
 }
 
 /// -1 .. 1 and back at constant speed, one way in `leg_s`.
@@ -138,28 +138,28 @@ double zigzag(double time_s, double leg_s) {
 constexpr double kReversalS = 0.05;
 
 Pose reversals_turning(double time_s) {
-  return turned(0.5 * kPi * (1.0 + zigzag(time_s, kReversalS)), kUp);
+  return turned(0.5 * std::numbers::pi * (1.0 + zigzag(time_s, kReversalS)), kUp);
 }
 Pose reversals_moving(double time_s) {
   constexpr double kSpeedMps = 2.0;
-  return {kSideways * (0.5 * kReversalS * kSpeedMps * zigzag(time_s, kReversalS)), {1.0, 0.0, 0.0, 0.0}};
+  return {kTrialSideways * (0.5 * kReversalS * kSpeedMps * zigzag(time_s, kReversalS)), {1.0, 0.0, 0.0, 0.0}};
 }
 
 Pose teleport(double time_s) {
   constexpr double kJumpS = 0.5;
-  return {time_s < kJumpS ? glm::dvec3(0.0) : kSideways, {1.0, 0.0, 0.0, 0.0}};
+  return {time_s < kJumpS ? glm::dvec3(0.0) : kTrialSideways, {1.0, 0.0, 0.0, 0.0}};
 }
 
 /// Two steps forward and two steps of braking, each with this acceleration, after half a second.
 Pose burst(double time_s) {
   constexpr double kAccelerationMps2 = 1000.0;
   constexpr double kBeginS = 0.5;
-  constexpr double kHalfS = 2.0 * kStepS;
+  constexpr double kHalfS = 2.0 * kTrialStepS;
   const double t = std::clamp(time_s - kBeginS, 0.0, 2.0 * kHalfS);
   const double left_s = 2.0 * kHalfS - t;
   const double way_m = t < kHalfS ? 0.5 * kAccelerationMps2 * t * t
                                   : kAccelerationMps2 * (kHalfS * kHalfS - 0.5 * left_s * left_s);
-  return {kSideways * way_m, {1.0, 0.0, 0.0, 0.0}};
+  return {kTrialSideways * way_m, {1.0, 0.0, 0.0, 0.0}};
 }
 
 /// What a lively head does: sways and nods.
@@ -186,7 +186,7 @@ class TrialList {
     trial.group = group;
     trial.setting = setting;
     trial.groom = standard_groom();
-    trial.substep_s = every(kStepS);
+    trial.substep_s = every(kTrialStepS);
     for (const StabilityMeasure measure : measures) trial.measured[static_cast<size_t>(measure)] = true;
     trials_.push_back(std::move(trial));
     return trials_.back();
@@ -206,18 +206,18 @@ double fair_speed_mps(const StabilityTrial& trial) {
   constexpr double kLengthM = 0.25;
   constexpr double kWhip = 2.0;
   double fastest_mps = glm::length(trial.wind_mps);
-  for (double time_s = 0.0; trial.head && time_s < trial.moving_s; time_s += kStepS) {
+  for (double time_s = 0.0; trial.head && time_s < trial.moving_s; time_s += kTrialStepS) {
     const Pose before = trial.head(time_s);
-    const Pose after = trial.head(time_s + kStepS);
+    const Pose after = trial.head(time_s + kTrialStepS);
     const double turn_rad = angle_between_rad(before.rotation, after.rotation);
     fastest_mps = std::max(
-        fastest_mps, (glm::distance(before.position_m, after.position_m) + kReachM * turn_rad) / kStepS);
+        fastest_mps, (glm::distance(before.position_m, after.position_m) + kReachM * turn_rad) / kTrialStepS);
   }
   if (trial.start == StartState::Kicked) fastest_mps += kKickRadps * kLengthM;
   return kWhip * (fastest_mps + std::sqrt(4.0 * glm::length(trial.gravity_mps2) * kLengthM));
 }
 
-constexpr double kTimeToRestS = 12.0;  // a little more than the promise
+constexpr double kTrialRestS = 12.0;  // a little more than the promise
 
 void add_stiffness(TrialList& list) {
   const int stride = list.grid() == StabilityGrid::Full ? 1 : 3;
@@ -266,14 +266,14 @@ void add_motions(TrialList& list) {
         "motion", motion.name, {StabilityMeasure::Speed, StabilityMeasure::Rest, StabilityMeasure::Jitter});
     trial.head = motion.head;
     trial.moving_s = motion.seconds;
-    trial.still_s = kTimeToRestS;
+    trial.still_s = kTrialRestS;
   }
   StabilityTrial& wind =
       list.add("motion", "wind of 80 m/s",
                {StabilityMeasure::Speed, StabilityMeasure::Rest, StabilityMeasure::Jitter});
   wind.wind_mps = {80.0, 0.0, 0.0};
   wind.moving_s = 2.0;
-  wind.still_s = kTimeToRestS;
+  wind.still_s = kTrialRestS;
 }
 
 void add_grooms(TrialList& list) {
@@ -303,7 +303,7 @@ void add_bad_inputs(TrialList& list) {
     trial.given = {{"sag_free", 1.0}};
     trial.bad_input = bad_input;
     trial.moving_s = 1.0;
-    trial.still_s = kTimeToRestS;
+    trial.still_s = kTrialRestS;
   }
 }
 
@@ -344,12 +344,12 @@ void add_energies(TrialList& list) {
   upright.groom = upright_groom();
   upright.is_groom_carried = false;
   upright.given = {{"sag_free", 0.0}};
-  upright.still_s = kTimeToRestS;
+  upright.still_s = kTrialRestS;
   StabilityTrial& taut =
       list.add("energy", "pulled taut, released",
                {StabilityMeasure::Speed, StabilityMeasure::Rest, StabilityMeasure::Jitter});
   taut.start = StartState::Taut;
-  taut.still_s = kTimeToRestS;
+  taut.still_s = kTrialRestS;
 }
 
 void add_rests(TrialList& list) {
@@ -365,7 +365,7 @@ void add_rests(TrialList& list) {
       list.add("rest", "hanging hair, many steps", {StabilityMeasure::Style, StabilityMeasure::Speed});
   rest.groom = hanging_groom(even_segments_m(16));
   rest.given = {{"sag_free", 1.0}};
-  rest.still_s = lengths.many_steps * kStepS;
+  rest.still_s = lengths.many_steps * kTrialStepS;
   rest.is_checked_seldom = true;
 }
 

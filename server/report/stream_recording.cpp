@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/base/profile.h"
+#include "common/base/units.h"
 #include "common/groom/groom_asset.h"
 #include "common/strands/scene_asset.h"
 #include "server/publish/publisher.h"
@@ -19,7 +20,6 @@ namespace {
 
 // Strands swing into the motion before anything is recorded.
 constexpr double kSettleS = 1.5;
-constexpr double kNsPerMs = 1e6;
 // Of the lattice that the publisher is given and nobody sees.
 constexpr float kPublishedBoundM = 1e-4f;
 

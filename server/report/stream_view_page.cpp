@@ -5,17 +5,14 @@
 
 #include <algorithm>
 
+#include "common/base/units.h"
 #include "common/plot/svg_plot.h"
 #include "server/report/csv_file.h"
 
 namespace strandcast {
 namespace {
 
-constexpr int kSheetQuality = 95;
-
-double mm(double m) {
-  return 1e3 * m;
-}
+constexpr int kViewSheetQuality = 95;
 
 const StreamViewRow* row_of(const StreamView& view, const std::string& codec, double distance_m,
                             double bound_m) {
@@ -83,7 +80,7 @@ HtmlTable view_table(const StreamView& view) {
   table.columns.emplace_back("strands, Mbit/s");
   for (const char* codec : kViewCodecs)
     for (const double bound_m : kViewBoundsM) {
-      std::vector<HtmlCell> cells = {codec, fmt::format("{:g}", mm(bound_m))};
+      std::vector<HtmlCell> cells = {codec, fmt::format("{:g}", kMmPerM * bound_m)};
       double mbit_per_s = 0.0;
       for (const double distance_m : kViewDistancesM) {
         const StreamViewRow* row = row_of(view, codec, distance_m, bound_m);
@@ -111,7 +108,7 @@ std::string view_plot(const StreamView& view) {
       series.name = fmt::format("{} from {:g} m", codec, distance_m);
       for (const StreamViewRow& row : view.rows)
         if (row.codec == codec && row.distance_m == distance_m)
-          series.points.push_back({mm(row.bound_m), row.psnr_db,
+          series.points.push_back({kMmPerM * row.bound_m, row.psnr_db,
                                    fmt::format("{}: {:.1f} dB, SSIM {:.3f}, {:.2f} Mbit/s", series.name,
                                                row.psnr_db, row.ssim, row.mbit_per_s)});
       if (!series.points.empty()) desc.series.push_back(std::move(series));
@@ -133,7 +130,7 @@ HtmlTable pixel_table(const StreamView& view, LookMeasure measure) {
         const StreamViewRow* row = row_of(view, strand_codec, distance_m, bound_m);
         if (row == nullptr) continue;
         std::vector<HtmlCell> cells = {
-            fmt::format("{} at {:g} mm from {:g} m", strand_codec, mm(bound_m), distance_m),
+            fmt::format("{} at {:g} mm from {:g} m", strand_codec, kMmPerM * bound_m, distance_m),
             look_words(row->psnr_db, row->ssim, measure), fmt::format("{:.2f}", row->mbit_per_s)};
         for (const std::string& codec : codecs) cells.push_back(need_of(view, codec, *row, measure));
         if (measure == LookMeasure::Psnr) cells.emplace_back(look_with_same_rate(view, *row));
@@ -156,7 +153,7 @@ std::string pixel_plot(const StreamView& view, double distance_m) {
       if (row.codec == codec && row.distance_m == distance_m)
         strands.points.push_back({row.mbit_per_s, row.psnr_db,
                                   fmt::format("{} at {:g} mm: {:.1f} dB, {:.2f} Mbit/s", codec,
-                                              mm(row.bound_m), row.psnr_db, row.mbit_per_s)});
+                                              kMmPerM * row.bound_m, row.psnr_db, row.mbit_per_s)});
     if (!strands.points.empty()) desc.series.push_back(std::move(strands));
   }
   for (const std::string& codec : picture_codecs(view)) {
@@ -189,7 +186,7 @@ void add_view_sections(HtmlPage& page, const StreamView& view) {
   page.table(view_table(view));
   page.figure(view_plot(view), "Higher is better; 40 dB is hard to tell from exact.");
   for (const ViewSheet& sheet : view.sheets)
-    if (const auto jpeg = encode_jpeg(sheet.image, kSheetQuality)) page.picture(*jpeg, sheet.caption);
+    if (const auto jpeg = encode_jpeg(sheet.image, kViewSheetQuality)) page.picture(*jpeg, sheet.caption);
   page.heading("Strands or pictures?");
   std::string missing;
   if (!view.missing.empty())
@@ -213,8 +210,9 @@ HtmlTable playout_table(const std::vector<PlayoutRow>& rows) {
   table.columns = {"head", "shown between states", "off in the world, rms mm", "PSNR, dB", "SSIM", "dE"};
   for (const PlayoutRow& row : rows)
     table.rows.push_back({row.motion, way_words(row.interpolation),
-                          fmt::format("{:.3f}", mm(row.rms_error_m)), fmt::format("{:.1f}", row.psnr_db),
-                          fmt::format("{:.3f}", row.ssim), fmt::format("{:.2f}", row.delta_e)});
+                          fmt::format("{:.3f}", kMmPerM * row.rms_error_m),
+                          fmt::format("{:.1f}", row.psnr_db), fmt::format("{:.3f}", row.ssim),
+                          fmt::format("{:.2f}", row.delta_e)});
   return table;
 }
 
@@ -237,7 +235,7 @@ std::string playout_csv(const std::vector<PlayoutRow>& rows) {
       {"motion", "solver", "interpolation", "pictures", "rms_error_mm", "psnr_db", "ssim", "delta_e"});
   for (const PlayoutRow& row : rows)
     csv.add_row({row.motion, row.solver, to_string(row.interpolation),
-                 fmt::format("{}", row.compared_pictures), csv_number(mm(row.rms_error_m)),
+                 fmt::format("{}", row.compared_pictures), csv_number(kMmPerM * row.rms_error_m),
                  csv_number(row.psnr_db), csv_number(row.ssim), csv_number(row.delta_e)});
   return csv.text();
 }
@@ -246,9 +244,9 @@ std::string view_csv(const StreamView& view) {
   CsvFile csv({"codec", "distance_m", "bound_mm", "psnr_db", "ssim", "delta_e", "hair_share", "mbit_per_s",
                "width", "height"});
   for (const StreamViewRow& row : view.rows)
-    csv.add_row({row.codec, csv_number(row.distance_m), csv_number(mm(row.bound_m)), csv_number(row.psnr_db),
-                 csv_number(row.ssim), csv_number(row.delta_e), csv_number(row.hair_share),
-                 csv_number(row.mbit_per_s), fmt::format("{}", view.size.width),
+    csv.add_row({row.codec, csv_number(row.distance_m), csv_number(kMmPerM * row.bound_m),
+                 csv_number(row.psnr_db), csv_number(row.ssim), csv_number(row.delta_e),
+                 csv_number(row.hair_share), csv_number(row.mbit_per_s), fmt::format("{}", view.size.width),
                  fmt::format("{}", view.size.height)});
   return csv.text();
 }

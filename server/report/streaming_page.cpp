@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 
+#include "common/base/units.h"
 #include "common/plot/svg_plot.h"
 #include "server/report/csv_file.h"
 #include "server/report/html_page.h"
@@ -43,10 +44,6 @@ size_t style_of(const std::string& codec) {
   return static_cast<size_t>(found - kCodecStyles.begin());
 }
 
-double mm(double m) {
-  return 1e3 * m;
-}
-
 /// The recording that plots of one recording are of: walking and turning where there is any.
 const StreamingRow* shown_recording(const StreamingReport& report) {
   for (const StreamingRow& row : report.rows)
@@ -75,7 +72,7 @@ std::string row_note(const StreamingRow& row) {
   return fmt::format(
       "{}, bound {:g} mm: {:.2f} bits per vertex, largest error {:.4f} mm, encode {:.1f} ms, "
       "decode {:.1f} ms",
-      row.codec_and_wind(), mm(row.bound_m), row.bits, mm(row.max_error_m), row.encode_cpu_ms,
+      row.codec_and_wind(), kMmPerM * row.bound_m, row.bits, kMmPerM * row.max_error_m, row.encode_cpu_ms,
       row.decode_cpu_ms);
 }
 
@@ -135,26 +132,28 @@ HtmlTable codec_table(const StreamingReport& report, const StreamRecording& reco
         row.size.strand_count != size.strand_count || row.size.vertex_count != size.vertex_count)
       continue;
     const bool keeps = row.keeps_bound();
-    table.rows.push_back({row.codec_and_wind(),
-                          row.bound_m > 0.0 ? fmt::format("{:.3g}", mm(row.bound_m)) : "lossless",
-                          fmt::format("{:.2f}", row.bits),
-                          fmt::format("{:.2f}", row.all_bits),
-                          fmt::format("{:.2f}", row.join_bits),
-                          fmt::format("{:.1f}", row.mbit_per_s()),
-                          {fmt::format("{:.4f}{}", mm(row.max_error_m), keeps ? "" : " misses the bound"),
-                           keeps ? HtmlMark::None : HtmlMark::Bad},
-                          fmt::format("{:.4f}", mm(row.rms_error_m)),
-                          fmt::format("{:.2f}", row.encode_cpu_ms),
-                          fmt::format("{:.2f}", row.decode_cpu_ms),
-                          fmt::format("{:.2f}", row.encode_wall_ms)});
+    table.rows.push_back(
+        {row.codec_and_wind(),
+         row.bound_m > 0.0 ? fmt::format("{:.3g}", kMmPerM * row.bound_m) : "lossless",
+         fmt::format("{:.2f}", row.bits),
+         fmt::format("{:.2f}", row.all_bits),
+         fmt::format("{:.2f}", row.join_bits),
+         fmt::format("{:.1f}", row.mbit_per_s()),
+         {fmt::format("{:.4f}{}", kMmPerM * row.max_error_m, keeps ? "" : " misses the bound"),
+          keeps ? HtmlMark::None : HtmlMark::Bad},
+         fmt::format("{:.4f}", kMmPerM * row.rms_error_m),
+         fmt::format("{:.2f}", row.encode_cpu_ms),
+         fmt::format("{:.2f}", row.decode_cpu_ms),
+         fmt::format("{:.2f}", row.encode_wall_ms)});
   }
   return table;
 }
 
 HtmlTable latency_table(const StreamLatency& latency) {
   HtmlTable table;
-  table.caption = fmt::format("{}, {}, codec {} at {:g} mm, {:.0f} bytes per frame", latency.motion,
-                              to_string(latency.size), latency.codec, mm(latency.bound_m), latency.bytes);
+  table.caption =
+      fmt::format("{}, {}, codec {} at {:g} mm, {:.0f} bytes per frame", latency.motion,
+                  to_string(latency.size), latency.codec, kMmPerM * latency.bound_m, latency.bytes);
   table.columns = {"stage", "median, ms", "99th percentile, ms"};
   std::vector<LatencyStage> stages = latency.stages;
   stages.push_back(latency.total);
@@ -252,13 +251,13 @@ std::string streaming_csv(const StreamingReport& report) {
                  row.is_ours       ? "ours"
                  : row.is_temporal ? "peer, temporal"
                                    : "peer, positions",
-                 csv_number(mm(row.bound_m)),
+                 csv_number(kMmPerM * row.bound_m),
                  csv_number(row.bits),
                  csv_number(row.all_bits),
                  csv_number(row.join_bits),
                  csv_number(row.mbit_per_s()),
-                 csv_number(mm(row.max_error_m)),
-                 csv_number(mm(row.rms_error_m)),
+                 csv_number(kMmPerM * row.max_error_m),
+                 csv_number(kMmPerM * row.rms_error_m),
                  row.keeps_bound() ? "yes" : "no",
                  csv_number(row.encode_cpu_ms),
                  csv_number(row.decode_cpu_ms),
@@ -283,7 +282,7 @@ std::string streaming_bound_plot(const StreamingReport& report) {
     series.style = static_cast<int>(style_of(name));
     for (const StreamingRow& row : report.rows)
       if (row.codec_and_wind() == name && row.is_same_recording(*shown) && !row.is_bound_free)
-        series.points.push_back({mm(row.bound_m), row.bits, row_note(row)});
+        series.points.push_back({kMmPerM * row.bound_m, row.bits, row_note(row)});
     if (!series.points.empty()) desc.series.push_back(std::move(series));
   }
   return make_svg_plot(desc);
@@ -390,8 +389,8 @@ std::string streaming_page(const StreamingReport& report) {
 std::string streaming_summary(const StreamingReport& report) {
   std::string text = needs_text(report) + "\n";
   for (const StreamViewRow& row : report.view.rows)
-    text += fmt::format("{} at {:.2f} mm from {:g} m: {:.1f} dB, SSIM {:.3f}\n", row.codec, mm(row.bound_m),
-                        row.distance_m, row.psnr_db, row.ssim);
+    text += fmt::format("{} at {:.2f} mm from {:g} m: {:.1f} dB, SSIM {:.3f}\n", row.codec,
+                        kMmPerM * row.bound_m, row.distance_m, row.psnr_db, row.ssim);
   for (const PlayoutRow& row : report.playout)
     text += fmt::format("between states at 30 Hz, {}, {}: {:.1f} dB, SSIM {:.3f}\n", row.motion,
                         to_string(row.interpolation), row.psnr_db, row.ssim);
@@ -409,7 +408,7 @@ std::string streaming_summary(const StreamingReport& report) {
   for (const StreamingRow& row : report.rows)
     if (!row.keeps_bound())
       text += fmt::format("misses its bound: {} at {:.3g} mm on {}, {}: {:.4g} mm\n", row.codec,
-                          mm(row.bound_m), row.motion, to_string(row.size), mm(row.max_error_m));
+                          kMmPerM * row.bound_m, row.motion, to_string(row.size), kMmPerM * row.max_error_m);
   for (const std::string& sentence : missing_peers()) text += sentence + "\n";
   return text;
 }

@@ -38,7 +38,7 @@ const Row* find_by_name(const std::vector<Row>& rows, const std::string& name) {
   return found == rows.end() ? nullptr : &*found;
 }
 
-std::string percent(double share) {
+std::string volume_percent(double share) {
   return fmt::format("{:.1f} %", 100.0 * share);
 }
 
@@ -62,8 +62,9 @@ void add_errors(HtmlPage& page, const VolumeStudy& study) {
     table.rows.push_back({fmt::format("{}", error.resolution), fmt::format("{:.1f}", 1e3f * error.cell_m),
                           fmt::format("{}", error.smoothing),
                           error.interval == 1 ? "step" : fmt::format("{} steps", error.interval),
-                          to_string(error.hairs), percent(error.density), percent(error.gradient),
-                          percent(error.velocity), fmt::format("{:.2f}", error.cpu_ms)});
+                          to_string(error.hairs), volume_percent(error.density),
+                          volume_percent(error.gradient), volume_percent(error.velocity),
+                          fmt::format("{:.2f}", error.cpu_ms)});
   page.table(table);
 }
 
@@ -87,7 +88,7 @@ void add_scatters(HtmlPage& page, const VolumeStudy& study) {
          fmt::format("{:.1e}", scatter.density),
          fmt::format("{:.1e}", scatter.momentum),
          {scatter.is_repeatable ? "yes" : "no", scatter.is_repeatable ? HtmlMark::None : HtmlMark::Bad},
-         percent(scatter.lost_share)});
+         volume_percent(scatter.lost_share)});
   page.table(table);
 }
 
@@ -103,8 +104,9 @@ void add_outcomes(HtmlPage& page, const VolumeStudy& study) {
       "", {"volume", "speed, mm/s", "step to step, mm", "of the groom's volume", "crowded", "ms a step"}, {}};
   for (const VolumeOutcome& outcome : study.outcomes)
     table.rows.push_back({outcome.name, fmt::format("{:.2f}", 1e3 * outcome.speed_rms_mps),
-                          fmt::format("{:.4f}", 1e3 * outcome.nyquist_m), percent(outcome.volume_share),
-                          percent(outcome.crowded_share), fmt::format("{:.3f}", outcome.step_cpu_ms)});
+                          fmt::format("{:.4f}", 1e3 * outcome.nyquist_m),
+                          volume_percent(outcome.volume_share), volume_percent(outcome.crowded_share),
+                          fmt::format("{:.3f}", outcome.step_cpu_ms)});
   page.table(table);
 }
 
@@ -123,8 +125,8 @@ void add_covered(HtmlPage& page, const VolumeStudy& study) {
                     "an implicit term in the place of a pressure solve: a tuft keeps {} of its volume "
                     "instead of {}, and {} of its "
                     "vertices are crowded instead of {}.",
-                    percent(usual->volume_share), percent(none->volume_share), percent(usual->crowded_share),
-                    percent(none->crowded_share)));
+                    volume_percent(usual->volume_share), volume_percent(none->volume_share),
+                    volume_percent(usual->crowded_share), volume_percent(none->crowded_share)));
   if (const VolumeError* const same = find_guides(study, kTrueResolution); same != nullptr)
     page.paragraph(fmt::format(
         "Strips (Koh and Huang 2001; 003, 2.1) move many hairs as one patch, to simulate fewer vertices. "
@@ -132,7 +134,8 @@ void add_covered(HtmlPage& page, const VolumeStudy& study) {
         "the hairs around them do so with {} of the vertices here, and know the density of all hair within "
         "{} on the same "
         "cells, without taking any freedom from strands.",
-        percent(static_cast<double>(study.guide_count) / study.hair_count), percent(same->density)));
+        volume_percent(static_cast<double>(study.guide_count) / study.hair_count),
+        volume_percent(same->density)));
   page.paragraph(
       fmt::format("Breaking (002, 4.2): a hair of {:.0f} cm in a shake of 10 g pulls at its root with {:.2f} "
                   "mN, and breaks at {:.0f} N, "
@@ -151,24 +154,25 @@ std::string volume_summary(const VolumeStudy& study) {
     text += fmt::format(
         "{} guides know the density of {} hairs within {} on the same {} cells of {:.0f} mm, in {:.2f} ms a "
         "step.\n",
-        study.guide_count, study.hair_count, percent(same->density), same->resolution, 1e3f * same->cell_m,
-        same->cpu_ms);
+        study.guide_count, study.hair_count, volume_percent(same->density), same->resolution,
+        1e3f * same->cell_m, same->cpu_ms);
   for (const uint32_t resolution : {kTrueResolution / 2, 2 * kTrueResolution})
     if (const VolumeError* const other = find_guides(study, resolution); other != nullptr)
       text += fmt::format("On {} cells they {} by {}, in {:.2f} ms.\n", resolution,
                           resolution < kTrueResolution ? "blur it" : "see single guides, and miss it",
-                          percent(other->density), other->cpu_ms);
+                          volume_percent(other->density), other->cpu_ms);
   const ScatterResult* const atomics = find_by_name(study.scatters, "atomics");
   for (const ScatterResult& scatter : study.scatters)
     text += fmt::format(
         "{}: {:.2f} ms{}, density within {:.1e}{}\n", scatter.name, scatter.cpu_ms,
         atomics == nullptr ? "" : fmt::format(" ({:.2f} of atomics)", scatter.cpu_ms / atomics->cpu_ms),
         scatter.density,
-        scatter.lost_share > 0.0 ? fmt::format(", {} of samples lost", percent(scatter.lost_share)) : "");
+        scatter.lost_share > 0.0 ? fmt::format(", {} of samples lost", volume_percent(scatter.lost_share))
+                                 : "");
   for (const VolumeOutcome& outcome : study.outcomes)
     text += fmt::format("{}: {:.2f} mm/s at rest, {} of the groom's volume, {} crowded, {:.3f} ms a step\n",
-                        outcome.name, 1e3 * outcome.speed_rms_mps, percent(outcome.volume_share),
-                        percent(outcome.crowded_share), outcome.step_cpu_ms);
+                        outcome.name, 1e3 * outcome.speed_rms_mps, volume_percent(outcome.volume_share),
+                        volume_percent(outcome.crowded_share), outcome.step_cpu_ms);
   return text;
 }
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <ctime>
 #include <deque>
 #include <limits>
 #include <utility>
@@ -14,6 +13,7 @@
 #include "common/kernels/volume/hair_volume.h"
 #include "common/math/point_tree.h"
 #include "server/report/crowded_hair.h"
+#include "server/report/process_time.h"
 #include "server/report/scatter_study.h"
 
 namespace strandcast {
@@ -27,10 +27,6 @@ constexpr uint32_t kTuftVertices = 16;
 constexpr uint32_t kTuftSeed = 1;
 /// Cells of a tuft of so few strands, and what it is looked at by.
 constexpr uint32_t kTuftResolution = 12;
-
-double process_cpu_ms() {
-  return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
-}
 
 /// All strands at one moment, and some steps before it.
 struct Moment {

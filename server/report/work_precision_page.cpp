@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "common/base/units.h"
 #include "common/plot/svg_plot.h"
 #include "server/report/csv_file.h"
 #include "server/report/exact_solutions.h"
@@ -21,7 +22,6 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kFramesPerS = 1.0 / MotionSet::kFrameS;
 // What a budget is for, on the page.
 constexpr double kPickStrands = 10'000.0;
-constexpr double kUsPerMs = 1e3;
 constexpr double kBudgetsMs[] = {2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0};
 
 std::string percent(double value) {

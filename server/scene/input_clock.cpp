@@ -3,13 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/units.h"
+
 namespace strandcast {
-namespace {
-
-constexpr double kNsPerS = 1e9;
-
-}  // namespace
-
 InputClock::InputClock(double step_s) : step_ns_(step_s * kNsPerS) {}
 
 int64_t InputClock::next(int64_t due_ns) {

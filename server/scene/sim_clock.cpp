@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/units.h"
+
 namespace strandcast {
 namespace {
 
-constexpr double kNsPerS = 1e9;
 constexpr int64_t kFactorWindowNs = 1'000'000'000;
 
 }  // namespace

@@ -12,4 +12,10 @@ glm::dvec3 direction_or(const glm::dvec3& vector, const glm::dvec3& otherwise);
 /// Smallest rotation from one unit vector to another; of opposite ones, any.
 glm::dquat smallest_rotation(const glm::dvec3& from, const glm::dvec3& to);
 
+/// A unit vector at right angles to one.
+glm::dvec3 any_perpendicular(const glm::dvec3& direction);
+
+/// The matrix that takes x to v x x.
+glm::dmat3 cross_matrix(const glm::dvec3& v);
+
 }  // namespace strandcast

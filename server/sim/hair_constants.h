@@ -1,5 +1,6 @@
 // HairConstants: what a real hair is made of, in SI units, and the stiffnesses that follow. Plain data.
 #pragma once
+#include <numbers>
 
 namespace strandcast {
 
@@ -11,7 +12,7 @@ struct HairConstants {
   double young_modulus_pa = 3e9;
   double poisson_ratio = 0.45;
 
-  double area_m2() const { return kPi * radius_m * radius_m; }
+  double area_m2() const { return std::numbers::pi * radius_m * radius_m; }
   double linear_density_kgpm() const { return density_kgpm3 * area_m2(); }
   double shear_modulus_pa() const { return young_modulus_pa / (2.0 * (1.0 + poisson_ratio)); }
   /// E A: force per relative stretch, N.
@@ -20,9 +21,6 @@ struct HairConstants {
   double bending_stiffness_nm2() const { return young_modulus_pa * 0.25 * area_m2() * radius_m * radius_m; }
   /// G J: moment per twist, N m^2.
   double twist_stiffness_nm2() const { return shear_modulus_pa() * 0.5 * area_m2() * radius_m * radius_m; }
-
- private:
-  static constexpr double kPi = 3.14159265358979323846;
 };
 
 }  // namespace strandcast

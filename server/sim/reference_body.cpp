@@ -4,17 +4,13 @@
 #include <cmath>
 #include <optional>
 
+#include "server/sim/reference_contact.h"
+
 namespace strandcast {
 namespace {
 
-constexpr double kTinyLengthM = 1e-10;
 /// So much nearer than it was is no contact yet.
-constexpr double kSlackM = 1e-6;
-/// Two rounds, and more where so much is left.
-constexpr int kMostRounds = 5;
-constexpr double kResidueM = 5e-5;
-/// An end that the middle's turn moved by more than twice this may have met something else.
-constexpr double kLookAgainM = 2e-4;
+constexpr double kBodySlackM = 1e-6;
 constexpr double kFarM = 1e6;
 
 /// Of a segment's length: a side that is shorter is none, and what of a side is short of kKeptSide is made up
@@ -199,7 +195,7 @@ bool keep_out_of(const BodyInput& body, const ReferenceBodyStrand& strand) {
     if (clearance_m < least_m) {
       const double now_m =
           std::min(distance_to_body_m(body, end), distance_to_body_m(body, 0.5 * (start + end)));
-      strand.clearance_m[i] = std::min(std::max(now_m - kSlackM, clearance_m), least_m);
+      strand.clearance_m[i] = std::min(std::max(now_m - kBodySlackM, clearance_m), least_m);
     } else {
       strand.clearance_m[i] = least_m;
     }

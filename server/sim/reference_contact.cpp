@@ -3,18 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/sim/directions.h"
 #include "server/sim/strand_layout.h"
 
 namespace strandcast {
 namespace {
 
-constexpr double kTinyLength = 1e-12;
-
-/// Any unit vector at right angles to a unit vector.
-glm::dvec3 any_perpendicular(const glm::dvec3& axis) {
-  const glm::dvec3 other = std::abs(axis.x) < 0.6 ? glm::dvec3(1.0, 0.0, 0.0) : glm::dvec3(0.0, 1.0, 0.0);
-  return glm::normalize(glm::cross(axis, other));
-}
+constexpr double kTinyContact = 1e-12;
 
 }  // namespace
 
@@ -49,12 +44,12 @@ int push_rounds(const StepInput& input) {
 glm::dvec3 held_by_friction(const glm::dvec3& old_m, const glm::dvec3& point_m, const glm::dquat& carry,
                             double friction, const ReferenceSphere& sphere) {
   const double distance = glm::distance(point_m, sphere.center_m);
-  if (distance < kTinyLength) return point_m;
+  if (distance < kTinyContact) return point_m;
   const glm::dvec3 normal = (point_m - sphere.center_m) / distance;
   const glm::dvec3 slip = point_m - carry * old_m;
   const glm::dvec3 sliding = slip - normal * glm::dot(slip, normal);
   const double way = glm::length(sliding);
-  if (way < kTinyLength) return point_m;
+  if (way < kTinyContact) return point_m;
   return point_m - sliding * std::min(1.0, friction * (sphere.radius_m - distance) / way);
 }
 
@@ -67,7 +62,7 @@ glm::dvec3 turned_onto_sphere(const ReferenceSegment& segment, const glm::dvec3&
   const double length = segment.length_m;
   const glm::dvec3 to_center = center - segment.start_m;
   const double distance = glm::length(to_center);
-  if (distance < kTinyLength || length < kTinyLength) return segment.end_m;
+  if (distance < kTinyContact || length < kTinyContact) return segment.end_m;
   const glm::dvec3 axis = to_center / distance;
   // Law of cosines in the triangle start, end, center.
   const double cosine = std::clamp(
@@ -75,7 +70,7 @@ glm::dvec3 turned_onto_sphere(const ReferenceSegment& segment, const glm::dvec3&
   const glm::dvec3 along = segment.end_m - segment.start_m;
   glm::dvec3 side = along - axis * glm::dot(along, axis);
   const double side_length = glm::length(side);
-  side = side_length > kTinyLength ? side / side_length : any_perpendicular(axis);
+  side = side_length > kTinyContact ? side / side_length : any_perpendicular(axis);
   return segment.start_m + length * (cosine * axis + std::sqrt(1.0 - cosine * cosine) * side);
 }
 

@@ -10,6 +10,13 @@
 
 namespace strandcast {
 
+inline constexpr double kTinyLengthM = 1e-10;
+/// Rounds of answers to a field or a body: two, and more where so much is left.
+inline constexpr int kMostRounds = 5;
+inline constexpr double kResidueM = 5e-5;
+/// An end that the middle's turn moved by more than twice this may have met something else.
+inline constexpr double kLookAgainM = 2e-4;
+
 /// A collider as the solvers take it, within the limits of strand_layout.h.
 struct ReferenceSphere {
   glm::dvec3 center_m{0.0};

@@ -3,26 +3,22 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/sim/reference_contact.h"
+
 namespace strandcast {
 namespace {
 
-constexpr double kTinyLengthM = 1e-10;
 /// So much nearer than in the groom is no contact yet.
-constexpr double kSlackM = 1e-6;
+constexpr double kFieldSlackM = 1e-6;
 constexpr double kLeastSlope = 0.5;
-/// Two rounds, and more where so much is left.
-constexpr int kMostRounds = 5;
-constexpr double kResidueM = 5e-5;
-/// An end that the middle's turn moved by more than twice this may have met something else.
-constexpr double kLookAgainM = 2e-4;
 
 /// The nearest part of the skin as a plane that a point is in front of.
-struct Contact {
+struct FieldContact {
   glm::dvec3 normal{0.0};
   double depth_m = 0.0;  // below the clearance; not positive = none
 };
 
-Contact contact_at(const DistanceField& field, const glm::dvec3& point_m, double clearance_m) {
+FieldContact contact_at(const DistanceField& field, const glm::dvec3& point_m, double clearance_m) {
   const DistanceField::Sample sample = field.sample(point_m);
   const double slope = glm::length(sample.gradient);
   return {slope > 0.0 ? sample.gradient / slope : glm::dvec3(0.0),
@@ -41,7 +37,7 @@ glm::dvec3 segment_at_height(const glm::dvec3& towards, const glm::dvec3& normal
   return length_m * (std::sin(angle) * normal + std::cos(angle) * flat);
 }
 
-glm::dvec3 after_friction(const glm::dvec3& before_m, const glm::dvec3& end_m, const Contact& contact,
+glm::dvec3 after_friction(const glm::dvec3& before_m, const glm::dvec3& end_m, const FieldContact& contact,
                           double friction) {
   const glm::dvec3 slip = end_m - before_m;
   const glm::dvec3 sliding = slip - glm::dot(slip, contact.normal) * contact.normal;
@@ -53,7 +49,7 @@ glm::dvec3 after_friction(const glm::dvec3& before_m, const glm::dvec3& end_m, c
 }  // namespace
 
 double field_clearance_m(const DistanceField& field, const glm::dvec3& groomed_m) {
-  return std::min(kFieldClearanceM, field.sample(groomed_m).distance_m - kSlackM);
+  return std::min(kFieldClearanceM, field.sample(groomed_m).distance_m - kFieldSlackM);
 }
 
 bool keep_out_of(const DistanceField& field, const ReferenceFieldStrand& strand) {
@@ -75,14 +71,14 @@ bool keep_out_of(const DistanceField& field, const ReferenceFieldStrand& strand)
           field_clearance_m(field, 0.5 * (strand.groomed_m[i - 1] + strand.groomed_m[i]));
       for (int attempt = 0; attempt < 2; ++attempt) {
         for (int round = 0; round < kMostRounds; ++round) {
-          const Contact contact = contact_at(field, end, clearance_m);
+          const FieldContact contact = contact_at(field, end, clearance_m);
           const double left_m = clearance_m - field.sample(end).distance_m;
           if (!(left_m > (round < 2 ? 0.0 : kResidueM))) break;
           const glm::dvec3 held = after_friction(strand.before_m[i], end, contact, strand.friction);
           end = start + segment_at_height(held - start, contact.normal, length_m,
                                           glm::dot(end - start, contact.normal) + contact.depth_m);
         }
-        const Contact cut = contact_at(field, 0.5 * (start + end), middle_clearance_m);
+        const FieldContact cut = contact_at(field, 0.5 * (start + end), middle_clearance_m);
         if (!(cut.depth_m > 0.0)) break;
         end = start + segment_at_height(end - start, cut.normal, length_m,
                                         glm::dot(end - start, cut.normal) + 2.0 * cut.depth_m);

@@ -3,18 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/sim/directions.h"
 #include "server/sim/reference_contact.h"
 
 namespace strandcast {
 namespace {
 
-constexpr double kTinyLengthM = 1e-10;
-
-glm::dvec3 any_perpendicular(const glm::dvec3& direction) {
-  const glm::dvec3 other =
-      std::abs(direction.x) < 0.6 ? glm::dvec3(1.0, 0.0, 0.0) : glm::dvec3(0.0, 1.0, 0.0);
-  return glm::normalize(glm::cross(direction, other));
-}
+constexpr double kTinyFollicleM = 1e-10;
 
 /// A segment that turns in the plane of two perpendicular directions.
 struct Turning {
@@ -54,7 +49,7 @@ bool hold_root(const StepInput& input, const ReferenceRoot& root) {
   const glm::dvec3 edge = root.position_m[root.first] - start;
   const double length_m = glm::length(edge);
   const double groomed_m = glm::length(root.groomed);
-  if (!(length_m > kTinyLengthM && groomed_m > kTinyLengthM)) return false;
+  if (!(length_m > kTinyFollicleM && groomed_m > kTinyFollicleM)) return false;
   if (!(angle_rad(edge, root.groomed) > input.follicle_limit_rad)) return false;
 
   Turning turning{start, root.groomed / groomed_m, {}, length_m};
@@ -65,7 +60,7 @@ bool hold_root(const StepInput& input, const ReferenceRoot& root) {
   for (size_t c = 0; c < sphere_count(input); ++c) angle = angle_beside(turning, angle, sphere_of(input, c));
 
   glm::dvec3 shift = turning.end_m(angle) - root.position_m[root.first];
-  if (const double way_m = glm::length(shift); way_m > kTinyLengthM) {
+  if (const double way_m = glm::length(shift); way_m > kTinyFollicleM) {
     const glm::dvec3 along = shift / way_m;
     glm::dvec3& velocity_mps = root.velocity_mps[root.first];
     velocity_mps += std::max(0.0, -glm::dot(velocity_mps - root.follicle_mps, along)) * along;

@@ -8,7 +8,7 @@
 namespace strandcast {
 namespace {
 
-constexpr double kTinyLength = 1e-12;
+constexpr double kTinySegment = 1e-12;
 
 }  // namespace
 
@@ -115,9 +115,9 @@ void ReferenceStrands::place(ReferenceStrand& strand, uint32_t i) const {
   const double length = strand.segment_m[i];
   glm::dvec3 direction = strand.predicted_m[i] - start;
   // No direction to keep: take the groomed one.
-  if (glm::length(direction) < kTinyLength) direction = strand.target_m[i] - strand.target_m[i - 1];
+  if (glm::length(direction) < kTinySegment) direction = strand.target_m[i] - strand.target_m[i - 1];
   const double norm = glm::length(direction);
-  glm::dvec3 end = norm < kTinyLength ? start : start + length * (direction / norm);
+  glm::dvec3 end = norm < kTinySegment ? start : start + length * (direction / norm);
 
   const glm::dvec3 outside =
       pushed_out(input(), carry(), parameters_.collider_friction, {strand.old_m[i], start, end, length});
@@ -145,7 +145,7 @@ glm::dvec3 ReferenceStrands::finish_velocity(const ReferenceStrand& strand, uint
     glm::dvec3 correction = strand.placed_m[i + 1] - strand.predicted_m[i + 1] - strand.pushed_m[i + 1];
     // A string takes no thrust: of a correction that points away from vertex i only a share counts.
     const glm::dvec3 segment = strand.placed_m[i + 1] - strand.placed_m[i];
-    if (const double length_m = glm::length(segment); length_m > kTinyLength) {
+    if (const double length_m = glm::length(segment); length_m > kTinySegment) {
       const glm::dvec3 direction = segment / length_m;
       const double thrust_m = std::max(0.0, glm::dot(correction, direction));
       correction -= (1.0 - parameters_.thrust_share) * thrust_m * direction;

@@ -9,9 +9,9 @@
 namespace strandcast {
 namespace {
 
-constexpr float kShortestM = 1e-9f;
+constexpr float kShortestEdgeM = 1e-9f;
 /// Vertices that a worker takes at a time.
-constexpr uint32_t kVerticesPerRange = 8'192;
+constexpr uint32_t kFollowedVerticesPerRange = 8'192;
 
 }  // namespace
 
@@ -69,7 +69,7 @@ void VertexFollow::follow(std::span<const glm::vec3> kept_in_head_m,
                           std::span<glm::vec3> all_in_head_m) const {
   put(kept_in_head_m, all_in_head_m);
   if (kept_.size() == vertex_count_) return;
-  const size_t grain = std::max(1u, kVerticesPerRange / vertex_count_);
+  const size_t grain = std::max(1u, kFollowedVerticesPerRange / vertex_count_);
   shared_workers().at(Priority::Simulation).for_ranges(strand_count_, grain, [&](size_t begin, size_t end) {
     follow_some(kept_in_head_m.data(), all_in_head_m.data(), begin, end);
   });
@@ -88,7 +88,7 @@ void VertexFollow::follow_some(const glm::vec3* kept_in_head_m, glm::vec3* all_i
         const glm::vec3 way = to[s] - from[s];
         const float length = glm::length(way), rest_length = glm::length(whole[s]);
         // Two that are in one place, now or in the groom, have no way between them.
-        if (length < kShortestM || rest_length < kShortestM) {
+        if (length < kShortestEdgeM || rest_length < kShortestEdgeM) {
           out[s] = from[s] +
                    way * (static_cast<float>(v - kept_[k - 1]) / static_cast<float>(kept_[k] - kept_[k - 1]));
           continue;

@@ -4,10 +4,10 @@
 
 #include <utility>
 
+#include "common/base/units.h"
+
 namespace strandcast {
 namespace {
-
-constexpr double kNsPerS = 1e9;
 
 DetailLevel next_lower(DetailLevel level) {
   return static_cast<DetailLevel>(static_cast<int>(level) + 1);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/base/thread_name.h"
+#include "common/base/units.h"
 #include "common/log/log.h"
 #include "common/strands/strand_codec.h"
 #include "server/source/scene_change.h"
@@ -16,7 +17,6 @@
 namespace strandcast {
 namespace {
 
-constexpr double kNsPerS = 1e9;
 /// Medians cost a sort of the window; viewers are told twice a second.
 constexpr uint64_t kStatsInterval = 8;
 constexpr int64_t kStatsNs = 250'000'000;  // when steps take long

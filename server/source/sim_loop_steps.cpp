@@ -3,14 +3,13 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/base/units.h"
 #include "common/groom/head_measure.h"
 #include "common/log/log.h"
 #include "server/source/sim_loop.h"
 
 namespace strandcast {
 namespace {
-
-constexpr double kNsPerS = 1e9;
 
 double median_ms(const gl::PassReports& passes, std::string_view name) {
   for (const gl::PassReport& pass : passes)

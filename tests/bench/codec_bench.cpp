@@ -104,16 +104,16 @@ void run_raw_zstd(const char* scene, const Recording& recording) {
 
 struct Scene {
   std::string name;
-  std::function<Result<Recording>(const RecordedPart&)> record;
+  std::function<Result<Recording>(const RecordedSpan&)> record;
 };
 
 std::vector<Scene> test_scenes() {
   std::vector<Scene> scenes;
-  scenes.push_back({"built_in_2000x16", [](const RecordedPart& part) {
+  scenes.push_back({"built_in_2000x16", [](const RecordedSpan& part) {
                       return record_simulation({"dftl", 2000, 16, {}, 0.0}, part);
                     }});
   const auto add = [&scenes](std::string name, const HairMotionDesc& desc) {
-    scenes.push_back({std::move(name), [desc](const RecordedPart& part) -> Result<Recording> {
+    scenes.push_back({std::move(name), [desc](const RecordedSpan& part) -> Result<Recording> {
                         return record_chains(desc, part);
                       }});
   };
@@ -149,7 +149,7 @@ std::vector<Scene> mocap_scenes(const std::filesystem::path& folder) {
       for (const char* solver : {"dftl", "direct_rod"}) {
         const SimulatedMotion motion{solver, strands, vertices, file, part.begin_s};
         scenes.push_back({fmt::format("mocap_{}_{}_{}x{}", part.name, solver, strands, vertices),
-                          [motion](const RecordedPart& of) { return record_simulation(motion, of); }});
+                          [motion](const RecordedSpan& of) { return record_simulation(motion, of); }});
       }
     }
   }

@@ -43,7 +43,7 @@ Snapshot on_lattice(const Snapshot& state, float quantum_m) {
   return quantise(input).snapshot;
 }
 
-Recording record_chains(const HairMotionDesc& desc, const RecordedPart& part) {
+Recording record_chains(const HairMotionDesc& desc, const RecordedSpan& part) {
   HairMotion hair(desc);
   Recording recording;
   recording.rest_in_head_m = hair.rest_in_head();
@@ -54,7 +54,7 @@ Recording record_chains(const HairMotionDesc& desc, const RecordedPart& part) {
   return recording;
 }
 
-Result<Recording> record_simulation(const SimulatedMotion& motion, const RecordedPart& part) {
+Result<Recording> record_simulation(const SimulatedMotion& motion, const RecordedSpan& part) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(motion.solver));
   MotionClip clip;
   if (!motion.clip.empty()) {

@@ -23,12 +23,12 @@ struct Recording {
 Snapshot on_lattice(const Snapshot& state, float quantum_m);
 
 /// `warm_up` steps that are not recorded, then `count` that are.
-struct RecordedPart {
+struct RecordedSpan {
   int warm_up = 60;
   int count = 120;
 };
 
-Recording record_chains(const HairMotionDesc& desc, const RecordedPart& part);
+Recording record_chains(const HairMotionDesc& desc, const RecordedSpan& part);
 
 /// A scene of procedural hair in the built-in breeze.
 struct SimulatedMotion {
@@ -40,6 +40,6 @@ struct SimulatedMotion {
 };
 
 /// Errors name the clip.
-Result<Recording> record_simulation(const SimulatedMotion& motion, const RecordedPart& part);
+Result<Recording> record_simulation(const SimulatedMotion& motion, const RecordedSpan& part);
 
 }  // namespace strandcast

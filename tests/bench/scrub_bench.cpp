@@ -9,25 +9,23 @@
 
 #include "common/base/profile.h"
 #include "common/base/quantile.h"
+#include "common/base/units.h"
 #include "common/record/recording_reader.h"
 #include "common/record/strand_frames.h"
 
 namespace strandcast {
 namespace {
 
-constexpr int64_t kNsPerS = 1'000'000'000;
-constexpr double kMsPerNs = 1e-6;
-
 /// Milliseconds until the first state at or behind the second is there.
 Result<double> show(RecordingReader& reader, StrandDecoder& decoder, int64_t second) {
   const int64_t begin_ns = now_ns();
-  RETURN_IF_ERROR(reader.seek(second * kNsPerS));
+  RETURN_IF_ERROR(reader.seek(second * kSInNs));
   while (true) {
     ASSIGN_OR_RETURN(const auto item, reader.next());
     if (!item) break;
     const auto& frame = std::get<RecordedFrame>(item->what).frame;
     ASSIGN_OR_RETURN(const auto state, decoder.decode(frame->message));
-    if (state->sim_time_ns >= second * kNsPerS) break;
+    if (state->sim_time_ns >= second * kSInNs) break;
   }
   return static_cast<double>(now_ns() - begin_ns) * kMsPerNs;
 }
@@ -41,7 +39,7 @@ int run(const char* path) {
   const double open_ms = static_cast<double>(now_ns() - begin_ns) * kMsPerNs;
   std::vector<int64_t> seconds;
   const RecordingInfo& info = (*reader)->info();
-  for (int64_t s = info.first_sim_time_ns / kNsPerS; s * kNsPerS <= info.last_sim_time_ns; ++s)
+  for (int64_t s = info.first_sim_time_ns / kSInNs; s * kSInNs <= info.last_sim_time_ns; ++s)
     seconds.push_back(s);
   std::shuffle(seconds.begin(), seconds.end(), std::mt19937(1));
   std::vector<double> times_ms;

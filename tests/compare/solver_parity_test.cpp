@@ -10,7 +10,7 @@
 #include "tests/support/solver_bounds.h"
 #include "tests/support/test_grid.h"
 
-namespace strandcast {
+namespace strandcast::solver_parity_test {
 namespace {
 
 constexpr double kSubstepS = 1.0 / 60.0;
@@ -205,4 +205,4 @@ TEST(SolverTable, HasOneRowWithoutAKernel) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::solver_parity_test

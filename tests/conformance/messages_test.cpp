@@ -8,7 +8,7 @@
 #include "strandcast/v1/session.pb.h"
 #include "tests/conformance/control_vectors.h"
 
-namespace strandcast::conformance {
+namespace strandcast::conformance::messages_test {
 namespace {
 
 namespace pb = google::protobuf;
@@ -116,4 +116,4 @@ TEST(WireDocument, NamesEveryMessageAndField) {
 }
 
 }  // namespace
-}  // namespace strandcast::conformance
+}  // namespace strandcast::conformance::messages_test

@@ -3,7 +3,7 @@
 #include "common/strands/byte_io.h"
 #include "tests/conformance/payload_vectors.h"
 
-namespace strandcast::conformance {
+namespace strandcast::conformance::payloads_test {
 namespace {
 
 /// The words of all lines of a kept file.
@@ -74,4 +74,4 @@ TEST(Conformance, KeptTilesShowTheirPictureAndArePackedAlike) {
 }
 
 }  // namespace
-}  // namespace strandcast::conformance
+}  // namespace strandcast::conformance::payloads_test

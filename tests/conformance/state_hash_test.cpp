@@ -2,7 +2,7 @@
 #include "common/base/file.h"
 #include "tests/conformance/reference_hash.h"
 
-namespace strandcast::conformance {
+namespace strandcast::conformance::state_hash_test {
 namespace {
 
 /// The state of the example in section 6.
@@ -49,4 +49,4 @@ TEST(StateHash, TheWorkedExampleOfTheDocumentIsRight) {
 }
 
 }  // namespace
-}  // namespace strandcast::conformance
+}  // namespace strandcast::conformance::state_hash_test

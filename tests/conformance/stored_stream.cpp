@@ -20,7 +20,7 @@ namespace {
 constexpr uint64_t kMaxFileBytes = 1u << 20;
 constexpr size_t kLongestRestBytes = 4096;  // of a rest shape that is written out
 
-Bytes bytes_of(std::span<const glm::vec3> points) {
+Bytes point_bytes_of(std::span<const glm::vec3> points) {
   const auto bytes = std::as_bytes(points);
   return {bytes.begin(), bytes.end()};
 }
@@ -170,7 +170,7 @@ std::string to_text(const StoredStream& stored) {
   const StreamCase& stream = stored.stream;
   std::string text = fmt::format("codec {} {}\nsize {} {} {}\n", stream.codec, stored.codec_number,
                                  stream.strand_count, stream.vertex_count, stream.coded_count);
-  const Bytes rest = bytes_of(stored.rest_in_head_m);
+  const Bytes rest = point_bytes_of(stored.rest_in_head_m);
   if (rest.empty())
     text += "rest none\n";
   else if (rest.size() > kLongestRestBytes)

@@ -8,7 +8,7 @@
 #include "tests/conformance/reference_hash.h"
 #include "tests/conformance/stored_stream.h"
 
-namespace strandcast::conformance {
+namespace strandcast::conformance::streams_test {
 namespace {
 
 const std::filesystem::path kFolder =
@@ -167,4 +167,4 @@ TEST(Conformance, OtherBytesInOneFrameAreNoticed) {
 }
 
 }  // namespace
-}  // namespace strandcast::conformance
+}  // namespace strandcast::conformance::streams_test

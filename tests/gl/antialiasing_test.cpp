@@ -9,7 +9,7 @@
 #include "common/render/renderer.h"
 #include "tests/support/gl_fixture.h"
 
-namespace strandcast {
+namespace strandcast::antialiasing_test {
 namespace {
 
 constexpr RenderSize kSize{160, 90};
@@ -155,4 +155,4 @@ TEST_F(AntialiasingTest, APictureOfOnePixelIsDrawn) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::antialiasing_test

@@ -9,7 +9,7 @@
 #include "tests/support/gl_fixture.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast::gl {
+namespace strandcast::gl::compile_all_test {
 namespace {
 
 class CompileAll : public GlTest {};
@@ -75,4 +75,4 @@ TEST_F(CompileAll, FindsTheOneVariantThatIsBroken) {
 }
 
 }  // namespace
-}  // namespace strandcast::gl
+}  // namespace strandcast::gl::compile_all_test

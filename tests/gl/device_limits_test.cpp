@@ -10,7 +10,7 @@
 #include "common/gl/program.h"
 #include "tests/support/gl_fixture.h"
 
-namespace strandcast::gl {
+namespace strandcast::gl::device_limits_test {
 namespace {
 
 using testing::HasSubstr;
@@ -268,4 +268,4 @@ TEST(DeviceLimits, AreListedInTheReadme) {
 }
 
 }  // namespace
-}  // namespace strandcast::gl
+}  // namespace strandcast::gl::device_limits_test

@@ -12,7 +12,7 @@
 #include "common/gl/objects.h"
 #include "tests/support/gl_fixture.h"
 
-namespace strandcast::gl {
+namespace strandcast::gl::egl_context_test {
 namespace {
 
 using testing::HasSubstr;
@@ -150,4 +150,4 @@ TEST(DeviceInfo, ADebugMessageIsNoError) {
 }
 
 }  // namespace
-}  // namespace strandcast::gl
+}  // namespace strandcast::gl::egl_context_test

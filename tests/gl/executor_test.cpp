@@ -13,7 +13,7 @@
 #include "tests/support/sim_devices.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::executor_test {
 namespace {
 
 using testing::HasSubstr;
@@ -270,4 +270,4 @@ TEST_P(EveryExecutor, TimesWhatRuns) {
 INSTANTIATE_TEST_SUITE_P(Of, EveryExecutor, testing::ValuesIn(sim_devices()), name_of_device);
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::executor_test

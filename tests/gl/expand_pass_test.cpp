@@ -10,7 +10,7 @@
 #include "tests/support/gl_fixture.h"
 #include "tests/support/strand_reference.h"
 
-namespace strandcast {
+namespace strandcast::expand_pass_test {
 namespace {
 
 using reference::Keys;
@@ -304,4 +304,4 @@ TEST_F(ExpandPassTest, WithoutFollowersNothingIsAllocatedForThem) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::expand_pass_test

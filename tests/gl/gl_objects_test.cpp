@@ -9,7 +9,7 @@
 #include "tests/support/gl_fixture.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast::gl {
+namespace strandcast::gl::gl_objects_test {
 namespace {
 
 class GlObjects : public GlTest {
@@ -178,4 +178,4 @@ TEST_F(GlObjects, TheTimerCoversTheWorkBetween) {
 }
 
 }  // namespace
-}  // namespace strandcast::gl
+}  // namespace strandcast::gl::gl_objects_test

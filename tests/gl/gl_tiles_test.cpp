@@ -21,7 +21,7 @@
 #include "tests/support/grown_hair.h"
 #include "tests/support/sample_look.h"
 
-namespace strandcast {
+namespace strandcast::gl_tiles_test {
 namespace {
 
 constexpr RenderSize kSize{160, 120};
@@ -341,4 +341,4 @@ TEST_F(TileLists, LeaveOutWhatIsBehindTheEyeOffThePictureOrNoNumber) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::gl_tiles_test

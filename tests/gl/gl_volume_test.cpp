@@ -13,7 +13,7 @@
 #include "server/sim/volume/reference_volume.h"
 #include "server/sim/volume/volume_forces.h"
 
-namespace strandcast {
+namespace strandcast::gl_volume_test {
 namespace {
 
 using testing::HasSubstr;
@@ -402,4 +402,4 @@ TEST(VolumeScatters, AreRefusedWhereTheyAreNotThere) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::gl_volume_test

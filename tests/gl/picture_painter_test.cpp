@@ -19,7 +19,7 @@
 #include "tests/support/sample_messages.h"
 #include "tests/support/sanitizers.h"
 
-namespace strandcast {
+namespace strandcast::picture_painter_test {
 namespace {
 
 constexpr float kHeadRadiusM = 0.095f;
@@ -307,4 +307,4 @@ TEST_F(PaintingMemory, APixelTakesWithoutAGpuWhatTheBudgetCounts) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::picture_painter_test

@@ -11,7 +11,7 @@
 #include "tests/support/gl_fixture.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast::gl {
+namespace strandcast::gl::program_test {
 namespace {
 
 using testing::AllOf;
@@ -285,4 +285,4 @@ TEST_F(Programs, SharedConstantsWorkInLayouts) {
 }
 
 }  // namespace
-}  // namespace strandcast::gl
+}  // namespace strandcast::gl::program_test

@@ -8,7 +8,7 @@
 #include "tests/support/sim_devices.h"
 #include "tests/support/sim_scene.h"
 
-namespace strandcast {
+namespace strandcast::quarantine_test {
 namespace {
 
 using testing::ElementsAreArray;
@@ -168,4 +168,4 @@ TEST_P(Quarantine, PoisonThatGoesThroughAStepIsGoneAfterIt) {
 INSTANTIATE_TEST_SUITE_P(EveryExecutor, Quarantine, testing::ValuesIn(sim_devices()), name_of_device);
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::quarantine_test

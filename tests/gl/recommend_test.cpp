@@ -8,7 +8,7 @@
 #include "server/report/report_executor.h"
 #include "tests/support/sim_devices.h"
 
-namespace strandcast {
+namespace strandcast::recommend_test {
 namespace {
 
 using testing::HasSubstr;
@@ -99,4 +99,4 @@ TEST(Recommend, RefusesBudgetsAndModelsThatAreNone) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::recommend_test

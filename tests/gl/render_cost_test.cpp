@@ -5,7 +5,7 @@
 #include "common/render/renderer.h"
 #include "tests/support/gl_fixture.h"
 
-namespace strandcast {
+namespace strandcast::render_cost_test {
 namespace {
 
 using gl::ObjectCounts;
@@ -292,4 +292,4 @@ TEST_F(RenderCostTest, AnotherPathDrawsBehindTheSameRendererAndPaysForNothingOfT
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::render_cost_test

@@ -5,7 +5,7 @@
 #include "tests/support/gl_fixture.h"
 #include "tests/support/sample_asset.h"
 
-namespace strandcast {
+namespace strandcast::render_device_test {
 namespace {
 
 using testing::HasSubstr;
@@ -123,4 +123,4 @@ TEST_F(RenderDevices, ATileRendererFollowsItsLook) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::render_device_test

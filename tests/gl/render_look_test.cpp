@@ -10,7 +10,7 @@
 #include "common/render/renderer.h"
 #include "tests/support/gl_fixture.h"
 
-namespace strandcast {
+namespace strandcast::render_look_test {
 namespace {
 
 constexpr RenderSize kSize{240, 240};
@@ -203,4 +203,4 @@ TEST_F(RenderLook, BlocksDoNotDependOnTheSizeOfThePicture) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::render_look_test

@@ -13,7 +13,7 @@
 #include "common/scene/hair_color.h"
 #include "tests/support/gl_fixture.h"
 
-namespace strandcast {
+namespace strandcast::render_methods_test {
 namespace {
 
 constexpr RenderSize kSize{160, 160};
@@ -251,4 +251,4 @@ TEST_F(RenderMethods, StrandsWithoutLengthDrawAFinitePicture) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::render_methods_test

@@ -8,7 +8,7 @@
 
 #include "tests/support/gl_fixture.h"
 
-namespace strandcast {
+namespace strandcast::renderer_test {
 namespace {
 
 constexpr RenderSize kSmall{160, 90};
@@ -372,4 +372,4 @@ TEST_F(RendererTest, WrongSizesAreErrorsInWords) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::renderer_test

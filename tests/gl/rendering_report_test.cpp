@@ -7,7 +7,7 @@
 #include "server/report/html_page.h"
 #include "tests/support/gl_fixture.h"
 
-namespace strandcast {
+namespace strandcast::rendering_report_test {
 namespace {
 
 using testing::HasSubstr;
@@ -108,4 +108,4 @@ TEST(HtmlPages, CodePicturesInBase64) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::rendering_report_test

@@ -8,7 +8,7 @@
 #include "common/scene/scene_file.h"
 #include "server/scene/scene_content.h"
 
-namespace strandcast {
+namespace strandcast::scalp_test {
 namespace {
 
 using testing::HasSubstr;
@@ -86,4 +86,4 @@ TEST_F(Scalp, HeldRootsCoverMoreOfIt) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::scalp_test

@@ -1,6 +1,7 @@
 // The laws of shading as the GPU computes them, held against the double-precision fibre of
 // common/render/scatter.
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "common/render/passes/table_textures.h"
@@ -10,11 +11,10 @@
 #include "common/scene/hair_color.h"
 #include "tests/support/shader_probe.h"
 
-namespace strandcast {
+namespace strandcast::scatter_shader_test {
 namespace {
 
 using scatter::kDegree;
-using scatter::kPi;
 using scatter::StrandView;
 
 constexpr double kWidth = 7.5 * kDegree;
@@ -357,15 +357,15 @@ TEST_F(ScatterShader, ChiangsFibreIsTheReferenceWithinOnePercentOfThePeak) {
         std::array<glm::dvec3, 3> lobes{};
         constexpr int kEntries = 200;
         for (int i = 0; i < kEntries; ++i) {
-          const double gamma = kPi * ((i + 0.5) / kEntries - 0.5), h = std::sin(gamma);
-          const double weight = 0.5 * kPi / kEntries * std::cos(gamma);
+          const double gamma = std::numbers::pi * ((i + 0.5) / kEntries - 0.5), h = std::sin(gamma);
+          const double weight = 0.5 * std::numbers::pi / kEntries * std::cos(gamma);
           for (int c = 0; c < 3; ++c) {
             const auto shares = scatter::lobe_shares({scatter::kHairIndex, out, h, absorption[c]});
             for (size_t p = 0; p < 4; ++p) {
               const double across =
                   p < 3 ? scatter::trimmed_logistic(
                               scale, scatter::wrapped(angles.phi - scatter::exit_azimuth(p, index, h)))
-                        : 0.5 / kPi;
+                        : 0.5 / std::numbers::pi;
               lobes[std::min<size_t>(p, 2)][c] += weight * along[p] * across * shares[p];
             }
           }
@@ -382,14 +382,16 @@ TEST_F(ScatterShader, AWhiteFibreVanishesInAWhiteFurnace) {
   std::vector<double> solid_angle;
   for (int i = 0; i < kInclinations; ++i)
     for (int j = 0; j < kAzimuths; ++j) {
-      const double in = kPi * ((i + 0.5) / kInclinations - 0.5), phi = 2.0 * kPi * (j + 0.5) / kAzimuths;
+      const double in = std::numbers::pi * ((i + 0.5) / kInclinations - 0.5),
+                   phi = 2.0 * std::numbers::pi * (j + 0.5) / kAzimuths;
       Sample sample;
       sample.color = glm::dvec3(1.0);
       sample.view = {{1, 0, 0},
                      {std::sin(in), std::cos(in) * std::cos(phi), std::cos(in) * std::sin(phi)},
                      {std::sin(0.3), std::cos(0.3), 0}};
       rows.push_back(row_of(sample, glm::vec3(1.0f)));
-      solid_angle.push_back(2.0 * kPi * kPi / (kInclinations * kAzimuths) * std::cos(in));
+      solid_angle.push_back(2.0 * std::numbers::pi * std::numbers::pi / (kInclinations * kAzimuths) *
+                            std::cos(in));
     }
   const auto values =
       evaluate(includes_of("chiang"),
@@ -616,4 +618,4 @@ TEST_F(ScatterShader, DegenerateDirectionsStayFiniteInEveryModel) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::scatter_shader_test

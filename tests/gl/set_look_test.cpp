@@ -8,7 +8,7 @@
 #include "tests/support/sample_asset.h"
 #include "tests/support/sample_look.h"
 
-namespace strandcast {
+namespace strandcast::set_look_test {
 namespace {
 
 constexpr RenderSize kSize{96, 72};
@@ -104,4 +104,4 @@ TEST_P(SetLookTest, HoldsWhatTheNewestLookNeeds) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::set_look_test

@@ -14,7 +14,7 @@
 #include "common/gl/program.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast::gl {
+namespace strandcast::gl::shader_validators_test {
 namespace {
 
 using testing::AllOf;
@@ -227,4 +227,4 @@ TEST_F(ShaderValidators, RefuseStagesThatDoNotFit) {
 }
 
 }  // namespace
-}  // namespace strandcast::gl
+}  // namespace strandcast::gl::shader_validators_test

@@ -20,6 +20,9 @@ namespace strandcast {
 
 std::unique_ptr<RenderPass> make_light_pass(RenderScene& scene);
 
+}  // namespace strandcast
+
+namespace strandcast::shadow_test {
 namespace {
 
 using test::Line;
@@ -320,4 +323,4 @@ TEST_F(ShadowTest, NoInputGivesLightThatIsNotANumber) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::shadow_test

@@ -7,7 +7,7 @@
 #include "tests/support/hair_motion.h"
 #include "tests/support/sample_asset.h"
 
-namespace strandcast {
+namespace strandcast::strand_drawer_test {
 namespace {
 
 constexpr uint32_t kStrands = 60;
@@ -152,4 +152,4 @@ TEST_F(StrandDrawerTest, SaysWhyItCannotDraw) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::strand_drawer_test

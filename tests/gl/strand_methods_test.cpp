@@ -21,7 +21,7 @@
 #include "tests/support/sample_look.h"
 #include "tests/support/strand_reference.h"
 
-namespace strandcast {
+namespace strandcast::strand_methods_test {
 namespace {
 
 using reference::Keys;
@@ -544,4 +544,4 @@ TEST_F(StrandMethods, CoarseCastersShadeNearlyAlike) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::strand_methods_test

@@ -5,7 +5,7 @@
 #include "tests/support/shader_probe.h"
 #include "tests/support/strand_reference.h"
 
-namespace strandcast {
+namespace strandcast::strand_shader_test {
 namespace {
 
 using StrandShader = ShaderProbe;
@@ -121,4 +121,4 @@ TEST_F(StrandShader, SrgbHasItsFixedPoints) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::strand_shader_test

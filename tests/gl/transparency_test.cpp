@@ -10,7 +10,7 @@
 #include "tests/support/gl_fixture.h"
 #include "tests/support/line_scene.h"
 
-namespace strandcast {
+namespace strandcast::transparency_test {
 namespace {
 
 using test::Line;
@@ -268,4 +268,4 @@ TEST_F(TransparencyTest, NoInputGivesAPictureThatIsNotFinite) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::transparency_test

@@ -1,13 +1,13 @@
 // The relay's link model on given times: what goes in comes out, when and how the plan says.
 #include "common/chaos/chaos_pipe.h"
+#include "common/base/units.h"
 
 #include <numeric>
 
-namespace strandcast::chaos {
+namespace strandcast::chaos::chaos_pipe_test {
 namespace {
 
 constexpr uint64_t kSeed = 7;
-constexpr int64_t kUsPerS = 1'000'000;
 
 std::vector<std::byte> numbers(size_t count) {
   std::vector<std::byte> bytes(count);
@@ -72,7 +72,7 @@ TEST(ChaosPipe, RateAndQueueBoundWhatPasses) {
   const auto bytes = numbers(64'000);
   size_t passed = 0;
   size_t most_held = 0;
-  for (int64_t time_us = 0; time_us < kUsPerS; time_us += 1'000) {
+  for (int64_t time_us = 0; time_us < kSInUs; time_us += 1'000) {
     pipe.push(std::span(bytes).first(std::min(pipe.room(time_us), bytes.size())), time_us);
     most_held = std::max(most_held, pipe.held_bytes());
     for (auto piece = pipe.front(time_us); !piece.empty(); piece = pipe.front(time_us)) {
@@ -127,4 +127,4 @@ TEST(ChaosPipe, CorruptionDependsOnSeedAndPlaceOnly) {
 }
 
 }  // namespace
-}  // namespace strandcast::chaos
+}  // namespace strandcast::chaos::chaos_pipe_test

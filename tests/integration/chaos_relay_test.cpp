@@ -9,7 +9,7 @@
 
 #include "tests/support/eventually.h"
 
-namespace strandcast::chaos {
+namespace strandcast::chaos::chaos_relay_test {
 namespace {
 
 namespace asio = boost::asio;
@@ -155,4 +155,4 @@ TEST(ChaosRelay, ClientIsRefusedWhenTheServerIsAway) {
 }
 
 }  // namespace
-}  // namespace strandcast::chaos
+}  // namespace strandcast::chaos::chaos_relay_test

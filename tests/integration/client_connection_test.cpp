@@ -11,7 +11,7 @@
 #include "tests/support/fake_server.h"
 #include "tests/support/sample_messages.h"
 
-namespace strandcast {
+namespace strandcast::client_connection_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -408,4 +408,4 @@ TEST(ClientHostile, AnUpgradeAnswerWithoutEndIsLeft) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::client_connection_test

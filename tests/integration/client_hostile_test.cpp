@@ -20,7 +20,7 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/tools/load_viewers.h"
 
-namespace strandcast {
+namespace strandcast::client_hostile_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -455,4 +455,4 @@ TEST(HostileServer, PongsThatNobodyReadsEndAViewerOfTheLoadTool) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::client_hostile_test

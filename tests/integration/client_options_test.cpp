@@ -8,7 +8,7 @@
 #include "common/client/client_token.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::client_options_test {
 namespace {
 
 using testing::HasSubstr;
@@ -120,4 +120,4 @@ TEST_F(ClientTokenFile, SaysWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::client_options_test

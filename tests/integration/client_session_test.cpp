@@ -12,7 +12,7 @@
 #include "tests/support/fake_server.h"
 #include "tests/support/hair_motion.h"
 
-namespace strandcast {
+namespace strandcast::client_session_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -281,4 +281,4 @@ TEST(ViewerThread, SendsEveryWishForAModeAtOnce) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::client_session_test

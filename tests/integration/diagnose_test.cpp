@@ -9,7 +9,7 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_certificate.h"
 
-namespace strandcast {
+namespace strandcast::diagnose_test {
 namespace {
 
 using test::ChildProcess;
@@ -119,4 +119,4 @@ TEST_F(Diagnose, AnAddressThatIsNoneIsAnErrorOfUse) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::diagnose_test

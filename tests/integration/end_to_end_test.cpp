@@ -27,7 +27,7 @@
 #include "tests/support/server_fixture.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::end_to_end_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -709,4 +709,4 @@ TEST_F(EndToEnd, WithoutADisplayTheErrorNamesTheWayOut) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::end_to_end_test

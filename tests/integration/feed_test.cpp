@@ -10,7 +10,7 @@
 #include "tests/support/client_config.h"
 #include "tests/support/fake_server.h"
 
-namespace strandcast {
+namespace strandcast::feed_test {
 namespace {
 
 using test::config_for;
@@ -156,4 +156,4 @@ TEST(Feed, FollowsAPaceHalfwayWithEveryWordAndIsExactInRealTime) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::feed_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace strandcast {
+namespace strandcast::frame_chain_test {
 namespace {
 
 EncodedFramePtr frame(Opcode opcode, uint32_t sequence, uint32_t base, size_t bytes = 100) {
@@ -82,4 +82,4 @@ TEST(FrameChain, IsBoundedInBytes) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::frame_chain_test

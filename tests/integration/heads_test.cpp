@@ -20,7 +20,7 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/support/udp_socket.h"
 
-namespace strandcast {
+namespace strandcast::heads_test {
 namespace {
 
 using testing::AllOf;
@@ -562,4 +562,4 @@ TEST_F(HeadPictures, AViewerShowsAllOfThemOrTheOneThatItNames) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::heads_test

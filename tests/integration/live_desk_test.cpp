@@ -16,7 +16,7 @@
 #include "tests/support/log_capture.h"
 #include "tests/support/udp_socket.h"
 
-namespace strandcast {
+namespace strandcast::live_desk_test {
 namespace {
 
 using test::UdpSocket;
@@ -217,4 +217,4 @@ TEST_F(LiveDesks, LoopbackAloneIsListenedToWhereNothingElseIsAllowed) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::live_desk_test

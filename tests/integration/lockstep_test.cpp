@@ -8,7 +8,7 @@
 #include "common/client/viewer_client.h"
 #include "tests/support/server_fixture.h"
 
-namespace strandcast {
+namespace strandcast::lockstep_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -183,4 +183,4 @@ TEST_F(Lockstep, ATurnOfTheLoopThatDoesNotEndIsSeenAndOneThatWaitsIsNone) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::lockstep_test

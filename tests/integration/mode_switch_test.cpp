@@ -12,7 +12,7 @@
 #include "tests/support/raw_client.h"
 #include "tests/support/server_fixture.h"
 
-namespace strandcast {
+namespace strandcast::mode_switch_test {
 namespace {
 
 using test::RawClient;
@@ -254,4 +254,4 @@ TEST_F(ModeSwitching, AutoTakesFramesOnALinkTooSlowForStrandsAndComesBack) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::mode_switch_test

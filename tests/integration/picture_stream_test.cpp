@@ -11,7 +11,7 @@
 #include "tests/support/sim_devices.h"
 #include "tests/support/test_pictures.h"
 
-namespace strandcast {
+namespace strandcast::picture_stream_test {
 namespace {
 
 SceneDesc windy_scene(RenderSize size = {160, 120}) {
@@ -242,4 +242,4 @@ TEST_F(PictureStream, HowLargePicturesMayBeFollowsWhatDrawsNotWhatSimulates) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::picture_stream_test

@@ -15,7 +15,7 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/tools/load_viewers.h"
 
-namespace strandcast {
+namespace strandcast::process_faults_test {
 namespace {
 
 using load::LoadViewers;
@@ -253,4 +253,4 @@ TEST_F(ProcessFaults, ASignalToTheRunScriptEndsAllThatItStarted) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::process_faults_test

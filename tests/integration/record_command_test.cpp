@@ -13,7 +13,7 @@
 #include "tests/support/server_fixture.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::record_command_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -336,4 +336,4 @@ TEST_F(RecordCommands, HaveKeyframesOftenerWhereStepsTakeLonger) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::record_command_test

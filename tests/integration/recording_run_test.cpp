@@ -9,7 +9,7 @@
 #include "tests/support/server_fixture.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::recording_run_test {
 namespace {
 
 using testing::HasSubstr;
@@ -186,4 +186,4 @@ TEST_F(RecordedRun, TellsTheFirstStepThatIsNotAsItWas) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::recording_run_test

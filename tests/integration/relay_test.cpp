@@ -14,7 +14,7 @@
 #include "tests/support/raw_client.h"
 #include "tests/support/server_fixture.h"
 
-namespace strandcast {
+namespace strandcast::relay_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -536,4 +536,4 @@ TEST_F(Relays, ItSaysHowItGoes) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::relay_test

@@ -10,7 +10,7 @@
 #include "common/base/file.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::report_program_test {
 namespace {
 
 using testing::AllOf;
@@ -327,4 +327,4 @@ TEST_F(ReportProgram, RefusesBadInputInOneSentence) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::report_program_test

@@ -8,7 +8,7 @@
 #include "tests/support/child_process.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::scenario_program_test {
 namespace {
 
 using testing::AllOf;
@@ -125,4 +125,4 @@ INSTANTIATE_TEST_SUITE_P(All, ShippedScenario,
                          [](const auto& one) { return std::string(one.param); });
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::scenario_program_test

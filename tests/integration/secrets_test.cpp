@@ -11,7 +11,7 @@
 #include "tests/support/lacks_gl.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::secrets_test {
 namespace {
 
 using test::ChildProcess;
@@ -128,4 +128,4 @@ TEST_F(Secrets, NewTokensAreShownOnce) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::secrets_test

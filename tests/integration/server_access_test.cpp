@@ -4,7 +4,7 @@
 #include "tests/support/sample_messages.h"
 #include "tests/support/server_net_fixture.h"
 
-namespace strandcast {
+namespace strandcast::server_access_test {
 namespace {
 
 using test::code;
@@ -255,4 +255,4 @@ TEST(ServerAccessListen, UntrustedLoopbackNeedsTokens) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::server_access_test

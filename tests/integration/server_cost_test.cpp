@@ -19,7 +19,7 @@
 #include "tests/support/server_fixture.h"
 #include "tests/support/udp_socket.h"
 
-namespace strandcast {
+namespace strandcast::server_cost_test {
 namespace {
 
 using gl::ObjectCounts;
@@ -239,4 +239,4 @@ TEST_F(ServerCost, WhatExplainMeasuresIsWhatItPlansAndAServerRuns) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::server_cost_test

@@ -11,7 +11,7 @@
 #include "tests/support/raw_client.h"
 #include "tests/support/server_fixture.h"
 
-namespace strandcast {
+namespace strandcast::server_detail_test {
 namespace {
 
 using test::RawClient;
@@ -312,4 +312,4 @@ TEST_F(DetailServer, AFarCameraOfPicturesGetsFewerStrandsAndANearOneAll) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::server_detail_test

@@ -3,7 +3,7 @@
 #include "tests/support/proxy_header.h"
 #include "tests/support/server_net_fixture.h"
 
-namespace strandcast {
+namespace strandcast::server_limits_test {
 namespace {
 
 using test::code;
@@ -291,4 +291,4 @@ TEST_F(ServerLimits, WrongTokensOnTrustedLoopbackDoNotBlock) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::server_limits_test

@@ -18,7 +18,7 @@
 #include "tests/support/raw_client.h"
 #include "tests/support/server_fixture.h"
 
-namespace strandcast {
+namespace strandcast::server_live_test {
 namespace {
 
 using test::RawClient;
@@ -676,4 +676,4 @@ TEST_F(LiveServer, MetricsTellWhatRuns) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::server_live_test

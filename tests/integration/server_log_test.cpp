@@ -5,7 +5,7 @@
 #include "tests/support/log_capture.h"
 #include "tests/support/server_net_fixture.h"
 
-namespace strandcast {
+namespace strandcast::server_log_test {
 namespace {
 
 using test::code;
@@ -161,4 +161,4 @@ TEST_F(ServerLog, AViewerThatAcknowledgesNothingIsToldApart) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::server_log_test

@@ -19,7 +19,7 @@
 #include "tests/support/server_fixture.h"
 #include "tests/support/udp_socket.h"
 
-namespace strandcast {
+namespace strandcast::server_mocap_test {
 namespace {
 
 using test::UdpSocket;
@@ -319,4 +319,4 @@ TEST(LiveMocapErrors, AreOneSentenceThatNamesTheField) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::server_mocap_test

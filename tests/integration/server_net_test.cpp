@@ -13,7 +13,7 @@
 #include "tests/support/metrics_text.h"
 #include "tests/support/server_net_fixture.h"
 
-namespace strandcast {
+namespace strandcast::server_net_test {
 namespace {
 
 using test::code;
@@ -627,4 +627,4 @@ TEST(NetServerListen, RefusesBadAddressesAndOpenPortsWithoutToken) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::server_net_test

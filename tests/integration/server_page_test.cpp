@@ -9,7 +9,7 @@
 #include "tests/support/proxy_header.h"
 #include "tests/support/server_net_fixture.h"
 
-namespace strandcast {
+namespace strandcast::server_page_test {
 namespace {
 
 using test::code;
@@ -328,4 +328,4 @@ TEST_F(ServerPage, HostileRequestsHarmNobody) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::server_page_test

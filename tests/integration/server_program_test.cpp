@@ -25,7 +25,7 @@
 
 extern char** environ;
 
-namespace strandcast {
+namespace strandcast::server_program_test {
 namespace {
 
 using testing::AllOf;
@@ -319,4 +319,4 @@ TEST_F(ServerProgram, LeavesAfterTheGivenTime) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::server_program_test

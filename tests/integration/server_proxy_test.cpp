@@ -3,7 +3,7 @@
 #include "tests/support/proxy_header.h"
 #include "tests/support/server_net_fixture.h"
 
-namespace strandcast {
+namespace strandcast::server_proxy_test {
 namespace {
 
 using test::code;
@@ -155,4 +155,4 @@ TEST_F(ServerProxy, PROXYHeadersOfOthersAreNone) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::server_proxy_test

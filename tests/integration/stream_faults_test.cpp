@@ -13,7 +13,7 @@
 #include "tests/support/server_fixture.h"
 #include "tests/tools/load_viewers.h"
 
-namespace strandcast {
+namespace strandcast::stream_faults_test {
 namespace {
 
 using chaos::ChaosRelay;
@@ -362,4 +362,4 @@ TEST_F(StreamFaults, AViewerComesBackAfterResetsAndStopsWhenItMust) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::stream_faults_test

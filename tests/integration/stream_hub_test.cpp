@@ -16,7 +16,7 @@
 #include "tests/support/sample_asset.h"
 #include "tests/support/server_fixture.h"
 
-namespace strandcast {
+namespace strandcast::stream_hub_test {
 namespace {
 
 using test::FrameRecorder;
@@ -381,4 +381,4 @@ TEST_F(StreamOfARecording, ADemandThatCannotBeMetChangesNothing) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::stream_hub_test

@@ -17,7 +17,7 @@
 #include "tests/support/test_certificate.h"
 #include "tests/tools/load_viewers.h"
 
-namespace strandcast {
+namespace strandcast::tls_test {
 namespace {
 
 /// What OpenSSL gives as the reason why a client that knows this version of TLS only, and every cipher, gets
@@ -399,4 +399,4 @@ TEST(TlsFilesOfServer, AreReadWithCare) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::tls_test

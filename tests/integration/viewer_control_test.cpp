@@ -10,7 +10,7 @@
 #include "tests/support/server_fixture.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::viewer_control_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -221,4 +221,4 @@ TEST_F(ViewerControl, TracesOfServerAndViewerAreJoinedByTick) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::viewer_control_test

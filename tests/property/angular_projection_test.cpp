@@ -4,7 +4,7 @@
 
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::angular_projection_test {
 namespace {
 
 constexpr double kLengthM = 0.3;
@@ -160,4 +160,4 @@ TEST_F(AngularProjection, AMillionTimesStifferStaysFinite) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::angular_projection_test

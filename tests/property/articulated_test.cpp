@@ -7,7 +7,7 @@
 #include "server/report/swing_fit.h"
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::articulated_test {
 namespace {
 
 constexpr double kLengthM = 0.3;
@@ -256,4 +256,4 @@ TEST_F(Articulated, AMillionTimesStifferKeepsTheGroom) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::articulated_test

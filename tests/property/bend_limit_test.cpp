@@ -12,7 +12,7 @@
 #include "server/sim/strand_state.h"
 #include "tests/support/sim_devices.h"
 
-namespace strandcast {
+namespace strandcast::bend_limit_test {
 namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180.0;
@@ -196,4 +196,4 @@ TEST(BendLimit, HairStandsAndRests) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::bend_limit_test

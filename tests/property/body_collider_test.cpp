@@ -20,7 +20,7 @@
 #include "tests/support/solver_bounds.h"
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::body_collider_test {
 namespace {
 
 constexpr double kSubstepS = 1.0 / 60.0;
@@ -150,13 +150,13 @@ PassRun run_pass(Executor& executor, const Groom& groom, BodyInput body, double 
   return run;
 }
 
-class EveryExecutor : public testing::TestWithParam<SimDevice> {
+class BodyOnEveryExecutor : public testing::TestWithParam<SimDevice> {
  protected:
   SimExecutors executors_;
   Executor& executor_ = executors_.on(GetParam());
 };
 
-TEST_P(EveryExecutor, DoesWhatTheLawSaysInDouble) {
+TEST_P(BodyOnEveryExecutor, DoesWhatTheLawSaysInDouble) {
   const Groom groom = make_hair({.strand_count = 400});
   for (const BodyResponse response : {BodyResponse::Turn, BodyResponse::Sphere, BodyResponse::Project}) {
     SCOPED_TRACE(kBodyResponses[static_cast<size_t>(response)]);
@@ -210,7 +210,7 @@ TEST_P(EveryExecutor, DoesWhatTheLawSaysInDouble) {
   }
 }
 
-TEST_P(EveryExecutor, WhatTouchesNothingIsNotMoved) {
+TEST_P(BodyOnEveryExecutor, WhatTouchesNothingIsNotMoved) {
   BodyInput body = upper_body();
   for (BodyCapsule& shape : body.capsules) move(shape, {0.0, -5.0, 0.0});
   body.planes[0].point_m.y -= 5.0;
@@ -278,7 +278,7 @@ double largest_move_m(const std::vector<glm::dvec3>& from, const std::vector<glm
 
 // 003 figure 4.1 has two roots in a plane, and a circle of them in space. A model that has segments point at
 // the centre, a little beside it, on any side, and every step on another, moves them a little.
-TEST_P(EveryExecutor, WhatPointsAtTheCentreStaysOnItsSideOfTheBall) {
+TEST_P(BodyOnEveryExecutor, WhatPointsAtTheCentreStaysOnItsSideOfTheBall) {
   constexpr double kUnsteadyM = 1e-4;
   SegmentsOverABall segments(executor_, 0.01);
   std::vector<glm::dvec3> model(SegmentsOverABall::kCount);
@@ -304,7 +304,7 @@ TEST_P(EveryExecutor, WhatPointsAtTheCentreStaysOnItsSideOfTheBall) {
 }
 
 // As far to the one side as to the other, in turns: the end is on one side of the ball, or on the other.
-TEST_P(EveryExecutor, WhatIsThrownFromSideToSideStaysOnOne) {
+TEST_P(BodyOnEveryExecutor, WhatIsThrownFromSideToSideStaysOnOne) {
   SegmentsOverABall segments(executor_, 0.01);
   std::vector<glm::dvec3> model(SegmentsOverABall::kCount);
   const auto lean = [&](double angle_rad) {
@@ -325,7 +325,7 @@ TEST_P(EveryExecutor, WhatIsThrownFromSideToSideStaysOnOne) {
 }
 
 // Where the plane says enough it alone decides, as the two equations have it.
-TEST_P(EveryExecutor, WhatLeansFarGoesAroundTheBallWithTheModel) {
+TEST_P(BodyOnEveryExecutor, WhatLeansFarGoesAroundTheBallWithTheModel) {
   SegmentsOverABall segments(executor_, 0.01);
   std::vector<glm::dvec3> model(SegmentsOverABall::kCount);
   const auto turn = [&](double around_rad) {
@@ -342,7 +342,7 @@ TEST_P(EveryExecutor, WhatLeansFarGoesAroundTheBallWithTheModel) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Of, EveryExecutor, testing::ValuesIn(sim_devices()), name_of_device);
+INSTANTIATE_TEST_SUITE_P(Of, BodyOnEveryExecutor, testing::ValuesIn(sim_devices()), name_of_device);
 
 TEST(BodyColliderLanes, HaveTheSameBitsForEveryInstructionSetAndNumberOfThreads) {
   const Groom groom = make_hair({.strand_count = 77});
@@ -702,4 +702,4 @@ TEST_F(BodySolvers, ARealBodyIsNotEnteredByHairThatBeganOutsideOfIt) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::body_collider_test

@@ -10,7 +10,7 @@
 #include "tests/bench/codec_motions.h"
 #include "tests/support/test_grid.h"
 
-namespace strandcast {
+namespace strandcast::codec_bound_test {
 namespace {
 
 constexpr std::array kBoundsM = {2e-5f, 5e-5f, 1e-4f, 5e-4f};
@@ -148,4 +148,4 @@ TEST(CodecBound, HoldsForEveryModelOnTheBuiltInMotion) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::codec_bound_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::contact_rest_test {
 namespace {
 
 constexpr double kRadiusM = 0.095;
@@ -66,4 +66,4 @@ TEST_F(BuriedRoots, ComeToRest) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::contact_rest_test

@@ -5,7 +5,7 @@
 #include "tests/property/direct_rod_fixture.h"
 #include "tests/support/claims.h"
 
-namespace strandcast {
+namespace strandcast::direct_rod_robust_test {
 namespace {
 
 constexpr double kSubstepS = 1.0 / 60.0;
@@ -158,4 +158,4 @@ TEST_F(RodRobustness, AJumpOfAMetreSettlesInTheSameShape) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::direct_rod_robust_test

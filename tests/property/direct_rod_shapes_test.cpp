@@ -9,7 +9,7 @@
 #include "tests/support/claims.h"
 #include "tests/support/shared_data.h"
 
-namespace strandcast {
+namespace strandcast::direct_rod_shapes_test {
 namespace {
 
 constexpr double kRateHz = 60.0;
@@ -215,4 +215,4 @@ TEST_F(RodShapes, SpaceDiscretisationIsOfSecondOrder) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::direct_rod_shapes_test

@@ -9,19 +9,19 @@
 
 #include "common/scene/scene_file.h"
 #include "server/scene/scene_content.h"
+#include "server/sim/directions.h"
 #include "server/sim/solvers/direct_rod/direct_rod_style.h"
 #include "tests/property/direct_rod_fixture.h"
 #include "tests/support/some_strands.h"
 #include "tests/support/test_grid.h"
 
-namespace strandcast {
+namespace strandcast::direct_rod_style_test {
 namespace {
 
 using test::some_strands;
 
 class RodStyle : public DirectRod {
  protected:
-  static constexpr double kPi = std::numbers::pi;
   static constexpr glm::dvec3 kGravity{0.0, -kGravityMps2, 0.0};
 
   static RodParameters hair(SolverParameters given = {}) {
@@ -348,19 +348,20 @@ class GroomLasts : public RodStyle {
 
   /// 10 g to and fro at 4 Hz for 2 s.
   static Pose shake(double t) {
-    const double rate = 2.0 * kPi * 4.0;
+    const double rate = 2.0 * std::numbers::pi * 4.0;
     return {glm::dvec3(10.0 * 9.80665 / (rate * rate) * std::sin(rate * t), 0.0, 0.0), {1.0, 0.0, 0.0, 0.0}};
   }
   /// To either side by 90 degrees, at 2,600 deg/s in the middle.
   static Pose turn(double t) {
-    const double most = 0.5 * kPi;
-    const double rate = 2600.0 * kPi / 180.0 / most;
+    const double most = 0.5 * std::numbers::pi;
+    const double rate = 2600.0 * std::numbers::pi / 180.0 / most;
     return {glm::dvec3(0.0), glm::angleAxis(most * std::sin(rate * t), glm::dvec3(0.0, 1.0, 0.0))};
   }
   /// Over within half a second, 2 s upside down, and back.
   static Pose somersault(double t) {
     const double share = std::min({t / 0.5, 1.0, (3.0 - t) / 0.5});
-    return {glm::dvec3(0.0), glm::angleAxis(kPi * std::max(share, 0.0), glm::dvec3(1.0, 0.0, 0.0))};
+    return {glm::dvec3(0.0),
+            glm::angleAxis(std::numbers::pi * std::max(share, 0.0), glm::dvec3(1.0, 0.0, 0.0))};
   }
 
   Hold hold(const SolverHost& host, const Groom& groom, double rest_s = 20.0) {
@@ -376,7 +377,7 @@ class GroomLasts : public RodStyle {
     }
     {
       Run run(*this, host, groom, styled);
-      run.move(16.0 * kPi / 2.0 / (2600.0 * kPi / 180.0) * 2.0, turn);
+      run.move(16.0 * std::numbers::pi / 2.0 / (2600.0 * std::numbers::pi / 180.0) * 2.0, turn);
       run.rest(10.0);
       result.lost_share["2,600 deg/s"] = run.lost_share();
     }
@@ -407,7 +408,8 @@ class GroomLasts : public RodStyle {
       };
       // Sideways by 4 cm and back within 0.4 s.
       run.move(0.4, [](double t) {
-        return Pose{glm::dvec3(0.02 * (1.0 - std::cos(2.0 * kPi * t / 0.4)), 0.0, 0.0), {1.0, 0.0, 0.0, 0.0}};
+        return Pose{glm::dvec3(0.02 * (1.0 - std::cos(2.0 * std::numbers::pi * t / 0.4)), 0.0, 0.0),
+                    {1.0, 0.0, 0.0, 0.0}};
       });
       run.rest(0.6);
       way_m[is_styled] = std::accumulate(most.begin(), most.end(), 0.0);
@@ -500,4 +502,4 @@ TEST_F(GroomLasts, EveryPublicGroom) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::direct_rod_style_test

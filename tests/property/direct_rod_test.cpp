@@ -8,7 +8,7 @@
 #include "tests/property/direct_rod_fixture.h"
 #include "tests/support/claims.h"
 
-namespace strandcast {
+namespace strandcast::direct_rod_test {
 namespace {
 
 class RodMechanics : public DirectRod {
@@ -373,4 +373,4 @@ TEST_F(RodMechanics, AMillionTimesStifferStaysFinite) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::direct_rod_test

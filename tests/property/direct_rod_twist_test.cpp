@@ -2,7 +2,7 @@
 #include "tests/property/direct_rod_fixture.h"
 #include "tests/support/claims.h"
 
-namespace strandcast {
+namespace strandcast::direct_rod_twist_test {
 namespace {
 
 struct Helix {
@@ -193,4 +193,4 @@ TEST_F(RodTwist, TwistDoesNothingToAStraightStrand) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::direct_rod_twist_test

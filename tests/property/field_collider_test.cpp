@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "common/base/quantile.h"
@@ -17,13 +18,12 @@
 #include "tests/support/solver_bounds.h"
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::field_collider_test {
 namespace {
 
 constexpr double kRadiusM = 0.095;
 constexpr double kSubstepS = 1.0 / 60.0;
 constexpr double kFriction = 0.3;
-constexpr double kPi = 3.14159265358979323846;
 
 const DistanceField& ball() {
   static const DistanceField field =
@@ -128,13 +128,13 @@ PassRun run_pass(Executor& executor, const Groom& groom, double angle_rad, doubl
   return run;
 }
 
-class EveryExecutor : public testing::TestWithParam<SimDevice> {
+class FieldOnEveryExecutor : public testing::TestWithParam<SimDevice> {
  protected:
   SimExecutors executors_;
   Executor& executor_ = executors_.on(GetParam());
 };
 
-TEST_P(EveryExecutor, DoesWhatTheLawSaysInDouble) {
+TEST_P(FieldOnEveryExecutor, DoesWhatTheLawSaysInDouble) {
   const Groom groom = make_hair({.strand_count = 500});
   const PassRun run = run_pass(executor_, groom, 0.8);
   const StrandLayout& layout = run.layout;
@@ -174,14 +174,14 @@ TEST_P(EveryExecutor, DoesWhatTheLawSaysInDouble) {
   EXPECT_LE(*std::max_element(errors_m.begin(), errors_m.end()), 3e-3);
 }
 
-TEST_P(EveryExecutor, KeepsLengthsAndWhatModelsKeepBesideVelocities) {
+TEST_P(FieldOnEveryExecutor, KeepsLengthsAndWhatModelsKeepBesideVelocities) {
   const Groom groom = make_hair({});
   const PassRun run = run_pass(executor_, groom, 1.2);
   EXPECT_LE(length_excess_m(groom, run.after, 2e-6), 0.0);
   for (const glm::vec4& velocity : run.velocity) ASSERT_EQ(velocity.w, 3.5f);
 }
 
-TEST_P(EveryExecutor, WhatTouchesNothingIsNotWrittenNorWhatBeginsInside) {
+TEST_P(FieldOnEveryExecutor, WhatTouchesNothingIsNotWrittenNorWhatBeginsInside) {
   // Groomed from 3 mm below the skin, out of it: as loaded nothing moves, not by a bit.
   const Groom groom = make_hair({.root_depth_m = 0.003});
   const PassRun run = run_pass(executor_, groom, 0.0);
@@ -193,7 +193,7 @@ TEST_P(EveryExecutor, WhatTouchesNothingIsNotWrittenNorWhatBeginsInside) {
   EXPECT_EQ(run.after.velocity_mps, run.before.velocity_mps);
 }
 
-TEST_P(EveryExecutor, ABrokenStrandIsNothingToItsNeighbours) {
+TEST_P(FieldOnEveryExecutor, ABrokenStrandIsNothingToItsNeighbours) {
   Groom groom = make_hair({.strand_count = 20});
   StrandState strands(executor_);
   ASSERT_TRUE(strands.load(groom, kTurned));
@@ -223,7 +223,7 @@ TEST_P(EveryExecutor, ABrokenStrandIsNothingToItsNeighbours) {
   for (const glm::vec3& point : mended.position_m) ASSERT_TRUE(std::isfinite(point.x + point.y + point.z));
 }
 
-INSTANTIATE_TEST_SUITE_P(Of, EveryExecutor, testing::ValuesIn(sim_devices()), name_of_device);
+INSTANTIATE_TEST_SUITE_P(Of, FieldOnEveryExecutor, testing::ValuesIn(sim_devices()), name_of_device);
 
 TEST(FieldColliderLanes, HaveTheSameBitsForEveryInstructionSetAndNumberOfThreads) {
   const Groom groom = make_hair({.strand_count = 77});
@@ -271,9 +271,10 @@ class FieldSolvers : public SolverTest {
 
 /// 10 g at 5 Hz with yaw of 30 degrees at 3 Hz.
 Pose shake(double t) {
-  const double rate = 2.0 * kPi * 5.0;
+  const double rate = 2.0 * std::numbers::pi * 5.0;
   return {glm::dvec3(10.0 * 9.80665 / (rate * rate) * std::sin(rate * t), 0.0, 0.0),
-          glm::angleAxis(kPi / 6.0 * std::sin(2.0 * kPi * 3.0 * t), glm::dvec3(0.0, 1.0, 0.0))};
+          glm::angleAxis(std::numbers::pi / 6.0 * std::sin(2.0 * std::numbers::pi * 3.0 * t),
+                         glm::dvec3(0.0, 1.0, 0.0))};
 }
 StepInput shake_input(int step) {
   const Pose before = shake((step - 1) * kSubstepS), now = shake(step * kSubstepS);
@@ -334,4 +335,4 @@ TEST_F(FieldSolvers, StayOutOfTheHeadInAShakeAndSettleOnIt) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::field_collider_test

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <numbers>
 
 #include "common/base/quantile.h"
 #include "common/math/pose.h"
@@ -15,11 +16,9 @@
 #include "tests/support/some_strands.h"
 #include "tests/support/test_grid.h"
 
-namespace strandcast {
+namespace strandcast::follicle_limit_test {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kDegree = kPi / 180.0;
+constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kLimitDeg = claims::kFollicleLimitDeg;
 constexpr double kSubstepS = 1.0 / 60.0;
 /// A position of 0.3 m is stored to 1.5e-8 m: so much of an angle over a first segment of some millimetres,
@@ -42,12 +41,12 @@ StepInput held(StepInput input, double limit_deg = kLimitDeg) {
 
 /// 10 g to and fro at 4 Hz.
 Pose shake(double t) {
-  const double rate = 2.0 * kPi * 4.0;
+  const double rate = 2.0 * std::numbers::pi * 4.0;
   return {glm::dvec3(10.0 * 9.80665 / (rate * rate) * std::sin(rate * t), 0.0, 0.0), kUpright};
 }
 /// To either side by 90 degrees, at 2,600 deg/s in the middle.
 Pose turn(double t) {
-  const double most = 0.5 * kPi;
+  const double most = 0.5 * std::numbers::pi;
   return {glm::dvec3(0.0),
           glm::angleAxis(most * std::sin(2600.0 * kDegree / most * t), glm::dvec3(0.0, 1.0, 0.0))};
 }
@@ -399,4 +398,4 @@ TEST_F(FollicleLimits, HairHeldAtItsRootsComesToRest) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::follicle_limit_test

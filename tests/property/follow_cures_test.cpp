@@ -1,14 +1,13 @@
 // The two faults of dynamic Follow-The-Leader that 003 section 5.2 reports, measured without and with their
 // cures.
 #include <complex>
+#include <numbers>
 
 #include "server/sim/strand_parameters.h"
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::follow_cures_test {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// Positions of one vertex, one per step.
 using Track = std::vector<glm::dvec3>;
@@ -20,7 +19,8 @@ double jitter_m2ps4(const Track& track, double h_s) {
   double window_power = 0.0;
   std::vector<glm::dvec3> acceleration;
   for (size_t t = 0; t < count; ++t) {
-    const double window = 0.5 - 0.5 * std::cos(2.0 * kPi * (static_cast<double>(t) + 0.5) / count);
+    const double window =
+        0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * (static_cast<double>(t) + 0.5) / count);
     window_power += window * window;
     acceleration.push_back(window * (track[t + 2] - 2.0 * track[t + 1] + track[t]) / (h_s * h_s));
   }
@@ -29,7 +29,8 @@ double jitter_m2ps4(const Track& track, double h_s) {
     for (int axis = 0; axis < 3; ++axis) {
       std::complex<double> sum = 0.0;
       for (size_t t = 0; t < count; ++t)
-        sum += acceleration[t][axis] * std::polar(1.0, -2.0 * kPi * static_cast<double>(k * t) / count);
+        sum += acceleration[t][axis] *
+               std::polar(1.0, -2.0 * std::numbers::pi * static_cast<double>(k * t) / count);
       power += (2 * k == count ? 1.0 : 2.0) * std::norm(sum);
     }
   }
@@ -225,4 +226,4 @@ TEST_F(FollowCures, AllVersionsOfASolverTakeTheSameThickness) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::follow_cures_test

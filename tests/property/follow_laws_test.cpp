@@ -1,7 +1,7 @@
 // What static Follow-The-Leader keeps and what it does not, against Dynamic Follow-The-Leader.
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::follow_laws_test {
 namespace {
 
 class FollowLaws : public SolverTest {
@@ -82,4 +82,4 @@ TEST_F(FollowLaws, StaticStepMatchesTheEquationsByHand) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::follow_laws_test

@@ -11,7 +11,7 @@
 #include "tests/support/solver_fixture.h"
 #include "tests/support/some_strands.h"
 
-namespace strandcast {
+namespace strandcast::groom_rest_test {
 namespace {
 
 /// A hundredth of the strand, 1 mm in 10 cm: no eye tells the two shapes apart. Colliders that reach into the
@@ -207,4 +207,4 @@ TEST_F(GroomAtRest, LongHairFallsOntoTheShoulders) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::groom_rest_test

@@ -15,7 +15,7 @@
 #include "server/sim/solver_registry.h"
 #include "tests/support/sim_scene.h"
 
-namespace strandcast {
+namespace strandcast::sim_lanes_test {
 namespace {
 
 constexpr double kSubstepS = 1.0 / 60.0;
@@ -182,4 +182,4 @@ TEST(Lanes, AKernelWhoseVerticesWaitForEachOtherIsRefused) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::sim_lanes_test

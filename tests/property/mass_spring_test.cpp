@@ -10,7 +10,7 @@
 #include "server/sim/solvers/mass_spring/mass_spring.h"
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::mass_spring_test {
 namespace {
 
 using testing::AllOf;
@@ -631,4 +631,4 @@ TEST_F(MassSpring, AltitudeSpringsOpenACollapsedCurl) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::mass_spring_test

@@ -2,7 +2,7 @@
 // test here runs the form that this device would not choose by itself as well.
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::odd_even_test {
 namespace {
 
 constexpr double kSubstepS = 1.0 / 60.0;
@@ -88,4 +88,4 @@ TEST_F(OddEvenForms, AnyNumberOfVerticesAndStrands) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::odd_even_test

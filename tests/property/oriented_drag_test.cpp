@@ -12,7 +12,7 @@
 #include "server/sim/strand_state.h"
 #include "tests/support/sim_devices.h"
 
-namespace strandcast {
+namespace strandcast::oriented_drag_test {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -162,4 +162,4 @@ INSTANTIATE_TEST_SUITE_P(Rows, BlownHair, testing::ValuesIn(rows_with_drag()),
                          [](const auto& row) { return row.param; });
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::oriented_drag_test

@@ -2,7 +2,7 @@
 // is left falls with iterations and substeps.
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::position_laws_test {
 namespace {
 
 class PositionLaws : public SolverTest {
@@ -104,4 +104,4 @@ TEST_F(PositionLaws, IterationsAndSubstepsTakeTheStretchAway) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::position_laws_test

@@ -1,7 +1,7 @@
 // shape_constraints: each constraint alone does what its equation says; then what they keep together.
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::shape_constraints_test {
 namespace {
 
 class ShapeConstraints : public SolverTest {
@@ -333,4 +333,4 @@ TEST_F(ShapeConstraints, HeldShapesDoNotFlicker) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::shape_constraints_test

@@ -4,7 +4,7 @@
 #include "tests/support/solver_bounds.h"
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::solver_laws_test {
 namespace {
 
 constexpr double kSubstepS = 1.0 / 60.0;
@@ -487,4 +487,4 @@ TEST_F(OddEven, FiveIterationsComeClose) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::solver_laws_test

@@ -6,7 +6,7 @@
 #include "tests/support/shared_data.h"
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::solver_robustness_test {
 namespace {
 
 constexpr double kSubstepS = 1.0 / 60.0;
@@ -230,4 +230,4 @@ TEST_F(SolverRobustness, AKilometreInOneStepSettlesToTheSameShape) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::solver_robustness_test

@@ -3,6 +3,7 @@
 // an entry that nothing breaks any more.
 #include "server/report/stability.h"
 
+#include <numbers>
 #include <set>
 #include <tuple>
 
@@ -11,7 +12,7 @@
 #include "tests/support/solver_fixture.h"
 #include "tests/support/test_grid.h"
 
-namespace strandcast {
+namespace strandcast::stability_test {
 namespace {
 
 using testing::HasSubstr;
@@ -210,11 +211,10 @@ TEST(StabilityMeasures, RestIsWhenTheLastVertexStops) {
 }
 
 TEST(StabilityMeasures, JitterIsWhatAlternatesAndNotWhatSwings) {
-  constexpr double kPi = 3.14159265358979323846;
   std::vector<glm::dvec3> alternating, swinging;
   for (int i = 0; i < 128; ++i) {
     alternating.emplace_back(i % 2 == 0 ? 1e-4 : -1e-4, 0.0, 0.0);
-    swinging.emplace_back(0.0, 0.1 * std::sin(2.0 * kPi * 1.3 * i * kStepS), 0.0);  // 6.7 m/s^2
+    swinging.emplace_back(0.0, 0.1 * std::sin(2.0 * std::numbers::pi * 1.3 * i * kStepS), 0.0);  // 6.7 m/s^2
   }
   EXPECT_NEAR(upper_band_acceleration_mps2(alternating, kStepS), 4e-4 / (kStepS * kStepS), 1e-3);
   EXPECT_LE(upper_band_acceleration_mps2(swinging, kStepS), 1e-3);
@@ -299,4 +299,4 @@ TEST(StabilityTables, ABrokenPromiseIsRedWithNumberLimitAndReason) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::stability_test

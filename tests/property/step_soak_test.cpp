@@ -9,7 +9,7 @@
 #include "tests/support/stepped_hair.h"
 #include "tests/support/test_grid.h"
 
-namespace strandcast {
+namespace strandcast::step_soak_test {
 namespace {
 
 constexpr float kBoundM = SteppedHair::kBoundM;
@@ -319,4 +319,4 @@ TEST(StepSoak, HoldsWhateverBefallsAStream) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::step_soak_test

@@ -5,7 +5,7 @@
 #include "common/gl/objects.h"
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::strand_state_test {
 namespace {
 
 constexpr double kSubstepS = 1.0 / 60.0;
@@ -221,4 +221,4 @@ TEST_P(StrandsOf, WhatIsCompiledIsNotCompiledAgain) {
 INSTANTIATE_TEST_SUITE_P(EveryExecutor, StrandsOf, testing::ValuesIn(sim_devices()), name_of_device);
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::strand_state_test

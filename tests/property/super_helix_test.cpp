@@ -6,7 +6,7 @@
 #include "server/sim/solvers/super_helix/helix_shape.h"
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::super_helix_test {
 namespace {
 
 constexpr double kLengthM = 0.3;
@@ -229,4 +229,4 @@ TEST_F(SuperHelix, AnUndampedSwingGainsNoEnergy) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::super_helix_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::tractrix_hybrid_test {
 namespace {
 
 constexpr double kSubstepS = 1.0 / 60.0;
@@ -134,4 +134,4 @@ TEST_F(TractrixHybrid, WithoutSweepsItIsTheCompliantModel) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::tractrix_hybrid_test

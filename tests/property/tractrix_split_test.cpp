@@ -2,7 +2,7 @@
 #include "server/sim/solvers/tractrix/tractrix_step.h"
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::tractrix_split_test {
 namespace {
 
 constexpr double kSubstepS = 1.0 / 60.0;
@@ -115,4 +115,4 @@ TEST_F(TractrixSplit, TheStyleComesBackAfterMotion) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::tractrix_split_test

@@ -8,7 +8,7 @@
 #include "server/sim/solvers/tractrix/tractrix_step.h"
 #include "tests/support/solver_fixture.h"
 
-namespace strandcast {
+namespace strandcast::tractrix_test {
 namespace {
 
 constexpr double kSubstepS = 1.0 / 60.0;
@@ -321,4 +321,4 @@ TEST_F(TractrixStyle, TheRandomOrderIsTheSameInKernelAndReference) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::tractrix_test

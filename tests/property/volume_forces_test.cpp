@@ -18,7 +18,7 @@
 #include "tests/support/sim_devices.h"
 #include "tests/support/test_grid.h"
 
-namespace strandcast {
+namespace strandcast::volume_forces_test {
 namespace {
 
 using testing::HasSubstr;
@@ -513,4 +513,4 @@ TEST(VolumeForces, WithoutThemHairFallsTogether) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::volume_forces_test

@@ -12,7 +12,7 @@
 
 #include "tests/support/shared_data.h"
 
-namespace strandcast::testing {
+namespace strandcast::test {
 
 /// A file that is put together number by number.
 struct ByteFile {
@@ -40,7 +40,7 @@ inline std::filesystem::path shared_data() {
   return STRANDCAST_SHARED_DATA;
 }
 
-}  // namespace strandcast::testing
+}  // namespace strandcast::test
 
 /// Skips the test where the shared data folder is not beside the checkout.
-#define REQUIRE_SHARED_DATA() REQUIRE_SHARED(strandcast::testing::shared_data())
+#define REQUIRE_SHARED_DATA() REQUIRE_SHARED(strandcast::test::shared_data())

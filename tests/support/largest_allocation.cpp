@@ -22,7 +22,7 @@ void operator delete(void* memory, size_t) noexcept {
   std::free(memory);
 }
 
-namespace strandcast::testing {
+namespace strandcast::test {
 
 void reset_largest_allocation() {
   largest_bytes = 0;
@@ -31,4 +31,4 @@ size_t largest_allocation_bytes() {
   return largest_bytes;
 }
 
-}  // namespace strandcast::testing
+}  // namespace strandcast::test

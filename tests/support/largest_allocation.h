@@ -4,11 +4,11 @@
 
 #include <cstddef>
 
-namespace strandcast::testing {
+namespace strandcast::test {
 
 /// Starts again from 0.
 void reset_largest_allocation();
 /// Bytes of the largest allocation since then, any thread.
 size_t largest_allocation_bytes();
 
-}  // namespace strandcast::testing
+}  // namespace strandcast::test

@@ -12,14 +12,12 @@
 #include <vector>
 
 #include "common/base/hash.h"
+#include "common/base/units.h"
 #include "server/net/flow_control.h"
 #include "server/net/send_queue.h"
 #include "server/net/strand_class.h"
 
 namespace strandcast::simulated {
-
-inline constexpr int64_t kMs = 1'000'000;
-inline constexpr int64_t kS = 1'000 * kMs;
 inline constexpr int64_t kStepNs = 16'666'667;
 /// Sizes of the built-in scene at 0.1 mm with an older codec, which gave more.
 inline constexpr double kFullBytesPerS = 6.6e6 / 8.0;
@@ -43,7 +41,7 @@ inline double relative_cost(const StrandClass& row) {
 
 struct Link {
   double bytes_per_s = 1e9;
-  int64_t round_trip_ns = 1 * kMs;
+  int64_t round_trip_ns = 1 * kMsInNs;
   int64_t jitter_ns = 0;
   std::function<bool(int64_t)> is_frozen = [](int64_t) { return false; };
   int64_t reader_ns = 1;  // the client looks this often for what has come
@@ -71,7 +69,7 @@ inline Content turning_head() {
           .keyframe_bytes = 2'000 * 16 * 25 / 16,  // 12.5 bits per vertex
           .asset_bytes = 577'000,
           .activity = [](int64_t time_ns) {
-            const bool turns = time_ns % (12 * kS) < 400 * kMs;
+            const bool turns = time_ns % (12 * kSInNs) < 400 * kMsInNs;
             const double gust = static_cast<double>(time_ns / kStepNs % 10) / 9.0;
             return (turns ? 2.0 : 1.0) * (1.4 - 0.6 * gust);
           }};
@@ -90,7 +88,7 @@ class Viewer {
   }
 
   void run(int64_t duration_ns) {
-    for (const int64_t end_ns = time_ns + duration_ns; time_ns < end_ns; time_ns += kMs) tick();
+    for (const int64_t end_ns = time_ns + duration_ns; time_ns < end_ns; time_ns += kMsInNs) tick();
   }
 
   struct Arrival {
@@ -120,7 +118,7 @@ class Viewer {
   Machine machine;
   FlowControl flow;
   SendQueue queue;
-  int64_t time_ns = 1 * kS;
+  int64_t time_ns = 1 * kSInNs;
   size_t present = 0;
   size_t changes = 0;
   size_t keyframes = 0;
@@ -163,14 +161,14 @@ class Viewer {
     while (is_looking && reads && !on_its_way_.empty() && on_its_way_.front().ack_ns <= time_ns &&
            !link.is_frozen(time_ns))
       receive();
-    if (!machine.is_away(time_ns)) decode(kMs);
+    if (!machine.is_away(time_ns)) decode(kMsInNs);
     if (time_ns >= next_step_ns_) {
       next_step_ns_ += kStepNs;
       ++step_;
       const uint32_t divisor = classes_[present].rate_divisor;
       if (step_ % divisor == 0) offer(Opcode::StrandDelta);
     }
-    if (time_ns % (50 * kMs) == 0) adapt();
+    if (time_ns % (50 * kMsInNs) == 0) adapt();
     probe();
     pump();
   }
@@ -181,7 +179,7 @@ class Viewer {
       flow.on_round_trip(time_ns - pinged_ns_, time_ns);
       pong_ns_ = 0;
     }
-    if (pong_ns_ != 0 || time_ns - pinged_ns_ < kS) return;
+    if (pong_ns_ != 0 || time_ns - pinged_ns_ < kSInNs) return;
     pinged_ns_ = time_ns;
     pong_ns_ = std::max(free_ns_, time_ns) + link.round_trip_ns + late_ns();
   }
@@ -219,7 +217,7 @@ class Viewer {
   }
 
   void pump() {
-    if (queue.needs_keyframe() && flow.may_start(time_ns) && time_ns >= keyframe_asked_ns_ + 250 * kMs) {
+    if (queue.needs_keyframe() && flow.may_start(time_ns) && time_ns >= keyframe_asked_ns_ + 250 * kMsInNs) {
       keyframe_asked_ns_ = time_ns;
       offer(Opcode::StrandKeyframe);
     }
@@ -257,7 +255,7 @@ class Viewer {
   }
 
   void acknowledge(const Received& done) {
-    constexpr int64_t kClientAheadNs = 5'000 * kS, kLeastDecodeNs = kMs / 10;
+    constexpr int64_t kClientAheadNs = 5'000 * kSInNs, kLeastDecodeNs = kMsInNs / 10;
     const FrameHeader& header = done.frame->header;
     ClientTimes client;
     if (machine.tells_times)
@@ -282,7 +280,7 @@ class Viewer {
   std::deque<Received> received_;
   int64_t told_ns_ = 0;
   std::map<const EncodedFrame*, int64_t> made_ns_;
-  int64_t pinged_ns_ = 0, pong_ns_ = 0, next_step_ns_ = 0, free_ns_ = 0, keyframe_asked_ns_ = -kS;
+  int64_t pinged_ns_ = 0, pong_ns_ = 0, next_step_ns_ = 0, free_ns_ = 0, keyframe_asked_ns_ = -kSInNs;
   uint64_t step_ = 0;
   uint32_t sequence_ = 0, random_ = 0;
 };

@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "common/base/hash.h"
 
 namespace strandcast::reference {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kWaves = 2.5;
 constexpr double kWaveShare = 0.35;
 
@@ -60,7 +59,8 @@ CurvePoint follower_point(const Keys& keys, const glm::uvec3& corner, uint32_t f
                              2.0 * random(follower, 0x165667b1u) - 1.0,
                              2.0 * random(follower, 0xd3a2646cu) - 1.0);
   const double phase = random(follower, 0xfd7046c5u);
-  const double wave = std::sin(2.0 * kPi * (kWaves * along + phase)) - std::sin(2.0 * kPi * phase);
+  const double wave =
+      std::sin(2.0 * std::numbers::pi * (kWaves * along + phase)) - std::sin(2.0 * std::numbers::pi * phase);
   const glm::dvec3 turned(direction.y, direction.z, direction.x);
   sum.position_m += style.variation_m * along * (direction + kWaveShare * wave * turned);
   return sum;

@@ -8,6 +8,7 @@
 
 #include "client/app/stop_signal.h"
 #include "common/base/profile.h"
+#include "common/base/units.h"
 #include "common/chaos/chaos_relay.h"
 #include "common/client/address.h"
 
@@ -17,7 +18,6 @@ using namespace strandcast;
 using namespace strandcast::chaos;
 
 constexpr double kMaxMs = 60'000.0;
-constexpr double kUsPerMs = 1e3;
 constexpr double kBytesPerMbit = 125e3;
 
 struct CommandLine {

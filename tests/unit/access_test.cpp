@@ -1,14 +1,13 @@
 // Who may talk to the server: listening, Host and Origin rules, message rate.
 #include "server/net/access.h"
+#include "common/base/units.h"
 
 #include <gtest/gtest.h>
 
 #include "server/net/net_server.h"
 
-namespace strandcast {
+namespace strandcast::access_test {
 namespace {
-
-constexpr int64_t kSecondNs = 1'000'000'000;
 
 TEST(Access, BeyondLoopbackNeedsAToken) {
   EXPECT_TRUE(check_listening(true, "127.0.0.1", {}).ok());
@@ -103,22 +102,22 @@ TEST(Access, OriginMatrix) {
 
 TEST(Access, RateLimitIsExact) {
   RateLimit limit(20.0);
-  for (int i = 0; i < 20; ++i) EXPECT_TRUE(limit.take(kSecondNs)) << i;
-  EXPECT_FALSE(limit.take(kSecondNs)) << "one over";
-  EXPECT_FALSE(limit.take(kSecondNs + kSecondNs / 20 - 1'000));
-  EXPECT_TRUE(limit.take(kSecondNs + kSecondNs / 20 + 1'000)) << "one comes back in a twentieth of a second";
+  for (int i = 0; i < 20; ++i) EXPECT_TRUE(limit.take(kSInNs)) << i;
+  EXPECT_FALSE(limit.take(kSInNs)) << "one over";
+  EXPECT_FALSE(limit.take(kSInNs + kSInNs / 20 - 1'000));
+  EXPECT_TRUE(limit.take(kSInNs + kSInNs / 20 + 1'000)) << "one comes back in a twentieth of a second";
 }
 
 TEST(Access, RateLimitAllowsTheRateAndRefusesTwiceAsMuch) {
   RateLimit limit(100.0);
   int accepted = 0;
   // 200 per second for 10 s: the first 100 at once, then 100 per second.
-  for (int i = 0; i < 2'000; ++i) accepted += limit.take(kSecondNs + i * (kSecondNs / 200)) ? 1 : 0;
+  for (int i = 0; i < 2'000; ++i) accepted += limit.take(kSInNs + i * (kSInNs / 200)) ? 1 : 0;
   EXPECT_GE(accepted, 1'000);
   EXPECT_LE(accepted, 1'101);
   RateLimit steady(100.0);
-  for (int i = 0; i < 1'000; ++i) EXPECT_TRUE(steady.take(kSecondNs + i * (kSecondNs / 100)));
+  for (int i = 0; i < 1'000; ++i) EXPECT_TRUE(steady.take(kSInNs + i * (kSInNs / 100)));
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::access_test

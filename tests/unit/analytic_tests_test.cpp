@@ -5,7 +5,7 @@
 #include "server/report/analytic_tests.h"
 #include "server/report/curl_test.h"
 
-namespace strandcast {
+namespace strandcast::analytic_tests_test {
 namespace {
 
 const AnalyticTest& test_named(const std::string& name) {
@@ -61,4 +61,4 @@ TEST(AnalyticTests, WhatCannotBeRunSaysWhy) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::analytic_tests_test

@@ -9,7 +9,7 @@
 #include "common/base/quantile.h"
 #include "common/base/result.h"
 
-namespace strandcast {
+namespace strandcast::base_test {
 namespace {
 
 Result<int> half(int value) {
@@ -87,4 +87,4 @@ TEST(Quantile, IsTheValueOfTheNearestRank) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::base_test

@@ -10,7 +10,7 @@
 #include "tests/support/shared_data.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::bvh_test {
 namespace {
 
 using testing::HasSubstr;
@@ -586,4 +586,4 @@ TEST(Bvh, JointsOfTheBodyAreSeenFromTheHead) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::bvh_test

@@ -1,6 +1,7 @@
 // The numbers in README.md and ARCHITECTURE.md are those that tests hold (tests/support/claims.h) or that the
 // code has, and where README.md speaks of what was measured there is no other.
 #include "tests/support/claims.h"
+#include "common/base/units.h"
 
 #include <regex>
 
@@ -15,7 +16,7 @@
 #include "server/report/work_precision.h"
 #include "server/source/sim_loop.h"
 
-namespace strandcast {
+namespace strandcast::claims_test {
 namespace {
 
 std::string text_of(const std::string& document) {
@@ -29,8 +30,6 @@ std::string on_one_line(const std::string& text) {
 std::string percent(double share) {
   return fmt::format("{:g} %", 100.0 * share);
 }
-
-constexpr double kNsPerS = 1e9;
 
 std::vector<std::string> readme_claims() {
   using namespace claims;
@@ -85,10 +84,10 @@ std::vector<std::string> architecture_claims() {
       fmt::format("{:g} to {:g} times the bits", kLeastDeltaRatio, kMostDeltaRatio),
       fmt::format("a quarter of {} strands of the built-in scene", kFilledStrands),
       fmt::format("within {:g} mm of the truth (median; {:g} mm for 95 %)", kFilledMedianMm, kFilledMostMm),
-      fmt::format("no more than {} ms of frames wait (a keyframe: {};", kGateQueueNs / kNsPerMs,
-                  kStartDelayNs / kNsPerMs),
+      fmt::format("no more than {} ms of frames wait (a keyframe: {};", kGateQueueNs / kMsInNs,
+                  kStartDelayNs / kMsInNs),
       fmt::format("only the asset, or {} KiB", kFirstBytes >> 10),
-      fmt::format("at most every {} ms and the newest only", kLookChangeNs / kNsPerMs),
+      fmt::format("at most every {} ms and the newest only", kLookChangeNs / kMsInNs),
       fmt::format("at most one in {:g} s for all", kKeyframePauseNs / kNsPerS),
       fmt::format("after {} periods it comes once more", kStillPeriods),
       fmt::format("frame {} in {:g} s found no place", kTroublingLosses, kLossWindowNs / kNsPerS),
@@ -147,4 +146,4 @@ TEST(Claims, AreAllThatReadmeMeasures) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::claims_test

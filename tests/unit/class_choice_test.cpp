@@ -1,13 +1,14 @@
 // Laws of which class a viewer gets.
 #include "server/net/class_choice.h"
+#include "common/base/units.h"
 
 #include <random>
 #include <vector>
 
-namespace strandcast {
+namespace strandcast::class_choice_test {
 namespace {
 
-constexpr int64_t kBeginNs = 1'000'000 * kNsPerMs;
+constexpr int64_t kBeginNs = 1'000'000 * kMsInNs;
 const std::vector<double> kCosts = {800e3, 400e3, 200e3, 100e3};
 
 ClassChoice::Question at(size_t present, double allowed_bytes_per_s) {
@@ -53,8 +54,8 @@ TEST(ClassChoice, AStandingQueueIsTroubleAndOneThatDrainsIsNot) {
     ClassChoice choice = settled();
     int64_t time_ns = kBeginNs;
     for (int i = 0; i <= 10; ++i) {
-      time_ns = kBeginNs + i * 50 * kNsPerMs;
-      const auto delay_ns = static_cast<int64_t>(delay_ms_at(i) * static_cast<double>(kNsPerMs));
+      time_ns = kBeginNs + i * 50 * kMsInNs;
+      const auto delay_ns = static_cast<int64_t>(delay_ms_at(i) * static_cast<double>(kMsInNs));
       choice.on_delay({delay_ns, delay_ns}, time_ns);
     }
     return choice.choose(at(0, 0.0), time_ns);
@@ -76,8 +77,8 @@ TEST(ClassChoice, WhatACheaperClassDoesNotCureIsNoTrouble) {
                                         one.decode_share / 8};
     size_t chosen = 0;
     for (int i = 0; i <= 10 && chosen == 0; ++i) {
-      const int64_t time_ns = kBeginNs + i * 50 * kNsPerMs;
-      choice.on_delay({one.link_ms * kNsPerMs, one.all_ms * kNsPerMs}, time_ns);
+      const int64_t time_ns = kBeginNs + i * 50 * kMsInNs;
+      choice.on_delay({one.link_ms * kMsInNs, one.all_ms * kMsInNs}, time_ns);
       ClassChoice::Question question = at(0, 0.0);
       question.decode_shares = shares;
       chosen = choice.choose(question, time_ns);
@@ -136,10 +137,10 @@ TEST(ClassChoice, WhateverHappensItIsOneOfTheClassesAndAtMostOneBetter) {
     size_t present = 0;
     int64_t time_ns = kBeginNs;
     for (int i = 0; i < 500; ++i) {
-      time_ns += static_cast<int64_t>(random() % 500) * kNsPerMs;
+      time_ns += static_cast<int64_t>(random() % 500) * kMsInNs;
       if (random() % 8 == 0) choice.on_chain_loss(time_ns);
       const auto all_ms = static_cast<int64_t>(random() % 300);
-      choice.on_delay({all_ms / 2 * kNsPerMs, all_ms * kNsPerMs}, time_ns);
+      choice.on_delay({all_ms / 2 * kMsInNs, all_ms * kMsInNs}, time_ns);
       ClassChoice::Question question = at(present, random() % 3 == 0 ? 0.0 : 1e3 * (random() % 1'000));
       if (random() % 4 == 0) question.cap_bytes_per_s = 300e3;
       const size_t chosen = choice.choose(question, time_ns);
@@ -151,4 +152,4 @@ TEST(ClassChoice, WhateverHappensItIsOneOfTheClassesAndAtMostOneBetter) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::class_choice_test

@@ -8,11 +8,10 @@
 #include "client/app/notice_list.h"
 #include "client/app/stop_signal.h"
 #include "client/app/stream_check.h"
+#include "common/base/units.h"
 
-namespace strandcast {
+namespace strandcast::client_app_test {
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
 
 std::shared_ptr<const Snapshot> state_at(int64_t sim_time_ns, size_t lattice_values) {
   auto snapshot = std::make_shared<Snapshot>();
@@ -27,10 +26,10 @@ Image image_of(uint32_t width, uint32_t height) {
 
 TEST(ClipStore, KeepsStatesAtAnEvenRateUntilTheClipHasItsLength) {
   ClipStore clip(10.0, 0.5);
-  for (int64_t i = 0; i < 100 && !clip.is_full(); ++i) clip.add(state_at(i * 20 * kMs, 3));
+  for (int64_t i = 0; i < 100 && !clip.is_full(); ++i) clip.add(state_at(i * 20 * kMsInNs, 3));
   ASSERT_EQ(clip.snapshots().size(), 5u);
   for (size_t i = 0; i < 5; ++i)
-    EXPECT_EQ(clip.snapshots()[i]->sim_time_ns, static_cast<int64_t>(i) * 100 * kMs);
+    EXPECT_EQ(clip.snapshots()[i]->sim_time_ns, static_cast<int64_t>(i) * 100 * kMsInNs);
   EXPECT_FALSE(clip.is_cut());
 }
 
@@ -39,20 +38,20 @@ TEST(ClipStore, KeepsNoMoreBytesThanItsLimit) {
   ClipStore exact(10.0, 60.0, kLimit);
   ClipStore over(10.0, 60.0, kLimit - 1);
   for (int64_t i = 0; i < 100; ++i)
-    for (ClipStore* clip : {&exact, &over}) clip->add(state_at(i * 100 * kMs, 50));
+    for (ClipStore* clip : {&exact, &over}) clip->add(state_at(i * 100 * kMsInNs, 50));
   EXPECT_EQ(exact.snapshots().size(), 5u) << "five times 50 numbers of 4 bytes";
   EXPECT_EQ(over.snapshots().size(), 4u);
   EXPECT_TRUE(exact.is_cut() && exact.is_full());
   EXPECT_TRUE(over.is_cut() && over.is_full());
 
   ClipStore pictures(10.0, 60.0, 5 * 4 * 8 * 8);
-  for (int64_t i = 0; i < 100; ++i) pictures.add(image_of(8, 8), i * 100 * kMs);
+  for (int64_t i = 0; i < 100; ++i) pictures.add(image_of(8, 8), i * 100 * kMsInNs);
   EXPECT_EQ(pictures.images().size(), 5u);
 }
 
 TEST(ClipStore, KeepsPicturesOfOneSize) {
   ClipStore clip(10.0, 1.0);
-  for (int64_t i = 0; i < 20; ++i) clip.add(i % 2 == 0 ? image_of(8, 6) : image_of(4, 3), i * 100 * kMs);
+  for (int64_t i = 0; i < 20; ++i) clip.add(i % 2 == 0 ? image_of(8, 6) : image_of(4, 3), i * 100 * kMsInNs);
   ASSERT_EQ(clip.images().size(), 10u);
   for (const Image& image : clip.images()) EXPECT_EQ(image.width, 8u);
 }
@@ -60,11 +59,11 @@ TEST(ClipStore, KeepsPicturesOfOneSize) {
 TEST(LineBudget, LetsSoManyLinesThroughInASecondAndCountsTheOthers) {
   LineBudget lines;
   uint32_t written = 0;
-  for (int64_t i = 0; i < 1000; ++i) written += lines.take(i * kMs) ? 1 : 0;
+  for (int64_t i = 0; i < 1000; ++i) written += lines.take(i * kMsInNs) ? 1 : 0;
   EXPECT_EQ(written, kMaxForeignLinesPerS);
   EXPECT_EQ(lines.take_left_out(), 1000u - kMaxForeignLinesPerS);
   EXPECT_EQ(lines.take_left_out(), 0u);
-  EXPECT_TRUE(lines.take(1000 * kMs)) << "the next second";
+  EXPECT_TRUE(lines.take(1000 * kMsInNs)) << "the next second";
 }
 
 TEST(LineBudget, NoSecondHasMoreWhereverItBegins) {
@@ -73,10 +72,10 @@ TEST(LineBudget, NoSecondHasMoreWhereverItBegins) {
   // Nothing for long, then all at once: at the end of one second of a clock and the begin of the next.
   for (int64_t i = 0; i < 3000; ++i)
     if (i % 1000 >= 900 || i % 1000 < 100)
-      if (lines.take(i * kMs)) written_ns.push_back(i * kMs);
+      if (lines.take(i * kMsInNs)) written_ns.push_back(i * kMsInNs);
   ASSERT_GT(written_ns.size(), kMaxForeignLinesPerS);
   for (size_t i = kMaxForeignLinesPerS; i < written_ns.size(); ++i)
-    EXPECT_GE(written_ns[i] - written_ns[i - kMaxForeignLinesPerS], 1000 * kMs);
+    EXPECT_GE(written_ns[i] - written_ns[i - kMaxForeignLinesPerS], 1000 * kMsInNs);
 }
 
 TEST(NoticeList, TheOldestGiveWay) {
@@ -181,4 +180,4 @@ TEST(StopSignal, ASecondOneEndsItAtOnce) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::client_app_test

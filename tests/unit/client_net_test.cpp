@@ -12,7 +12,7 @@
 #include "common/client/reconnect_policy.h"
 #include "common/wire/close_code.h"
 
-namespace strandcast {
+namespace strandcast::client_net_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -349,4 +349,4 @@ TEST(Address, RefusesTheRestAndNamesIt) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::client_net_test

@@ -9,7 +9,7 @@
 #include "server/report/collision_page.h"
 #include "server/report/contact_depth.h"
 
-namespace strandcast {
+namespace strandcast::collision_study_test {
 namespace {
 
 using testing::HasSubstr;
@@ -122,4 +122,4 @@ TEST(ContactDepth, CountsWhatIsInsideAndNothingElse) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::collision_study_test

@@ -5,7 +5,7 @@
 #include "tests/support/grown_hair.h"
 #include "tests/support/sample_look.h"
 
-namespace strandcast {
+namespace strandcast::debug_view_test {
 namespace {
 
 /// One thick strand that hangs in front of the head's middle, alone.
@@ -110,4 +110,4 @@ TEST(DebugView, TilesHaveBorders) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::debug_view_test

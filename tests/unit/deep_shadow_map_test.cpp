@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-namespace strandcast {
+namespace strandcast::deep_shadow_map_test {
 namespace {
 
 using testing::IsEmpty;
@@ -124,4 +124,4 @@ TEST(DeepShadowMap, LeavesOutWhatIsNoSegment) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::deep_shadow_map_test

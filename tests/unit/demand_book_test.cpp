@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace strandcast {
+namespace strandcast::demand_book_test {
 namespace {
 
 PictureView sized(uint32_t width) {
@@ -120,4 +120,4 @@ TEST(DemandBook, SharesGoByTheReadersAddress) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::demand_book_test

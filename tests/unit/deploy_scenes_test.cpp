@@ -10,7 +10,7 @@
 #include "common/scene/scene_file.h"
 #include "tests/support/shared_data.h"
 
-namespace strandcast {
+namespace strandcast::deploy_scenes_test {
 namespace {
 
 using testing::HasSubstr;
@@ -128,4 +128,4 @@ TEST(DeployScenes, TheMohawkFitsAHumanHead) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::deploy_scenes_test

@@ -17,7 +17,7 @@
 #include "tests/support/own_workers.h"
 #include "tests/support/shared_data.h"
 
-namespace strandcast {
+namespace strandcast::distance_field_test {
 namespace {
 
 const std::filesystem::path kSintelCollider =
@@ -317,4 +317,4 @@ TEST(DistanceField, OfARealHeadIsAsGoodAsThePrototypes) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::distance_field_test

@@ -1,20 +1,18 @@
 // Laws of DrawPlan: what it chooses for machines of any speed, and that it keeps to it.
 #include "client/app/draw_plan.h"
+#include "common/base/units.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-namespace strandcast {
+namespace strandcast::draw_plan_test {
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
-constexpr int64_t kS = 1000 * kMs;
-constexpr int64_t kDisplayNs = kS / 60;
+constexpr int64_t kDisplayNs = kSInNs / 60;
 constexpr size_t kLast = kDrawSteps.size() - 1;
 // As README.md and ARCHITECTURE.md say: ten pictures a second, half a pixel, 200 ms.
-static_assert(kMovingBudgetMs == 100.0 && kSeenPx == 0.5 && kStandNs == 200 * kMs);
+static_assert(kMovingBudgetMs == 100.0 && kSeenPx == 0.5 && kStandNs == 200 * kMsInNs);
 
 /// A machine on which a picture of the first step takes so long, and the others as the table says.
 double time_of(size_t step, double full_ms) {
@@ -81,13 +79,13 @@ TEST(DrawPlan, FindsTheFinestStepThatIsInTimeOnEveryMachine) {
   for (double full_ms = 1.0; full_ms < 30'000.0; full_ms *= 1.6)
     for (const size_t first : {size_t{0}, size_t{3}, kLast}) {
       DrawPlan plan(first);
-      int64_t time_ns = kS;
+      int64_t time_ns = kSInNs;
       const auto time_ms = [&](size_t step) { return time_of(step, full_ms); };
-      draw_moving(plan, time_ns, 10 * kS, time_ms);
+      draw_moving(plan, time_ns, 10 * kSInNs, time_ms);
       const size_t found = plan.moving_step();
       EXPECT_TRUE(found == kLast || time_ms(found) <= kTooLong * kMovingBudgetMs) << full_ms;
       EXPECT_TRUE(found == 0 || time_ms(found - 1) > kLeavesRoom * kMovingBudgetMs) << full_ms;
-      EXPECT_EQ(draw_moving(plan, time_ns, kForgetStepNs + kS, time_ms), 0) << "and stays there";
+      EXPECT_EQ(draw_moving(plan, time_ns, kForgetStepNs + kSInNs, time_ms), 0) << "and stays there";
     }
 }
 
@@ -95,13 +93,13 @@ TEST(DrawPlan, StaysThoughTimesVaryAndTheTableIsWrong) {
   for (double full_ms = 1.0; full_ms < 30'000.0; full_ms *= 1.6)
     for (const double exponent : {0.3, 1.0, 2.0}) {
       DrawPlan plan(3);
-      int64_t time_ns = kS;
+      int64_t time_ns = kSInNs;
       uint32_t turn = 0;
       const auto time_ms = [&](size_t step) {
         const double noise = 1.0 + 0.1 * std::sin(2.4 * ++turn);
         return noise * full_ms * std::pow(kDrawSteps[step].cost, exponent);
       };
-      draw_moving(plan, time_ns, 10 * kS, time_ms);
+      draw_moving(plan, time_ns, 10 * kSInNs, time_ms);
       // A step that is worth another try, and back.
       EXPECT_LE(draw_moving(plan, time_ns, kForgetStepNs, time_ms), 2) << full_ms << " " << exponent;
     }
@@ -109,11 +107,11 @@ TEST(DrawPlan, StaysThoughTimesVaryAndTheTableIsWrong) {
 
 TEST(DrawPlan, AMachineThatBecomesBusyOrFreeIsFollowed) {
   DrawPlan plan(3);
-  int64_t time_ns = kS;
+  int64_t time_ns = kSInNs;
   const auto machine = [](double full_ms) { return [=](size_t step) { return time_of(step, full_ms); }; };
-  draw_moving(plan, time_ns, 10 * kS, machine(50.0));
+  draw_moving(plan, time_ns, 10 * kSInNs, machine(50.0));
   EXPECT_EQ(plan.moving_step(), 0u);
-  draw_moving(plan, time_ns, 2 * kS, machine(400.0));
+  draw_moving(plan, time_ns, 2 * kSInNs, machine(400.0));
   EXPECT_EQ(plan.moving_step(), 3u) << "a step of 72 ms; the one before takes 140";
   draw_moving(plan, time_ns, 2 * kForgetStepNs, machine(50.0));
   EXPECT_EQ(plan.moving_step(), 0u);
@@ -121,8 +119,8 @@ TEST(DrawPlan, AMachineThatBecomesBusyOrFreeIsFollowed) {
 
 TEST(DrawPlan, WhatStandsIsDrawnWholeAndWhatMovesInTime) {
   DrawPlan plan(3);
-  int64_t time_ns = kS;
-  draw_moving(plan, time_ns, 10 * kS, [](size_t step) { return time_of(step, 1000.0); });
+  int64_t time_ns = kSInNs;
+  draw_moving(plan, time_ns, 10 * kSInNs, [](size_t step) { return time_of(step, 1000.0); });
   const size_t moving = plan.moving_step();
   EXPECT_EQ(moving, 4u);
   plan.note_motion(time_ns);
@@ -130,31 +128,31 @@ TEST(DrawPlan, WhatStandsIsDrawnWholeAndWhatMovesInTime) {
   EXPECT_EQ(plan.step_at(time_ns + kStandNs - 1, moving), moving);
   EXPECT_EQ(plan.step_at(time_ns + kStandNs, moving), kCoarsestFairStep) << "soon something better";
   EXPECT_EQ(plan.step_at(time_ns + kStandNs, kCoarsestFairStep), 0u);
-  plan.note_drawn(0, 1000.0, time_ns + kS);
+  plan.note_drawn(0, 1000.0, time_ns + kSInNs);
   EXPECT_EQ(plan.moving_step(), moving) << "a sharp picture is no reason to draw others otherwise";
-  plan.note_motion(time_ns + 2 * kS);
-  EXPECT_EQ(plan.step_at(time_ns + 2 * kS, 0), moving);
+  plan.note_motion(time_ns + 2 * kSInNs);
+  EXPECT_EQ(plan.step_at(time_ns + 2 * kSInNs, 0), moving);
 }
 
 TEST(DrawPlan, AnotherWindowIsExpectedToTakeAccordingly) {
   DrawPlan plan(2);
   plan.set_pixels(1'000'000);
-  plan.note_drawn(2, 35.0, kS);
+  plan.note_drawn(2, 35.0, kSInNs);
   EXPECT_EQ(plan.moving_step(), 1u) << "all of it would take 100 ms, this one 65";
   plan.set_pixels(250'000);
   // A quarter of the pixels: 4^-0.75 of the time.
-  EXPECT_NEAR(plan.expected_ms(2, kS), 35.0 * std::pow(4.0, -0.75), 1e-9);
-  plan.note_drawn(2, 12.4, 2 * kS);
+  EXPECT_NEAR(plan.expected_ms(2, kSInNs), 35.0 * std::pow(4.0, -0.75), 1e-9);
+  plan.note_drawn(2, 12.4, 2 * kSInNs);
   EXPECT_EQ(plan.moving_step(), 0u);
 }
 
 TEST(DrawPlan, TellsTheServerOfPicturesThatAreWorthComparing) {
   for (double full_ms = 1.0; full_ms < 30'000.0; full_ms *= 1.6) {
     DrawPlan plan(3);
-    EXPECT_EQ(plan.fair_ms(kS), 0.0) << "nothing was measured";
-    int64_t time_ns = kS;
+    EXPECT_EQ(plan.fair_ms(kSInNs), 0.0) << "nothing was measured";
+    int64_t time_ns = kSInNs;
     const auto time_ms = [&](size_t step) { return time_of(step, full_ms); };
-    draw_moving(plan, time_ns, 10 * kS, time_ms);
+    draw_moving(plan, time_ns, 10 * kSInNs, time_ms);
     const double told_ms = plan.fair_ms(time_ns);
     // Never of a picture smaller than the server's smallest, and never of one finer than what is shown.
     EXPECT_GE(told_ms, time_of(kCoarsestFairStep, full_ms) - 1e-9);
@@ -167,4 +165,4 @@ TEST(DrawPlan, TellsTheServerOfPicturesThatAreWorthComparing) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::draw_plan_test

@@ -4,7 +4,7 @@
 
 #include "server/report/exact_solutions.h"
 
-namespace strandcast {
+namespace strandcast::exact_solutions_test {
 namespace {
 
 /// Tip of the heavy rod by shooting: theta'' = -gamma (1 - s) cos(theta) with theta measured downwards, so
@@ -143,4 +143,4 @@ TEST(ExactSolutions, StepRootsSolveTheirDifferenceEquations) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::exact_solutions_test

@@ -9,7 +9,7 @@
 #include "common/groom/groom_file.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::export_test {
 namespace {
 
 using ::testing::AllOf;
@@ -404,4 +404,4 @@ TEST(Export, WhatCannotBeWrittenIsToldTheWayOut) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::export_test

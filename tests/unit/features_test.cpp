@@ -3,7 +3,7 @@
 #include <random>
 #include <utility>
 
-namespace strandcast {
+namespace strandcast::features_test {
 namespace {
 
 TEST(Features, EmptySceneNeedsNothing) {
@@ -237,4 +237,4 @@ TEST(Features, AForcedFactHoldsAndSaysThatItIsForced) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::features_test

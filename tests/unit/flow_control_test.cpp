@@ -1,13 +1,14 @@
 // Flow control against a link on paper (tests/support/simulated_viewer.h): the laws are exact and the tests
 // take no time.
 #include "server/net/flow_control.h"
+#include "common/base/units.h"
 
 #include <algorithm>
 
 #include "server/net/strand_class.h"
 #include "tests/support/simulated_viewer.h"
 
-namespace strandcast {
+namespace strandcast::flow_control_test {
 namespace {
 
 using namespace simulated;
@@ -18,10 +19,10 @@ double share_of_full_rate(const Viewer& viewer, int64_t from_ns) {
 
 TEST(FlowControl, FastLinkKeepsFullRateAtEveryRoundTrip) {
   for (const int64_t round_trip_ms : {1, 20, 50, 150, 300}) {
-    Viewer viewer({.round_trip_ns = round_trip_ms * kMs, .jitter_ns = 10 * kMs});
-    viewer.run(3 * kS);
+    Viewer viewer({.round_trip_ns = round_trip_ms * kMsInNs, .jitter_ns = 10 * kMsInNs});
+    viewer.run(3 * kSInNs);
     const int64_t from_ns = viewer.time_ns;
-    viewer.run(20 * kS);
+    viewer.run(20 * kSInNs);
     EXPECT_GE(share_of_full_rate(viewer, from_ns), 0.99) << round_trip_ms;
     EXPECT_EQ(viewer.changes, 0u) << round_trip_ms << " ms of delay say nothing about the rate";
     EXPECT_EQ(viewer.keyframes, 1u) << round_trip_ms;
@@ -33,13 +34,13 @@ TEST(FlowControl, SlowLinksSettleWithinThreeSecondsAndStay) {
     for (const int64_t round_trip_ms : {10, 100, 300}) {
       SCOPED_TRACE(fmt::format("{} Mbit/s, {} ms", mbit, round_trip_ms));
       Viewer viewer(
-          {.bytes_per_s = mbit * 125e3, .round_trip_ns = round_trip_ms * kMs, .jitter_ns = 5 * kMs});
+          {.bytes_per_s = mbit * 125e3, .round_trip_ns = round_trip_ms * kMsInNs, .jitter_ns = 5 * kMsInNs});
       viewer.run(static_cast<int64_t>(kAssetBytes / (mbit * 125e3) * 1e9) +
-                 3 * kS);  // the asset takes its time
+                 3 * kSInNs);  // the asset takes its time
       const int64_t settled_ns = viewer.time_ns;
       const size_t changes = viewer.changes;
-      viewer.run(20 * kS);
-      EXPECT_LE(viewer.worst_age_ns(settled_ns), 250 * kMs);
+      viewer.run(20 * kSInNs);
+      EXPECT_LE(viewer.worst_age_ns(settled_ns), 250 * kMsInNs);
       EXPECT_GE(viewer.rate_hz(settled_ns), 10.0 * 0.98);
       EXPECT_LE(viewer.changes, changes + 1) << "what the link showed is remembered";
     }
@@ -50,32 +51,34 @@ TEST(FlowControl, LinkThatGetsSlowIsFollowedWithinThreeSeconds) {
   for (const double mbit : {1.0, 2.0, 5.0})
     for (const int64_t reader_ms : {1, 40}) {
       SCOPED_TRACE(fmt::format("{} Mbit/s, read every {} ms", mbit, reader_ms));
-      Viewer viewer({.round_trip_ns = 30 * kMs, .jitter_ns = 5 * kMs, .reader_ns = reader_ms * kMs});
-      viewer.run(10 * kS);
+      Viewer viewer(
+          {.round_trip_ns = 30 * kMsInNs, .jitter_ns = 5 * kMsInNs, .reader_ns = reader_ms * kMsInNs});
+      viewer.run(10 * kSInNs);
       ASSERT_EQ(viewer.present, 0u);
       viewer.link.bytes_per_s = mbit * 125e3;
-      viewer.run(3 * kS);
+      viewer.run(3 * kSInNs);
       const int64_t settled_ns = viewer.time_ns;
-      viewer.run(15 * kS);
-      EXPECT_LE(viewer.worst_age_ns(settled_ns), 250 * kMs);
+      viewer.run(15 * kSInNs);
+      EXPECT_LE(viewer.worst_age_ns(settled_ns), 250 * kMsInNs);
       EXPECT_GE(viewer.rate_hz(settled_ns), 10.0 * 0.98);
       // And back: up step by step, since a better class is tried only after quiet time.
       viewer.link.bytes_per_s = 1e9;
-      viewer.run(180 * kS);
+      viewer.run(180 * kSInNs);
       EXPECT_EQ(viewer.present, 0u);
     }
 }
 
 TEST(FlowControl, FreezesCostNoClass) {
-  Viewer viewer({.round_trip_ns = 20 * kMs,
-                 .is_frozen = [](int64_t time_ns) { return time_ns % (5 * kS) < 200 * kMs; }});
-  viewer.run(30 * kS);
+  Viewer viewer({.round_trip_ns = 20 * kMsInNs,
+                 .is_frozen = [](int64_t time_ns) { return time_ns % (5 * kSInNs) < 200 * kMsInNs; }});
+  viewer.run(30 * kSInNs);
   EXPECT_EQ(viewer.present, 0u);
   EXPECT_EQ(viewer.changes, 0u);
   // Live again one round trip and one frame after each freeze.
-  for (const auto& arrival : viewer.arrivals_since(6 * kS)) {
-    if (arrival.arrived_ns % (5 * kS) < 300 * kMs) continue;
-    EXPECT_LE(arrival.arrived_ns - arrival.made_ns, 20 * kMs + kStepNs) << "at " << arrival.arrived_ns / kMs;
+  for (const auto& arrival : viewer.arrivals_since(6 * kSInNs)) {
+    if (arrival.arrived_ns % (5 * kSInNs) < 300 * kMsInNs) continue;
+    EXPECT_LE(arrival.arrived_ns - arrival.made_ns, 20 * kMsInNs + kStepNs)
+        << "at " << arrival.arrived_ns / kMsInNs;
   }
 }
 
@@ -86,21 +89,21 @@ TEST(FlowControl, AViewerThatLacksItsProcessorKeepsItsStrands) {
     int64_t period_ns, away_ns;
   };
   for (const double decode_share : {0.0, 0.33})
-    for (const Absence& absence :
-         {Absence{kS, 0}, Absence{100 * kMs, 30 * kMs}, Absence{400 * kMs, 200 * kMs}, Absence{kS, 300 * kMs},
-          Absence{2 * kS, 1'000 * kMs}, Absence{7 * kS, 3 * kS}})
+    for (const Absence& absence : {Absence{kSInNs, 0}, Absence{100 * kMsInNs, 30 * kMsInNs},
+                                   Absence{400 * kMsInNs, 200 * kMsInNs}, Absence{kSInNs, 300 * kMsInNs},
+                                   Absence{2 * kSInNs, 1'000 * kMsInNs}, Absence{7 * kSInNs, 3 * kSInNs}})
       for (const int64_t round_trip_ms : {1, 40}) {
         SCOPED_TRACE(fmt::format("decodes {} of the time, away {} of {} ms, {} ms", decode_share,
-                                 absence.away_ns / kMs, absence.period_ns / kMs, round_trip_ms));
+                                 absence.away_ns / kMsInNs, absence.period_ns / kMsInNs, round_trip_ms));
         Viewer viewer({.bytes_per_s = 10.0 * kFullBytesPerS,
-                       .round_trip_ns = round_trip_ms * kMs,
-                       .jitter_ns = 5 * kMs});
+                       .round_trip_ns = round_trip_ms * kMsInNs,
+                       .jitter_ns = 5 * kMsInNs});
         viewer.machine.decode_ns = static_cast<int64_t>(decode_share * kStepNs);
         viewer.machine.is_away = [&](int64_t time_ns) {
           // Present at first: the asset shows the link.
-          return (time_ns - kS) % absence.period_ns >= absence.period_ns - absence.away_ns;
+          return (time_ns - kSInNs) % absence.period_ns >= absence.period_ns - absence.away_ns;
         };
-        viewer.run(40 * kS);
+        viewer.run(40 * kSInNs);
         EXPECT_EQ(viewer.changes, 0u);
       }
 }
@@ -109,9 +112,9 @@ TEST(FlowControl, AViewerThatLacksItsProcessorKeepsItsStrands) {
 TEST(FlowControl, ASlowLinkToAViewerThatIsAwayIsFollowed) {
   for (const double mbit : {1.0, 3.0}) {
     SCOPED_TRACE(mbit);
-    Viewer viewer({.bytes_per_s = mbit * 125e3, .round_trip_ns = 30 * kMs, .jitter_ns = 5 * kMs});
-    viewer.machine.is_away = [](int64_t time_ns) { return time_ns % kS < 100 * kMs; };
-    viewer.run(20 * kS);
+    Viewer viewer({.bytes_per_s = mbit * 125e3, .round_trip_ns = 30 * kMsInNs, .jitter_ns = 5 * kMsInNs});
+    viewer.machine.is_away = [](int64_t time_ns) { return time_ns % kSInNs < 100 * kMsInNs; };
+    viewer.run(20 * kSInNs);
     EXPECT_LE(relative_cost(make_strand_classes(built_in_plan())[viewer.present]) * kFullBytesPerS,
               mbit * 125e3);
   }
@@ -120,12 +123,13 @@ TEST(FlowControl, ASlowLinkToAViewerThatIsAwayIsFollowed) {
 TEST(FlowControl, AViewerThatDecodesForLongerThanAFrameGetsFewerStrands) {
   for (const double decode_share : {1.2, 2.5, 5.0}) {
     SCOPED_TRACE(decode_share);
-    Viewer viewer({.bytes_per_s = 10.0 * kFullBytesPerS, .round_trip_ns = 20 * kMs, .jitter_ns = 5 * kMs});
+    Viewer viewer(
+        {.bytes_per_s = 10.0 * kFullBytesPerS, .round_trip_ns = 20 * kMsInNs, .jitter_ns = 5 * kMsInNs});
     viewer.machine.decode_ns = static_cast<int64_t>(decode_share * kStepNs);
-    viewer.run(15 * kS);
+    viewer.run(15 * kSInNs);
     const size_t changes = viewer.changes;
     const int64_t from_ns = viewer.time_ns;
-    viewer.run(60 * kS);
+    viewer.run(60 * kSInNs);
     const std::vector<StrandClass> classes = make_strand_classes(built_in_plan());
     EXPECT_LE(decode_share * classes[viewer.present].strand_share, kBusyDecodeShare);
     EXPECT_GT(decode_share * classes[viewer.present - 1].strand_share, kBusyDecodeShare) << "no fewer";
@@ -136,50 +140,50 @@ TEST(FlowControl, AViewerThatDecodesForLongerThanAFrameGetsFewerStrands) {
 
 // Who tells no times is believed to be slow, as before.
 TEST(FlowControl, OfAViewerThatTellsNoTimesEveryDelayCounts) {
-  Viewer viewer({.bytes_per_s = 10.0 * kFullBytesPerS, .round_trip_ns = 20 * kMs});
+  Viewer viewer({.bytes_per_s = 10.0 * kFullBytesPerS, .round_trip_ns = 20 * kMsInNs});
   viewer.machine = {.decode_ns = 2 * kStepNs, .tells_times = false};
-  viewer.run(20 * kS);
+  viewer.run(20 * kSInNs);
   EXPECT_GT(viewer.present, 0u);
 }
 
 TEST(FlowControl, LongerPathIsNoQueue) {
-  Viewer viewer({.round_trip_ns = 20 * kMs});
-  viewer.run(10 * kS);
-  viewer.link.round_trip_ns = 320 * kMs;  // another route
-  viewer.run(60 * kS);
+  Viewer viewer({.round_trip_ns = 20 * kMsInNs});
+  viewer.run(10 * kSInNs);
+  viewer.link.round_trip_ns = 320 * kMsInNs;  // another route
+  viewer.run(60 * kSInNs);
   const int64_t from_ns = viewer.time_ns;
-  viewer.run(10 * kS);
+  viewer.run(10 * kSInNs);
   EXPECT_GE(share_of_full_rate(viewer, from_ns), 0.9);
 }
 
 TEST(FlowControl, StalledViewerGetsNothingButAKnockNowAndThen) {
-  Viewer viewer({.round_trip_ns = 5 * kMs});
-  viewer.run(5 * kS);
+  Viewer viewer({.round_trip_ns = 5 * kMsInNs});
+  viewer.run(5 * kSInNs);
   viewer.reads = false;
-  viewer.run(1 * kS);
+  viewer.run(1 * kSInNs);
   const size_t held = viewer.flow.in_flight_bytes();
-  viewer.run(5 * kS);
+  viewer.run(5 * kSInNs);
   EXPECT_LE(viewer.flow.in_flight_bytes(), held + 6 * kKeyframeBytes);
   EXPECT_NE(viewer.flow.oldest_due_ns(viewer.time_ns), 0);
   viewer.reads = true;
-  viewer.run(2 * kS);
+  viewer.run(2 * kSInNs);
   const int64_t from_ns = viewer.time_ns;
-  viewer.run(2 * kS);
+  viewer.run(2 * kSInNs);
   EXPECT_GE(viewer.rate_hz(from_ns), 9.0) << "and goes on when it reads again";
 }
 
 // A class that the link cannot carry is tried more and more rarely; what it can is found again soon.
 TEST(FlowControl, TriesThatFailAreRepeatedAtDoubledTimes) {
-  Viewer viewer({.round_trip_ns = 20 * kMs});
-  viewer.run(5 * kS);
+  Viewer viewer({.round_trip_ns = 20 * kMsInNs});
+  viewer.run(5 * kSInNs);
   const auto classes = make_strand_classes(built_in_plan());
   constexpr size_t kTooMuch = 1;
   ASSERT_GT(relative_cost(classes[kTooMuch]), 0.45);
   ASSERT_LT(relative_cost(classes[kTooMuch + 1]), 0.35);
   viewer.link.bytes_per_s = 0.4 * kFullBytesPerS;
-  viewer.run(30 * kS);
+  viewer.run(30 * kSInNs);
   viewer.tries.clear();
-  viewer.run(1'200 * kS);
+  viewer.run(1'200 * kSInNs);
   const std::vector<int64_t> tries_ns = viewer.tries[kTooMuch];
   ASSERT_GE(tries_ns.size(), 6u) << "it never gives up";
   EXPECT_TRUE(viewer.tries[0].empty()) << "no try lasted";
@@ -201,9 +205,9 @@ TEST(FlowControl, TriesThatFailAreRepeatedAtDoubledTimes) {
 }
 
 TEST(FlowControl, CapIsKept) {
-  Viewer viewer({.round_trip_ns = 5 * kMs});
+  Viewer viewer({.round_trip_ns = 5 * kMsInNs});
   viewer.cap_bytes_per_s = 0.5 * kFullBytesPerS;
-  viewer.run(60 * kS);
+  viewer.run(60 * kSInNs);
   const auto classes = make_strand_classes(built_in_plan());
   EXPECT_LE(relative_cost(classes[viewer.present]), 0.5);
   EXPECT_GT(relative_cost(classes[viewer.present - 1]), 0.5) << "no lower than the cap asks for";
@@ -227,46 +231,47 @@ TEST(FlowControl, ALinkIsNotFloodedBeforeItsFirstAcknowledgement) {
     flow.expect_acks();
     FrameHeader header;
     header.opcode = Opcode::JpegTiles;
-    int64_t time_ns = kS;
-    for (; flow.may_send(time_ns) && header.sequence < 1'000; time_ns += kMs) {
+    int64_t time_ns = kSInNs;
+    for (; flow.may_send(time_ns) && header.sequence < 1'000; time_ns += kMsInNs) {
       ++header.sequence;
       flow.on_sent(header, bytes, time_ns);
     }
     EXPECT_EQ(flow.in_flight_bytes(), std::max(kFirstBytes, bytes));
-    EXPECT_FALSE(flow.may_send(time_ns + 10 * kS));
-    flow.on_ack(header.stream_id, header.sequence, time_ns + 10 * kS);
-    EXPECT_TRUE(flow.may_send(time_ns + 10 * kS));
+    EXPECT_FALSE(flow.may_send(time_ns + 10 * kSInNs));
+    flow.on_ack(header.stream_id, header.sequence, time_ns + 10 * kSInNs);
+    EXPECT_TRUE(flow.may_send(time_ns + 10 * kSInNs));
   }
 }
 
 TEST(FlowControl, AnAcknowledgementIsDueWhenTheLinkCanHaveCarriedItsFrame) {
   FlowControl flow;
   flow.expect_acks();
-  flow.on_round_trip(20 * kMs, 1 * kS);
+  flow.on_round_trip(20 * kMsInNs, 1 * kSInNs);
   FrameHeader asset;
   asset.opcode = Opcode::Asset;
   asset.sequence = 1;
-  flow.on_sent(asset, 20'000, 1 * kS);
-  EXPECT_EQ(flow.oldest_due_ns(2 * kS), 1 * kS + 20 * kMs) << "nothing is known of the rate";
-  flow.on_written(asset, 3 * kS);
-  EXPECT_EQ(flow.oldest_due_ns(3 * kS), 3 * kS + 20 * kMs) << "it gets on";
+  flow.on_sent(asset, 20'000, 1 * kSInNs);
+  EXPECT_EQ(flow.oldest_due_ns(2 * kSInNs), 1 * kSInNs + 20 * kMsInNs) << "nothing is known of the rate";
+  flow.on_written(asset, 3 * kSInNs);
+  EXPECT_EQ(flow.oldest_due_ns(3 * kSInNs), 3 * kSInNs + 20 * kMsInNs) << "it gets on";
 
-  flow.on_ack(asset.stream_id, asset.sequence, 3 * kS + 20 * kMs);  // 20 kB in 2 s
+  flow.on_ack(asset.stream_id, asset.sequence, 3 * kSInNs + 20 * kMsInNs);  // 20 kB in 2 s
   FrameHeader first = asset, second = asset;
   first.opcode = second.opcode = Opcode::StrandKeyframe;
   first.sequence = 2;
   second.sequence = 3;
-  flow.on_sent(first, 50'000, 4 * kS);
-  EXPECT_NEAR(static_cast<double>(flow.oldest_due_ns(4 * kS)), 9.02 * kS, 1.0 * kMs);
-  flow.on_sent(second, 50'000, 5 * kS);
-  flow.on_written(second, 6 * kS);
-  EXPECT_NEAR(static_cast<double>(flow.oldest_due_ns(6 * kS)), 9.02 * kS, 1.0 * kMs)
+  flow.on_sent(first, 50'000, 4 * kSInNs);
+  EXPECT_NEAR(static_cast<double>(flow.oldest_due_ns(4 * kSInNs)), 9.02 * kSInNs, 1.0 * kMsInNs);
+  flow.on_sent(second, 50'000, 5 * kSInNs);
+  flow.on_written(second, 6 * kSInNs);
+  EXPECT_NEAR(static_cast<double>(flow.oldest_due_ns(6 * kSInNs)), 9.02 * kSInNs, 1.0 * kMsInNs)
       << "what follows may lie in a kernel's buffer, of a client that sleeps";
 
-  flow.on_ack(second.stream_id, second.sequence, 14 * kS);
+  flow.on_ack(second.stream_id, second.sequence, 14 * kSInNs);
   second.sequence = 4;
-  flow.on_sent(second, 60'000'000, 20 * kS);
-  EXPECT_EQ(flow.oldest_due_ns(20 * kS), 20 * kS + flow.base_ns() + kLongestTransferNs) << "but not for ever";
+  flow.on_sent(second, 60'000'000, 20 * kSInNs);
+  EXPECT_EQ(flow.oldest_due_ns(20 * kSInNs), 20 * kSInNs + flow.base_ns() + kLongestTransferNs)
+      << "but not for ever";
 }
 
 TEST(FlowControl, UnknownAndRepeatedAcknowledgementsChangeNothing) {
@@ -276,14 +281,14 @@ TEST(FlowControl, UnknownAndRepeatedAcknowledgementsChangeNothing) {
   header.stream_id = 2;
   for (uint32_t i = 1; i <= 5; ++i) {
     header.sequence = i;
-    flow.on_sent(header, 1'000, i * kMs);
+    flow.on_sent(header, 1'000, i * kMsInNs);
   }
-  flow.on_ack(2, 9, 10 * kMs);
-  flow.on_ack(1, 3, 10 * kMs);
+  flow.on_ack(2, 9, 10 * kMsInNs);
+  flow.on_ack(1, 3, 10 * kMsInNs);
   EXPECT_EQ(flow.in_flight_bytes(), 5'000u);
-  flow.on_ack(2, 3, 10 * kMs);
+  flow.on_ack(2, 3, 10 * kMsInNs);
   EXPECT_EQ(flow.in_flight_bytes(), 2'000u) << "those before it arrived too";
-  flow.on_ack(2, 3, 11 * kMs);
+  flow.on_ack(2, 3, 11 * kMsInNs);
   EXPECT_EQ(flow.in_flight_bytes(), 2'000u);
 }
 
@@ -354,4 +359,4 @@ TEST(StrandClasses, AreToldInWords) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::flow_control_test

@@ -1,5 +1,6 @@
 // When states were where in the server: histograms, and the trace.
 #include "server/app/frame_stages.h"
+#include "common/base/units.h"
 
 #include <gmock/gmock.h>
 
@@ -9,15 +10,13 @@
 #include "tests/support/metrics_text.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::frame_stages_test {
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
 
 SnapshotInfo state(uint64_t tick, int64_t motion_ns) {
   SnapshotInfo info;
   info.tick = tick;
-  info.sim_time_ns = static_cast<int64_t>(tick) * 16 * kMs;
+  info.sim_time_ns = static_cast<int64_t>(tick) * 16 * kMsInNs;
   info.motion_time_ns = motion_ns;
   return info;
 }
@@ -30,8 +29,8 @@ TEST(FrameStages, TracesEachStateOnce) {
     ASSERT_TRUE(stages.open_trace(folder.path() / "trace.csv"));
     stages.note_state(state(1, 5), 10);
     stages.note_state(state(1, 5), 11);  // published once more
-    stages.note_encoded(16 * kMs, 20);
-    stages.note_encoded(16 * kMs, 25);  // for another class
+    stages.note_encoded(16 * kMsInNs, 20);
+    stages.note_encoded(16 * kMsInNs, 25);  // for another class
     stages.note_state(state(2, 5), 30);
     stages.note_encoded(99, 31);  // of no state that is known
   }
@@ -54,12 +53,12 @@ TEST(FrameStages, TellsStatesThatAreThroughOnce) {
   stages.note_state(state(2, 6), 20);
   stages.note_state(state(3, 0), 30);
   EXPECT_THAT(ticks(40), testing::IsEmpty()) << "their frames may still come";
-  stages.note_encoded(16 * kMs, 45);
+  stages.note_encoded(16 * kMsInNs, 45);
   const std::vector<StateTime> first = stages.take_states(50);
   ASSERT_EQ(first.size(), 1u);
-  EXPECT_EQ(first[0], (StateTime{1, 16 * kMs, 0, 5, 10, 45}));
+  EXPECT_EQ(first[0], (StateTime{1, 16 * kMsInNs, 0, 5, 10, 45}));
   EXPECT_THAT(ticks(60), testing::IsEmpty());
-  stages.note_encoded(48 * kMs, 65);
+  stages.note_encoded(48 * kMsInNs, 65);
   EXPECT_THAT(ticks(70), testing::IsEmpty()) << "in their order";
   EXPECT_THAT(ticks(20 + kFramePatienceNs), testing::ElementsAre(2, 3)) << "no frame comes of the second";
   stages.note_state(state(4, 0), 100);
@@ -69,8 +68,8 @@ TEST(FrameStages, TellsStatesThatAreThroughOnce) {
 TEST(FrameStages, HistogramsCountASampleOnce) {
   FrameStages stages;
   for (uint64_t tick = 1; tick <= 200; ++tick) {
-    stages.note_state(state(tick, tick < 100 ? 1 * kMs : 2 * kMs), 8 * kMs);
-    stages.note_encoded(static_cast<int64_t>(tick) * 16 * kMs, 11 * kMs);
+    stages.note_state(state(tick, tick < 100 ? 1 * kMsInNs : 2 * kMsInNs), 8 * kMsInNs);
+    stages.note_encoded(static_cast<int64_t>(tick) * 16 * kMsInNs, 11 * kMsInNs);
   }
   std::vector<std::string> faults;
   const auto families = test::read_metrics(stages.metrics(), faults);
@@ -103,4 +102,4 @@ TEST(ProcessMetrics, SayWhatTheProcessTakes) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::frame_stages_test

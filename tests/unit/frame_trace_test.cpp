@@ -4,30 +4,29 @@
 #include <gmock/gmock.h>
 
 #include "common/base/file.h"
+#include "common/base/units.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::frame_trace_test {
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
 
 FrameTimes frame(uint64_t tick, int64_t motion_ns) {
   FrameTimes times;
   times.tick = tick;
   times.motion_ns = motion_ns;
-  times.sent_ns = motion_ns + 10 * kMs;
-  times.received_ns = times.sent_ns + static_cast<int64_t>(tick) * kMs;
-  times.decoded_ns = times.received_ns + 2 * kMs;
+  times.sent_ns = motion_ns + 10 * kMsInNs;
+  times.received_ns = times.sent_ns + static_cast<int64_t>(tick) * kMsInNs;
+  times.decoded_ns = times.received_ns + 2 * kMsInNs;
   return times;
 }
 
 TEST(FrameTrace, SaysHowLongEachPartOfTheWayTakes) {
   std::vector<FrameTimes> frames;
   for (uint64_t tick = 1; tick <= 101; ++tick) {
-    frames.push_back(frame(tick, static_cast<int64_t>(tick) * 100 * kMs));
-    frames.back().source_ns = frames.back().motion_ns - 1 * kMs;
-    frames.back().published_ns = frames.back().motion_ns + 7 * kMs;
-    frames.back().presented_ns = frames.back().decoded_ns + 5 * kMs;
+    frames.push_back(frame(tick, static_cast<int64_t>(tick) * 100 * kMsInNs));
+    frames.back().source_ns = frames.back().motion_ns - 1 * kMsInNs;
+    frames.back().published_ns = frames.back().motion_ns + 7 * kMsInNs;
+    frames.back().presented_ns = frames.back().decoded_ns + 5 * kMsInNs;
   }
   const auto stages = stage_times(frames);
   const auto stage = [&](const std::string& name) {
@@ -58,9 +57,10 @@ TEST(FrameTrace, SaysHowLongEachPartOfTheWayTakes) {
 // A sample that stays in later states because no other comes is no delay of theirs, and without a sample or a
 // clock there is nothing to measure.
 TEST(FrameTrace, CountsASampleOnceAndLeavesOutWhatIsNotKnown) {
-  FrameTimes without_clock = frame(4, 500 * kMs);
+  FrameTimes without_clock = frame(4, 500 * kMsInNs);
   without_clock.received_ns = without_clock.decoded_ns = 0;
-  const auto stages = stage_times({frame(1, 100 * kMs), frame(2, 100 * kMs), frame(3, 0), without_clock});
+  const auto stages =
+      stage_times({frame(1, 100 * kMsInNs), frame(2, 100 * kMsInNs), frame(3, 0), without_clock});
   ASSERT_EQ(stages.size(), 7u);
   EXPECT_EQ(stages[3].stage, "motion received -> sent");
   EXPECT_EQ(stages[3].count, 2u);
@@ -78,15 +78,15 @@ TEST(FrameTrace, IsALineForEachFrameWithWhatTheServerTellsLater) {
   FrameTrace trace(2);
   ASSERT_TRUE(trace.open(folder.path() / "trace.csv"));
   for (uint64_t tick = 7; tick <= 9; ++tick) {
-    FrameTimes times = frame(tick, tick == 8 ? 0 : 100 * kMs);  // as of a picture
-    times.sim_time_ns = static_cast<int64_t>(tick) * 10 * kMs;
+    FrameTimes times = frame(tick, tick == 8 ? 0 : 100 * kMsInNs);  // as of a picture
+    times.sim_time_ns = static_cast<int64_t>(tick) * 10 * kMsInNs;
     times.mode = tick == 8 ? StreamMode::Frames : StreamMode::Strands;
     trace.add(times);
   }
-  trace.note_states(std::vector<StateTime>{{7, 70 * kMs, 1, 2, 3, 4}, {8, 80 * kMs, 11, 12, 13, 14}});
-  trace.note_presented(StreamMode::Strands, 95 * kMs, 777);  // between the last state and one to come
-  trace.note_presented(StreamMode::Strands, 96 * kMs, 778);
-  trace.note_presented(StreamMode::Frames, 80 * kMs + kShownStateNs, 779);  // of a state that never came
+  trace.note_states(std::vector<StateTime>{{7, 70 * kMsInNs, 1, 2, 3, 4}, {8, 80 * kMsInNs, 11, 12, 13, 14}});
+  trace.note_presented(StreamMode::Strands, 95 * kMsInNs, 777);  // between the last state and one to come
+  trace.note_presented(StreamMode::Strands, 96 * kMsInNs, 778);
+  trace.note_presented(StreamMode::Frames, 80 * kMsInNs + kShownStateNs, 779);  // of a state that never came
   ASSERT_TRUE(trace.close());
   EXPECT_EQ(load_text(folder.path() / "trace.csv", 2'000).value(),
             fmt::format("{}"
@@ -103,16 +103,16 @@ TEST(FrameTrace, IsALineForEachFrameWithWhatTheServerTellsLater) {
 TEST(FrameTrace, LeavesFramesOfEarlierSessionsAlone) {
   FrameTrace trace;
   FrameTimes times = frame(7, 0);
-  times.sim_time_ns = 70 * kMs;
+  times.sim_time_ns = 70 * kMsInNs;
   trace.add(times);
   trace.begin_session();
-  trace.note_states(std::vector<StateTime>{{7, 70 * kMs, 1, 2, 3, 4}});
-  trace.note_presented(StreamMode::Strands, 70 * kMs, 5);
+  trace.note_states(std::vector<StateTime>{{7, 70 * kMsInNs, 1, 2, 3, 4}});
+  trace.note_presented(StreamMode::Strands, 70 * kMsInNs, 5);
   ASSERT_EQ(trace.frames().size(), 1u);
   EXPECT_EQ(trace.frames()[0].published_ns, 0);
   EXPECT_EQ(trace.frames()[0].presented_ns, 0);
   trace.add(times);
-  trace.note_states(std::vector<StateTime>{{7, 70 * kMs, INT64_MIN, INT64_MAX, 3, 4}});
+  trace.note_states(std::vector<StateTime>{{7, 70 * kMsInNs, INT64_MIN, INT64_MAX, 3, 4}});
   EXPECT_EQ(trace.frames()[1].published_ns, 3);
   EXPECT_EQ(trace.frames()[1].source_ns, 0) << "no time of any clock";
   EXPECT_EQ(trace.decoded_since(times.decoded_ns).size(), 2u);
@@ -120,4 +120,4 @@ TEST(FrameTrace, LeavesFramesOfEarlierSessionsAlone) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::frame_trace_test

@@ -10,7 +10,7 @@
 #include "common/pictures/jpeg_tiles.h"
 #include "tests/support/eventually.h"
 
-namespace strandcast {
+namespace strandcast::frame_worker_test {
 namespace {
 
 constexpr uint32_t kStrands = 6;
@@ -598,4 +598,4 @@ TEST_F(FrameWork, AFailedDrawingEndsFramesToo) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::frame_worker_test

@@ -7,7 +7,7 @@
 #include "tests/support/grown_hair.h"
 #include "tests/support/sample_look.h"
 
-namespace strandcast {
+namespace strandcast::golden_pictures_test {
 namespace {
 
 constexpr RenderSize kSize{96, 96};
@@ -94,4 +94,4 @@ TEST(GoldenPictures, HairLooksAsItDid) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::golden_pictures_test

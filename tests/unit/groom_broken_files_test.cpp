@@ -13,13 +13,13 @@
 #include "tests/support/largest_allocation.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::groom_broken_files_test {
 namespace {
 
 using ::testing::AllOf;
-using testing::ByteFile;
+using test::ByteFile;
 using ::testing::HasSubstr;
-using testing::shared_data;
+using test::shared_data;
 
 constexpr size_t kSmallAllocations = 64 << 10;  // messages, streams, paths
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -28,12 +28,12 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 /// the file is named.
 std::string refusal(const TemporaryFolder& folder, const ByteFile& file, const std::string& name) {
   const auto path = folder.write(name, file.text());
-  testing::reset_largest_allocation();
+  test::reset_largest_allocation();
   GroomFileOptions options;
   options.path = path;
   options.unit_m = 0.01f;
   const auto groom = load_groom(options);
-  EXPECT_LE(testing::largest_allocation_bytes(), file.bytes.size() + kSmallAllocations);
+  EXPECT_LE(test::largest_allocation_bytes(), file.bytes.size() + kSmallAllocations);
   if (groom) return "accepted";
   EXPECT_THAT(groom.error().to_string(), HasSubstr(path.string()));
   EXPECT_EQ(groom.error().to_string().find('\n'), std::string::npos);
@@ -205,9 +205,9 @@ TEST(BrokenTfx, RandomHeadersNeverGiveAGroomLargerThanTheFile) {
       const uint32_t hash = mix_u32(round * 4 + change);
       file.patch(hash % 176, static_cast<uint8_t>(mix_u32(hash)));
     }
-    testing::reset_largest_allocation();
+    test::reset_largest_allocation();
     const auto groom = read_tfx_binary(ByteView(file.bytes));
-    ASSERT_LE(testing::largest_allocation_bytes(), file.bytes.size() + kSmallAllocations);
+    ASSERT_LE(test::largest_allocation_bytes(), file.bytes.size() + kSmallAllocations);
     ASSERT_LE(groom ? groom->rest_position_m.size() * 12 : 0, file.bytes.size());
   }
 }
@@ -278,4 +278,4 @@ TEST(GroomBrokenFiles, TextUnderTheWrongNameIsCalledText) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::groom_broken_files_test

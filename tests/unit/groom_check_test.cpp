@@ -9,7 +9,7 @@
 #include "common/pictures/image_codec.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::groom_check_test {
 namespace {
 
 using testing::HasSubstr;
@@ -65,4 +65,4 @@ TEST(GroomCheck, SaysWhatItCannotRead) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::groom_check_test

@@ -8,11 +8,11 @@
 #include "tests/support/groom_files.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::groom_hair_test {
 namespace {
 
 using ::testing::AllOf;
-using testing::ByteFile;
+using test::ByteFile;
 using ::testing::HasSubstr;
 
 constexpr uint32_t kSegments = 1, kPoints = 2, kThickness = 4, kTransparency = 8, kColour = 16;
@@ -167,4 +167,4 @@ TEST(Hair, NonFinitePointsNameStrandAndVertex) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::groom_hair_test

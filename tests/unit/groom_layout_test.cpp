@@ -12,7 +12,7 @@
 #include "common/math/point_tree.h"
 #include "tests/support/groom_files.h"
 
-namespace strandcast {
+namespace strandcast::groom_layout_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -272,7 +272,7 @@ TEST(RootTriangles, RealGroomsGetOneToTwoPerStrand) {
   REQUIRE_SHARED_DATA();
   for (const char* name :
        {"Ratboy_mohawk.tfx", "TestHair1.tfx", "ponytail_side.tfx", "sintel_11400x16.tfx"}) {
-    const auto groom = load_tfx(testing::shared_data() / "grooms" / name);
+    const auto groom = load_tfx(test::shared_data() / "grooms" / name);
     ASSERT_TRUE(groom);
     const auto triangles = make_root_triangles(*groom);
     expect_proper(*groom, triangles);
@@ -321,4 +321,4 @@ TEST(PrefixOrder, EveryPrefixCoversTheHead) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::groom_layout_test

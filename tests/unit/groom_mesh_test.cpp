@@ -7,7 +7,7 @@
 #include "common/groom/mesh.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::groom_mesh_test {
 namespace {
 
 using ::testing::AllOf;
@@ -274,4 +274,4 @@ TEST(FitSphere, DegenerateSetsGetABoundingSphere) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::groom_mesh_test

@@ -7,7 +7,7 @@
 #include "common/groom/ply_loader.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::groom_ply_test {
 namespace {
 
 using ::testing::AllOf;
@@ -216,4 +216,4 @@ TEST(Ply, WhatIsWrongIsNamed) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::groom_ply_test

@@ -9,7 +9,7 @@
 #include "common/groom/scalp_roots.h"
 #include "common/math/point_tree.h"
 
-namespace strandcast {
+namespace strandcast::groom_procedural_test {
 namespace {
 
 constexpr float kRadiusM = 0.095f;
@@ -301,4 +301,4 @@ TEST(ScalpRoots, AreSpreadEvenlyByArea) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::groom_procedural_test

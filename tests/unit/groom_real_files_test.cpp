@@ -9,10 +9,10 @@
 #include "common/groom/tfx_loader.h"
 #include "tests/support/groom_files.h"
 
-namespace strandcast {
+namespace strandcast::groom_real_files_test {
 namespace {
 
-using testing::shared_data;
+using test::shared_data;
 
 std::vector<float> sorted_lengths(const Groom& groom) {
   std::vector<float> lengths(groom.strand_count());
@@ -159,4 +159,4 @@ TEST(RealMesh, ColliderIsWatertightWithOutwardNormals) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::groom_real_files_test

@@ -5,7 +5,7 @@
 #include "common/groom/tfx_loader.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::groom_tfx_text_test {
 namespace {
 
 using ::testing::AllOf;
@@ -127,4 +127,4 @@ TEST(TfxText, GarbageIsRefusedWithPrintableErrors) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::groom_tfx_text_test

@@ -6,7 +6,7 @@
 #include "common/groom/usda_loader.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::groom_usda_test {
 namespace {
 
 using ::testing::AllOf;
@@ -251,4 +251,4 @@ TEST(Usda, EveryTruncationIsRefused) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::groom_usda_test

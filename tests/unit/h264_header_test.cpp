@@ -3,7 +3,7 @@
 
 #include "common/pictures/picture_decoder.h"
 
-namespace strandcast {
+namespace strandcast::h264_header_test {
 namespace {
 
 using Bytes = std::vector<std::byte>;
@@ -169,4 +169,4 @@ TEST(H264, ABuildWithoutItSaysSo) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::h264_header_test

@@ -6,7 +6,7 @@ extern "C" {
 
 #include "common/pictures/video_codec.h"
 
-namespace strandcast {
+namespace strandcast::h264_slices_test {
 namespace {
 
 using Bytes = std::vector<std::byte>;
@@ -153,4 +153,4 @@ TEST_F(H264Slices, ADamagedOneLeavesNoChainBehind) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::h264_slices_test

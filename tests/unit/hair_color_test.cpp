@@ -7,7 +7,7 @@
 
 #include "common/scene/scene_file.h"
 
-namespace strandcast {
+namespace strandcast::hair_color_test {
 namespace {
 
 TEST(HairColor, TheSentenceNamesEveryPreset) {
@@ -67,4 +67,4 @@ TEST(HairColor, AnUnknownNameIsRefusedWithTheKnownOnes) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::hair_color_test

@@ -6,7 +6,7 @@
 
 #include "tests/support/grown_hair.h"
 
-namespace strandcast {
+namespace strandcast::hair_size_test {
 namespace {
 
 CameraDesc camera_from(const glm::vec3& offset_m, const glm::vec3& target_m = glm::vec3(0.0f)) {
@@ -51,4 +51,4 @@ TEST(HairSize, ExtentHoldsTheGroomAndReachesAsFarAsStretchedStrands) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::hair_size_test

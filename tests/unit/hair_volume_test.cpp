@@ -12,7 +12,7 @@
 #include "server/sim/volume/reference_volume.h"
 #include "tests/support/own_workers.h"
 
-namespace strandcast {
+namespace strandcast::hair_volume_test {
 namespace {
 
 using testing::HasSubstr;
@@ -412,4 +412,4 @@ TEST(VolumeExtras, TheWindThroughASlabFallsExponentially) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::hair_volume_test

@@ -11,7 +11,7 @@
 
 #include "common/groom/head_field.h"
 
-namespace strandcast {
+namespace strandcast::head_occupancy_test {
 namespace {
 
 constexpr float kRadiusM = 0.1f;
@@ -204,4 +204,4 @@ TEST(HeadOccupancy, TheBuiltInHeadIsSolidWhereItsFieldSaysSo) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::head_occupancy_test

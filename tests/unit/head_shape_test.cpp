@@ -18,7 +18,7 @@
 #include "common/math/point_tree.h"
 #include "tests/support/groom_files.h"
 
-namespace strandcast {
+namespace strandcast::head_shape_test {
 namespace {
 
 constexpr float kRadiusM = 0.09f;
@@ -345,7 +345,7 @@ TEST(Placement, RealGroomsFaceForwardOnAHeadThatSwallowsNothing) {
   for (const KnownGroom& item : known) {
     GroomFileOptions options;
     for (const std::string& file : item.files) {
-      const std::filesystem::path path = testing::shared_data() / "grooms" / file;
+      const std::filesystem::path path = test::shared_data() / "grooms" / file;
       if (options.path.empty()) {
         options.path = path;
       } else {
@@ -370,9 +370,9 @@ TEST(Placement, RealGroomsFaceForwardOnAHeadThatSwallowsNothing) {
 TEST(GroomParts, SeveralFilesAreOneHeadOfHair) {
   REQUIRE_SHARED_DATA();
   GroomFileOptions options;
-  options.path = testing::shared_data() / "grooms/ponytail_side.tfx";
+  options.path = test::shared_data() / "grooms/ponytail_side.tfx";
   const Groom one = load_groom(options).value();
-  options.more_paths = {testing::shared_data() / "grooms/ponytail_front_top.tfx"};
+  options.more_paths = {test::shared_data() / "grooms/ponytail_front_top.tfx"};
   options.unit_m = one.file_unit_m;
   const auto both = load_groom(options);
   ASSERT_TRUE(both) << both.error().to_string();
@@ -388,4 +388,4 @@ TEST(GroomParts, SeveralFilesAreOneHeadOfHair) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::head_shape_test

@@ -5,16 +5,15 @@
 
 #include "client/app/view_hud.h"
 #include "client/window/hud_panel.h"
+#include "common/base/units.h"
 
-namespace strandcast {
+namespace strandcast::hud_panel_test {
 namespace {
 
 using testing::AllOf;
 using testing::Contains;
 using testing::Field;
 using testing::HasSubstr;
-
-constexpr int64_t kS = 1'000'000'000;
 
 /// Dear ImGui without a window.
 class PanelBench {
@@ -132,26 +131,26 @@ TEST(ViewHud, SaysWhatIsTriedInsteadOfBlack) {
   ViewerState state;
   ViewFacts facts = facts_of("127.0.0.1:7878");
   facts.is_starting = true;
-  auto hud = writer.write(state, facts, kS);
+  auto hud = writer.write(state, facts, kSInNs);
   ASSERT_TRUE(hud.banner);
   EXPECT_EQ(hud.banner->headline, "starting");
   facts.is_starting = false;
   state.doing = "looking for the host";
-  hud = writer.write(state, facts, kS);
+  hud = writer.write(state, facts, kSInNs);
   EXPECT_EQ(hud.banner->headline, "connecting to 127.0.0.1:7878");
   EXPECT_THAT(hud.banner->doing, HasSubstr("looking for the host"));
   EXPECT_EQ(hud.banner->trouble, "");
   state.trouble = "127.0.0.1:7878: cannot connect: Connection refused";
   state.help = "start it";
-  hud = writer.write(state, facts, kS);
+  hud = writer.write(state, facts, kSInNs);
   EXPECT_EQ(hud.banner->trouble, "cannot connect: Connection refused");
   EXPECT_EQ(hud.banner->help, "start it");
   state.session_number = 1;
-  EXPECT_THAT(writer.write(state, facts, kS).banner->headline, HasSubstr("connection lost"));
+  EXPECT_THAT(writer.write(state, facts, kSInNs).banner->headline, HasSubstr("connection lost"));
   state.final_error = make_error(ErrorCode::Unauthorized, "The token is wrong or missing.");
-  EXPECT_EQ(writer.write(state, facts, kS).banner->doing, "Esc quits");
+  EXPECT_EQ(writer.write(state, facts, kSInNs).banner->doing, "Esc quits");
   state.is_connected = true;
-  EXPECT_FALSE(writer.write(state, facts, kS).banner);
+  EXPECT_FALSE(writer.write(state, facts, kSInNs).banner);
 }
 
 TEST(ViewHud, SaysWhatIsShownBetweenStates) {
@@ -164,12 +163,12 @@ TEST(ViewHud, SaysWhatIsShownBetweenStates) {
   const auto row = [](const std::string& value) {
     return AllOf(Field(&HudRow::label, std::string("interpolation")), Field(&HudRow::value, value));
   };
-  EXPECT_THAT(writer.write(state, facts, kS).rows, testing::Not(Contains(row("cubic"))))
+  EXPECT_THAT(writer.write(state, facts, kSInNs).rows, testing::Not(Contains(row("cubic"))))
       << "the newest state is shown";
   facts.playout = Playout::Smooth;
-  EXPECT_THAT(writer.write(state, facts, kS).rows, Contains(row("cubic")));
+  EXPECT_THAT(writer.write(state, facts, kSInNs).rows, Contains(row("cubic")));
   facts.interpolation = Interpolation::Linear;
-  EXPECT_THAT(writer.write(state, facts, kS).rows, Contains(row("linear")));
+  EXPECT_THAT(writer.write(state, facts, kSInNs).rows, Contains(row("linear")));
   ViewReport report = {{"interpolation", "none", false}, {"linear_pictures", "0"}, {"cubic_pictures", "0"}};
   set_interpolation(report, 0, 0);
   EXPECT_THAT(to_lines(report), HasSubstr("interpolation=none\n"));
@@ -188,25 +187,26 @@ TEST(ViewHud, SaysWhatAPersonShouldKnow) {
   state.status.realtime_factor = 1.0;
   state.status.is_motion_stale = false;
   const ViewFacts facts = facts_of("127.0.0.1");
-  EXPECT_TRUE(writer.write(state, facts, kS).warnings.empty());
+  EXPECT_TRUE(writer.write(state, facts, kSInNs).warnings.empty());
   state.status.is_paused = state.status.is_motion_stale = true;
-  EXPECT_THAT(writer.write(state, facts, kS).warnings,
+  EXPECT_THAT(writer.write(state, facts, kSInNs).warnings,
               AllOf(Contains(HasSubstr("paused")), Contains(HasSubstr("no head motion"))));
   state.status.is_paused = state.status.is_motion_stale = false;
   state.status.recording = "take 5.mcap: 12.5 s, 3.2 MB";
-  EXPECT_THAT(writer.write(state, facts, kS).warnings,
+  EXPECT_THAT(writer.write(state, facts, kSInNs).warnings,
               testing::ElementsAre("recording take 5.mcap: 12.5 s, 3.2 MB"));
   state.status.recording.clear();
   state.status.realtime_factor = 0.6;
-  EXPECT_TRUE(writer.write(state, facts, kS + kSlowMotionNs - 1).warnings.empty()) << "not for long enough";
-  EXPECT_THAT(writer.write(state, facts, kS + kSlowMotionNs).warnings, Contains(HasSubstr("x0.60")));
+  EXPECT_TRUE(writer.write(state, facts, kSInNs + kSlowMotionNs - 1).warnings.empty())
+      << "not for long enough";
+  EXPECT_THAT(writer.write(state, facts, kSInNs + kSlowMotionNs).warnings, Contains(HasSubstr("x0.60")));
   state.status.slow_motion = "Slow motion: this helps.";
-  EXPECT_THAT(writer.write(state, facts, kS + kSlowMotionNs).warnings,
+  EXPECT_THAT(writer.write(state, facts, kSInNs + kSlowMotionNs).warnings,
               testing::ElementsAre("Slow motion: this helps."))
       << "the server knows more";
   state.status.slow_motion.clear();
   state.status.realtime_factor = kSlowMotion;
-  EXPECT_TRUE(writer.write(state, facts, kS + 2 * kSlowMotionNs).warnings.empty());
+  EXPECT_TRUE(writer.write(state, facts, kSInNs + 2 * kSlowMotionNs).warnings.empty());
 }
 
 TEST(ViewHud, SaysWhatSimulates) {
@@ -215,7 +215,7 @@ TEST(ViewHud, SaysWhatSimulates) {
   state.is_connected = true;
   state.session_number = 1;
   const auto device = [&] {
-    for (const HudRow& row : writer.write(state, facts_of("127.0.0.1"), kS).rows)
+    for (const HudRow& row : writer.write(state, facts_of("127.0.0.1"), kSInNs).rows)
       if (row.label == "simulated by") return row.value;
     return std::string("no row");
   };
@@ -231,7 +231,7 @@ TEST(ViewHud, SaysWhichCodecStrandsComeByAndWhy) {
   state.session_number = 1;
   state.welcome.codec = "tangent";
   const auto codec = [&] {
-    for (const HudRow& row : writer.write(state, facts_of("127.0.0.1"), kS).rows)
+    for (const HudRow& row : writer.write(state, facts_of("127.0.0.1"), kSInNs).rows)
       if (row.label == "strands by") return row.value;
     return std::string("no row");
   };
@@ -250,7 +250,7 @@ TEST(ViewHud, SaysWhoseLookIsSeen) {
   state.look.look.hair_color = "red";
   ViewFacts facts = facts_of("127.0.0.1");
   const auto look = [&] {
-    for (const HudRow& row : writer.write(state, facts, kS).rows)
+    for (const HudRow& row : writer.write(state, facts, kSInNs).rows)
       if (row.label == "look") return row.value;
     return std::string("no row");
   };
@@ -270,14 +270,14 @@ TEST(ViewHud, CountsPicturesAndSaysHowTheyAreDrawn) {
   state.session_number = 1;
   state.welcome.scene_name = "stage";
   ViewFacts facts = facts_of("127.0.0.1");
-  EXPECT_EQ(writer.write(state, facts, kS).title, "stage: strands, nothing moves");
+  EXPECT_EQ(writer.write(state, facts, kSInNs).title, "stage: strands, nothing moves");
   facts.shown_count = 25;
   facts.draw_step = kCoarsestFairStep;
-  const HudState hud = writer.write(state, facts, 3 * kS);
+  const HudState hud = writer.write(state, facts, 3 * kSInNs);
   EXPECT_EQ(hud.title, "stage: strands, 12 pictures/s");
   EXPECT_THAT(hud.rows, Contains(AllOf(Field(&HudRow::label, "drawn"),
                                        Field(&HudRow::value, HasSubstr("50 % of the sides")))));
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::hud_panel_test

@@ -8,7 +8,7 @@
 
 #include "common/base/file.h"
 
-namespace strandcast {
+namespace strandcast::image_codec_test {
 namespace {
 
 Image smooth_image(uint32_t width, uint32_t height, int phase = 0) {
@@ -152,4 +152,4 @@ TEST(ClipWriter, RefusesNonsense) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::image_codec_test

@@ -1,6 +1,7 @@
 // Laws of the clock of the inputs: what the step stands for in real time, smooth where steps are left out,
 // never early, never far behind.
 #include "server/scene/input_clock.h"
+#include "common/base/units.h"
 
 #include <gtest/gtest.h>
 
@@ -9,16 +10,15 @@
 
 #include "server/scene/sim_clock.h"
 
-namespace strandcast {
+namespace strandcast::input_clock_test {
 namespace {
 
 constexpr double kStepS = 1.0 / 60.0;
 constexpr double kStepNs = kStepS * 1e9;
-constexpr int64_t kSecondNs = 1'000'000'000;
 
 /// The due time of step `index` when `every` steps of real time pass for each that is taken.
 int64_t due_ns(int index, double every = 1.0) {
-  return kSecondNs + std::llround(std::floor(index * every) * kStepNs);
+  return kSInNs + std::llround(std::floor(index * every) * kStepNs);
 }
 
 TEST(InputClock, IsTheTimeOfTheStepInRealTime) {
@@ -106,4 +106,4 @@ TEST(InputClock, FollowsASimulationAtTwoThirdsOfRealTime) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::input_clock_test

@@ -1,15 +1,14 @@
 #include "server/input/input_hub.h"
+#include "common/base/units.h"
 
 #include <cmath>
 #include <limits>
 #include <random>
 #include <thread>
 
-namespace strandcast {
+namespace strandcast::input_hub_test {
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
-constexpr int64_t kStart = 5'000'000 * kMs;  // some server time
+constexpr int64_t kStart = 5'000'000 * kMsInNs;  // some server time
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
@@ -38,31 +37,32 @@ TEST(InputHub, StartsWithoutMotionOrWind) {
 TEST(InputHub, HoldsTheNewestSampleWithoutDelay) {
   InputHub hub;
   hub.push(1, motion(0, pose_at(0.0)), kStart);
-  hub.push(1, motion(10 * kMs, pose_at(0.1)), kStart + 10 * kMs);
-  const InputFrame frame = hub.sample(kStart + 10 * kMs);
+  hub.push(1, motion(10 * kMsInNs, pose_at(0.1)), kStart + 10 * kMsInNs);
+  const InputFrame frame = hub.sample(kStart + 10 * kMsInNs);
   EXPECT_EQ(frame.world_from_head, pose_at(0.1));
-  EXPECT_EQ(frame.motion_time_ns, kStart + 10 * kMs) << "arrival of the newest sample used";
-  EXPECT_EQ(hub.sample(kStart + 300 * kMs).world_from_head, pose_at(0.1));
-  EXPECT_EQ(hub.sample(kStart + 300 * kMs).motion_time_ns, kStart + 10 * kMs);
+  EXPECT_EQ(frame.motion_time_ns, kStart + 10 * kMsInNs) << "arrival of the newest sample used";
+  EXPECT_EQ(hub.sample(kStart + 300 * kMsInNs).world_from_head, pose_at(0.1));
+  EXPECT_EQ(hub.sample(kStart + 300 * kMsInNs).motion_time_ns, kStart + 10 * kMsInNs);
 }
 
 TEST(InputHub, ADelayedSourceIsShownBetweenItsSamples) {
   InputHub hub;
-  hub.set_delay(1, 10 * kMs);
-  for (int i = 0; i < 10; ++i) hub.push(1, motion(i * 10 * kMs, pose_at(0.1 * i)), kStart + i * 10 * kMs);
-  EXPECT_NEAR(hub.sample(kStart + 90 * kMs).world_from_head.position_m.x, 0.8, 1e-12);
-  EXPECT_NEAR(hub.sample(kStart + 95 * kMs).world_from_head.position_m.x, 0.85, 1e-12);
-  EXPECT_NEAR(hub.sample(kStart + 120 * kMs).world_from_head.position_m.x, 0.9, 1e-12)
+  hub.set_delay(1, 10 * kMsInNs);
+  for (int i = 0; i < 10; ++i)
+    hub.push(1, motion(i * 10 * kMsInNs, pose_at(0.1 * i)), kStart + i * 10 * kMsInNs);
+  EXPECT_NEAR(hub.sample(kStart + 90 * kMsInNs).world_from_head.position_m.x, 0.8, 1e-12);
+  EXPECT_NEAR(hub.sample(kStart + 95 * kMsInNs).world_from_head.position_m.x, 0.85, 1e-12);
+  EXPECT_NEAR(hub.sample(kStart + 120 * kMsInNs).world_from_head.position_m.x, 0.9, 1e-12)
       << "the newest is held";
   // Of this source alone, and not for ever.
   hub.remove_source(1);
-  hub.push(2, motion(0, pose_at(1.0)), kStart + 200 * kMs);
-  hub.push(2, motion(10 * kMs, pose_at(2.0)), kStart + 210 * kMs);
-  EXPECT_EQ(hub.sample(kStart + 210 * kMs).world_from_head, pose_at(2.0));
-  hub.set_delay(2, 5 * kMs);
+  hub.push(2, motion(0, pose_at(1.0)), kStart + 200 * kMsInNs);
+  hub.push(2, motion(10 * kMsInNs, pose_at(2.0)), kStart + 210 * kMsInNs);
+  EXPECT_EQ(hub.sample(kStart + 210 * kMsInNs).world_from_head, pose_at(2.0));
+  hub.set_delay(2, 5 * kMsInNs);
   hub.set_delay(2, 0);
-  hub.push(2, motion(20 * kMs, pose_at(3.0)), kStart + 220 * kMs);
-  EXPECT_EQ(hub.sample(kStart + 220 * kMs).world_from_head, pose_at(3.0));
+  hub.push(2, motion(20 * kMsInNs, pose_at(3.0)), kStart + 220 * kMsInNs);
+  EXPECT_EQ(hub.sample(kStart + 220 * kMsInNs).world_from_head, pose_at(3.0));
 }
 
 TEST(InputHub, SaysHowFastItsOwnerPlaysTheMotion) {
@@ -73,27 +73,27 @@ TEST(InputHub, SaysHowFastItsOwnerPlaysTheMotion) {
   hub.push(1, slowed, kStart);
   EXPECT_EQ(hub.sample(kStart).motion_speed, 0.25);
   slowed.held_back = 0.5;
-  hub.push(2, slowed, kStart + kMs);
-  EXPECT_EQ(hub.sample(kStart + kMs).motion_speed, 0.25) << "another source drives the head";
-  hub.push(1, motion(10 * kMs, pose_at(0.0)), kStart + 10 * kMs);
-  EXPECT_EQ(hub.sample(kStart + 10 * kMs).motion_speed, 1.0);
+  hub.push(2, slowed, kStart + kMsInNs);
+  EXPECT_EQ(hub.sample(kStart + kMsInNs).motion_speed, 0.25) << "another source drives the head";
+  hub.push(1, motion(10 * kMsInNs, pose_at(0.0)), kStart + 10 * kMsInNs);
+  EXPECT_EQ(hub.sample(kStart + 10 * kMsInNs).motion_speed, 1.0);
 }
 
 TEST(InputHub, InterpolatesBetweenSamples) {
   InputHub hub;
   hub.push(1, motion(0, pose_at(0.0, 0.0)), kStart);
-  hub.push(1, motion(20 * kMs, pose_at(0.2, 0.4)), kStart + 20 * kMs);
-  const InputFrame frame = hub.sample(kStart + 5 * kMs);
+  hub.push(1, motion(20 * kMsInNs, pose_at(0.2, 0.4)), kStart + 20 * kMsInNs);
+  const InputFrame frame = hub.sample(kStart + 5 * kMsInNs);
   EXPECT_NEAR(frame.world_from_head.position_m.x, 0.05, 1e-12);
   EXPECT_NEAR(angle_between_rad(frame.world_from_head.rotation, pose_at(0, 0.1).rotation), 0.0, 1e-9);
-  EXPECT_EQ(frame.motion_time_ns, kStart + 20 * kMs);
+  EXPECT_EQ(frame.motion_time_ns, kStart + 20 * kMsInNs);
 }
 
 TEST(InputHub, NetworkJitterDoesNotReachThePose) {
   // 120 Hz samples of a head at 1 m/s, source clock far off, delays of 2 .. 22 ms; asked 30 ms behind.
   InputHub hub;
   std::mt19937 random(1);
-  const int64_t source_offset = 777'777 * kMs;
+  const int64_t source_offset = 777'777 * kMsInNs;
   struct Packet {
     int64_t arrival_ns, time_ns;
     double x_m;
@@ -101,19 +101,19 @@ TEST(InputHub, NetworkJitterDoesNotReachThePose) {
   std::vector<Packet> packets;
   int64_t last_arrival = 0;
   for (int i = 0; i < 600; ++i) {
-    const int64_t true_ns = kStart + i * 25 * kMs / 3;
+    const int64_t true_ns = kStart + i * 25 * kMsInNs / 3;
     const int64_t arrival =
-        std::max(last_arrival, true_ns + 2 * kMs + static_cast<int64_t>(random() % 20) * kMs);
+        std::max(last_arrival, true_ns + 2 * kMsInNs + static_cast<int64_t>(random() % 20) * kMsInNs);
     packets.push_back({arrival, true_ns - source_offset, static_cast<double>(true_ns - kStart) * 1e-9});
     last_arrival = arrival;  // TCP keeps the order
   }
   size_t next = 0;
-  for (int64_t now = kStart + 2000 * kMs; now < kStart + 4000 * kMs; now += 7 * kMs) {
+  for (int64_t now = kStart + 2000 * kMsInNs; now < kStart + 4000 * kMsInNs; now += 7 * kMsInNs) {
     for (; next < packets.size() && packets[next].arrival_ns <= now; ++next)
       hub.push(1, motion(packets[next].time_ns, pose_at(packets[next].x_m)), packets[next].arrival_ns);
-    const double x_m = hub.sample(now - 30 * kMs).world_from_head.position_m.x;
+    const double x_m = hub.sample(now - 30 * kMsInNs).world_from_head.position_m.x;
     // The best delay of 2 ms stays in the mapping, up to one more when no sample was that fast.
-    EXPECT_NEAR(x_m, static_cast<double>(now - 30 * kMs - 2 * kMs - kStart) * 1e-9, 0.0011);
+    EXPECT_NEAR(x_m, static_cast<double>(now - 30 * kMsInNs - 2 * kMsInNs - kStart) * 1e-9, 0.0011);
   }
   EXPECT_EQ(hub.counters().rejected(), 0u);
 }
@@ -127,24 +127,24 @@ TEST(InputHub, SaysWhenMotionIsStaleAndKeepsThePose) {
   EXPECT_TRUE(stale.is_motion_stale);
   EXPECT_TRUE(stale.has_motion);
   EXPECT_EQ(stale.world_from_head, pose_at(0.5));
-  hub.push(1, motion(2000 * kMs, pose_at(0.5)), kStart + 2000 * kMs);
-  EXPECT_FALSE(hub.sample(kStart + 2000 * kMs).is_motion_stale);
+  hub.push(1, motion(2000 * kMsInNs, pose_at(0.5)), kStart + 2000 * kMsInNs);
+  EXPECT_FALSE(hub.sample(kStart + 2000 * kMsInNs).is_motion_stale);
 }
 
 TEST(InputHub, LateAndDuplicateSamplesAreCountedAndChangeNothing) {
   InputHub hub;
   hub.push(1, motion(0, pose_at(0.0)), kStart);
-  hub.push(1, motion(20 * kMs, pose_at(0.2)), kStart + 20 * kMs);
-  hub.push(1, motion(10 * kMs, pose_at(0.15)),
-           kStart + 21 * kMs);  // late on the way, but nothing newer was used
-  EXPECT_NEAR(hub.sample(kStart + 10 * kMs).world_from_head.position_m.x, 0.15, 1e-12);
-  hub.push(1, motion(20 * kMs, pose_at(9.0)), kStart + 22 * kMs);
+  hub.push(1, motion(20 * kMsInNs, pose_at(0.2)), kStart + 20 * kMsInNs);
+  hub.push(1, motion(10 * kMsInNs, pose_at(0.15)),
+           kStart + 21 * kMsInNs);  // late on the way, but nothing newer was used
+  EXPECT_NEAR(hub.sample(kStart + 10 * kMsInNs).world_from_head.position_m.x, 0.15, 1e-12);
+  hub.push(1, motion(20 * kMsInNs, pose_at(9.0)), kStart + 22 * kMsInNs);
   EXPECT_EQ(hub.counters().duplicate, 1u);
-  const InputFrame before = hub.sample(kStart + 30 * kMs);
+  const InputFrame before = hub.sample(kStart + 30 * kMsInNs);
   EXPECT_EQ(before.world_from_head, pose_at(0.2));
-  hub.push(1, motion(19 * kMs, pose_at(9.0)), kStart + 31 * kMs);
-  hub.push(1, motion(20 * kMs, pose_at(9.0)), kStart + 31 * kMs);
-  const InputFrame after = hub.sample(kStart + 31 * kMs);
+  hub.push(1, motion(19 * kMsInNs, pose_at(9.0)), kStart + 31 * kMsInNs);
+  hub.push(1, motion(20 * kMsInNs, pose_at(9.0)), kStart + 31 * kMsInNs);
+  const InputFrame after = hub.sample(kStart + 31 * kMsInNs);
   EXPECT_EQ(after.world_from_head, before.world_from_head);
   EXPECT_EQ(hub.counters().late, 1u);
   EXPECT_EQ(hub.counters().duplicate, 2u);
@@ -180,14 +180,14 @@ TEST(InputHub, TeleportsAreFlaggedOnceAndNotInterpolated) {
     InputHub hub;
     hub.push(1, motion(0, pose_at(0.0)), kStart);
     EXPECT_TRUE(hub.sample(kStart).has_teleported) << "the first pose replaces none";
-    hub.push(1, motion(20 * kMs, far), kStart + 20 * kMs);
-    const InputFrame between = hub.sample(kStart + 10 * kMs);
+    hub.push(1, motion(20 * kMsInNs, far), kStart + 20 * kMsInNs);
+    const InputFrame between = hub.sample(kStart + 10 * kMsInNs);
     EXPECT_EQ(between.world_from_head, pose_at(0.0));
     EXPECT_FALSE(between.has_teleported);
-    const InputFrame there = hub.sample(kStart + 20 * kMs);
+    const InputFrame there = hub.sample(kStart + 20 * kMsInNs);
     EXPECT_EQ(there.world_from_head.position_m, far.position_m);
     EXPECT_TRUE(there.has_teleported);
-    EXPECT_FALSE(hub.sample(kStart + 21 * kMs).has_teleported);
+    EXPECT_FALSE(hub.sample(kStart + 21 * kMsInNs).has_teleported);
   }
 }
 
@@ -195,13 +195,13 @@ TEST(InputHub, AJumpAcrossSkippedSamplesOrAGapIsStillATeleport) {
   InputHub hub;
   hub.push(1, motion(0, pose_at(0.0)), kStart);
   hub.sample(kStart);
-  hub.push(1, motion(1 * kMs, pose_at(0.5)), kStart + 1 * kMs);  // 500 m/s there
-  hub.push(1, motion(2 * kMs, pose_at(0.0)), kStart + 2 * kMs);  // and back
-  EXPECT_TRUE(hub.sample(kStart + 16 * kMs).has_teleported);
+  hub.push(1, motion(1 * kMsInNs, pose_at(0.5)), kStart + 1 * kMsInNs);  // 500 m/s there
+  hub.push(1, motion(2 * kMsInNs, pose_at(0.0)), kStart + 2 * kMsInNs);  // and back
+  EXPECT_TRUE(hub.sample(kStart + 16 * kMsInNs).has_teleported);
   // A gap of 5 s hides the speed between samples, but the strands see the jump between two frames.
-  hub.sample(kStart + 5000 * kMs);
-  hub.push(1, motion(5010 * kMs, pose_at(2.0)), kStart + 5010 * kMs);
-  EXPECT_TRUE(hub.sample(kStart + 5016 * kMs).has_teleported);
+  hub.sample(kStart + 5000 * kMsInNs);
+  hub.push(1, motion(5010 * kMsInNs, pose_at(2.0)), kStart + 5010 * kMsInNs);
+  EXPECT_TRUE(hub.sample(kStart + 5016 * kMsInNs).has_teleported);
 }
 
 TEST(InputHub, FastHumanMotionIsNoTeleport) {
@@ -222,8 +222,8 @@ TEST(InputHub, RotationsStayInOneHemisphere) {
   for (int i = 0; i < 400; ++i) {  // two turns, with the sign of every other sample flipped
     Pose pose = pose_at(0.0, i * 0.03);
     if (i % 2) pose.rotation = -pose.rotation;
-    hub.push(1, motion(i * 10 * kMs, pose), kStart + i * 10 * kMs);
-    const glm::dquat rotation = hub.sample(kStart + i * 10 * kMs - 4 * kMs).world_from_head.rotation;
+    hub.push(1, motion(i * 10 * kMsInNs, pose), kStart + i * 10 * kMsInNs);
+    const glm::dquat rotation = hub.sample(kStart + i * 10 * kMsInNs - 4 * kMsInNs).world_from_head.rotation;
     EXPECT_GT(glm::dot(rotation, last), 0.99) << i;
     last = rotation;
   }
@@ -232,14 +232,14 @@ TEST(InputHub, RotationsStayInOneHemisphere) {
 TEST(InputHub, FirstSourceOwnsTheHeadUntilStaleOrRemoved) {
   InputHub hub;
   hub.push(1, motion(0, pose_at(0.1)), kStart);
-  hub.push(2, motion(0, pose_at(0.2)), kStart + 1 * kMs);
-  EXPECT_EQ(hub.sample(kStart + 2 * kMs).world_from_head, pose_at(0.1));
+  hub.push(2, motion(0, pose_at(0.2)), kStart + 1 * kMsInNs);
+  EXPECT_EQ(hub.sample(kStart + 2 * kMsInNs).world_from_head, pose_at(0.1));
   EXPECT_EQ(hub.counters().not_owner, 1u);
-  hub.push(2, motion(1000 * kMs, pose_at(0.2)), kStart + kMotionStaleNs);
+  hub.push(2, motion(1000 * kMsInNs, pose_at(0.2)), kStart + kMotionStaleNs);
   EXPECT_EQ(hub.sample(kStart + kMotionStaleNs).world_from_head, pose_at(0.1));
-  hub.push(2, motion(1001 * kMs, pose_at(0.2)), kStart + kMotionStaleNs + 1);
+  hub.push(2, motion(1001 * kMsInNs, pose_at(0.2)), kStart + kMotionStaleNs + 1);
   EXPECT_EQ(hub.sample(kStart + kMotionStaleNs + 1).world_from_head, pose_at(0.2));
-  hub.push(1, motion(1002 * kMs, pose_at(0.1)), kStart + kMotionStaleNs + 2);
+  hub.push(1, motion(1002 * kMsInNs, pose_at(0.1)), kStart + kMotionStaleNs + 2);
   EXPECT_EQ(hub.counters().not_owner, 3u) << "the first one has lost the head";
   hub.remove_source(1);
   EXPECT_FALSE(hub.sample(kStart + kMotionStaleNs + 3).is_motion_stale);
@@ -252,13 +252,13 @@ TEST(InputHub, FirstSourceOwnsTheHeadUntilStaleOrRemoved) {
 }
 
 TEST(InputHub, AStepOfTheSourceClockRestartsItsMapping) {
-  for (const int64_t step : {-3'600'000 * kMs, 3'600'000 * kMs}) {
+  for (const int64_t step : {-3'600'000 * kMsInNs, 3'600'000 * kMsInNs}) {
     InputHub hub;
     int64_t shift = 0;
     for (int i = 0; i < 100; ++i) {
       if (i == 50) shift = step;
-      const int64_t now = kStart + i * 10 * kMs;
-      hub.push(1, motion(i * 10 * kMs + shift, pose_at(0.01 * i)), now);
+      const int64_t now = kStart + i * 10 * kMsInNs;
+      hub.push(1, motion(i * 10 * kMsInNs + shift, pose_at(0.01 * i)), now);
       EXPECT_NEAR(hub.sample(now).world_from_head.position_m.x, 0.01 * i, 1e-12) << "no freeze at " << i;
     }
     EXPECT_EQ(hub.counters().clock_restarts, 1u);
@@ -272,10 +272,10 @@ TEST(InputHub, FollowsASlowlyDriftingClock) {
     InputHub hub;
     double worst_m = 0.0;
     for (int i = 0; i < 12'000; ++i) {
-      const int64_t now = kStart + i * 10 * kMs;
+      const int64_t now = kStart + i * 10 * kMsInNs;
       const double t = i * 0.01;
       hub.push(1, motion(static_cast<int64_t>(t * (1.0 + drift) * 1e9), pose_at(std::fmod(t, 50.0))), now);
-      const double x_m = hub.sample(now - 5 * kMs).world_from_head.position_m.x;
+      const double x_m = hub.sample(now - 5 * kMsInNs).world_from_head.position_m.x;
       if (std::fmod(t, 50.0) > 0.1) worst_m = std::max(worst_m, std::abs(x_m - (std::fmod(t, 50.0) - 0.005)));
     }
     EXPECT_LT(worst_m, 0.0012) << drift;
@@ -288,7 +288,7 @@ TEST(InputHub, RateAndBuffersAreBounded) {
   for (int i = 0; i < 256; ++i) flood.samples.push_back({i * 10'000, pose_at(0.0)});
   for (int message = 0; message < 40; ++message) {
     for (auto& sample : flood.samples) sample.time_ns += 256 * 10'000;
-    hub.push(1, flood, kStart + message * 25 * kMs);  // 10,240 samples in a second
+    hub.push(1, flood, kStart + message * 25 * kMsInNs);  // 10,240 samples in a second
   }
   const InputCounters counters = hub.counters();
   EXPECT_LE(counters.accepted, 2000u) << "a burst of 1,000 and 1,000 per second";
@@ -305,13 +305,13 @@ TEST(InputHub, AFullBufferForgetsItsOldest) {
   static_assert(kSamples > kMaxBufferedSamples);
   MotionSamples samples;
   for (int i = 0; i < kSamples; ++i) {
-    samples.samples.push_back({i * kMs, pose_at(1e-3 * i)});
+    samples.samples.push_back({i * kMsInNs, pose_at(1e-3 * i)});
     if (samples.samples.size() < kSamples / 2) continue;
-    hub.push(1, samples, kStart + i * kMs);
+    hub.push(1, samples, kStart + i * kMsInNs);
     samples.samples.clear();
   }
   EXPECT_EQ(hub.counters().dropped_oldest, kSamples - kMaxBufferedSamples);
-  EXPECT_EQ(hub.sample(kStart + kSamples * kMs).world_from_head, pose_at(1e-3 * (kSamples - 1)));
+  EXPECT_EQ(hub.sample(kStart + kSamples * kMsInNs).world_from_head, pose_at(1e-3 * (kSamples - 1)));
 }
 
 // Two samples in one packet may be microseconds apart: that is the network's haste, not the head's.
@@ -319,38 +319,38 @@ TEST(InputHub, SamplesThatAreCloseTogetherAreNoTeleport) {
   InputHub hub;
   hub.push(1, motion(0, pose_at(0.0)), kStart);
   (void)hub.sample(kStart);
-  hub.push(1, motion(10'000, pose_at(2e-3)), kStart + 16 * kMs);
-  hub.push(1, motion(20'000, pose_at(4e-3)), kStart + 16 * kMs);
-  EXPECT_FALSE(hub.sample(kStart + 16 * kMs).has_teleported);
+  hub.push(1, motion(10'000, pose_at(2e-3)), kStart + 16 * kMsInNs);
+  hub.push(1, motion(20'000, pose_at(4e-3)), kStart + 16 * kMsInNs);
+  EXPECT_FALSE(hub.sample(kStart + 16 * kMsInNs).has_teleported);
 }
 
 TEST(InputHub, TheWindStaysWithItsSourceUntilThatIsSilentForLong) {
   InputHub hub;
   hub.push(1, wind(0, {1.0f, 0.0f, 0.0f}), kStart);
-  hub.push(2, wind(0, {2.0f, 0.0f, 0.0f}), kStart + kWindStaleNs - kMs);
+  hub.push(2, wind(0, {2.0f, 0.0f, 0.0f}), kStart + kWindStaleNs - kMsInNs);
   EXPECT_EQ(hub.counters().not_owner, 1u);
-  hub.push(2, wind(kMs, {2.0f, 0.0f, 0.0f}), kStart + kWindStaleNs + kMs);
+  hub.push(2, wind(kMsInNs, {2.0f, 0.0f, 0.0f}), kStart + kWindStaleNs + kMsInNs);
   EXPECT_EQ(hub.counters().not_owner, 1u);
-  EXPECT_EQ(hub.sample(kStart + kWindStaleNs + kMs).wind_mps, glm::vec3(2.0f, 0.0f, 0.0f));
+  EXPECT_EQ(hub.sample(kStart + kWindStaleNs + kMsInNs).wind_mps, glm::vec3(2.0f, 0.0f, 0.0f));
 }
 
 TEST(InputHub, WindStreamReplacesTheScenesWindWhileItLives) {
   InputHub hub;
   hub.push(7, wind(0, {1, 0, 0}), kStart);
-  hub.push(7, wind(100 * kMs, {3, 0, 0}), kStart + 100 * kMs);
-  hub.push(8, wind(100 * kMs, {9, 9, 9}), kStart + 100 * kMs);
-  InputFrame frame = hub.sample(kStart + 50 * kMs);
+  hub.push(7, wind(100 * kMsInNs, {3, 0, 0}), kStart + 100 * kMsInNs);
+  hub.push(8, wind(100 * kMsInNs, {9, 9, 9}), kStart + 100 * kMsInNs);
+  InputFrame frame = hub.sample(kStart + 50 * kMsInNs);
   EXPECT_TRUE(frame.has_wind_stream);
   EXPECT_FALSE(frame.has_motion);
   EXPECT_NEAR(frame.wind_mps.x, 2.0f, 1e-6);
-  frame = hub.sample(kStart + 100 * kMs + kWindStaleNs);
+  frame = hub.sample(kStart + 100 * kMsInNs + kWindStaleNs);
   EXPECT_EQ(frame.wind_mps, glm::vec3(3, 0, 0));
-  EXPECT_FALSE(hub.sample(kStart + 101 * kMs + kWindStaleNs).has_wind_stream);
+  EXPECT_FALSE(hub.sample(kStart + 101 * kMsInNs + kWindStaleNs).has_wind_stream);
   EXPECT_EQ(hub.counters().not_owner, 1u);
-  hub.push(8, wind(0, {4, 0, 0}), kStart + 102 * kMs + kWindStaleNs);
-  EXPECT_TRUE(hub.sample(kStart + 102 * kMs + kWindStaleNs).has_wind_stream);
+  hub.push(8, wind(0, {4, 0, 0}), kStart + 102 * kMsInNs + kWindStaleNs);
+  EXPECT_TRUE(hub.sample(kStart + 102 * kMsInNs + kWindStaleNs).has_wind_stream);
   hub.remove_source(8);
-  EXPECT_FALSE(hub.sample(kStart + 102 * kMs + kWindStaleNs).has_wind_stream);
+  EXPECT_FALSE(hub.sample(kStart + 102 * kMsInNs + kWindStaleNs).has_wind_stream);
 }
 
 /// One random call sequence; numbers from tiny to impossible.
@@ -374,16 +374,16 @@ std::vector<InputFrame> play_garbage(uint32_t seed) {
   std::vector<InputFrame> frames;
   int64_t now = kStart;
   for (int i = 0; i < 400; ++i) {
-    now += static_cast<int64_t>(random() % 40) * kMs - 2 * kMs;
+    now += static_cast<int64_t>(random() % 40) * kMsInNs - 2 * kMsInNs;
     const uint64_t source = random() % 3;
     const int64_t time_ns = random() % 10 == 0 ? static_cast<int64_t>(random())
-                                               : now - static_cast<int64_t>(random() % 100) * kMs;
+                                               : now - static_cast<int64_t>(random() % 100) * kMsInNs;
     MotionSamples samples;
     WindSamples winds;
     for (uint64_t k = 0; k < random() % 5; ++k) {
       const Pose pose{{number(), number(), number()}, {number(), number(), number(), number()}};
       samples.samples.push_back(
-          {time_ns + static_cast<int64_t>(k) * kMs, random() % 2 ? pose : pose_at(0.001 * i)});
+          {time_ns + static_cast<int64_t>(k) * kMsInNs, random() % 2 ? pose : pose_at(0.001 * i)});
       winds.samples.push_back({time_ns, {static_cast<float>(number()), 0.0f, static_cast<float>(number())}});
     }
     hub.push(source, samples, now);
@@ -415,15 +415,15 @@ TEST(InputHub, AnyThreadMayPushWhileAnotherSamples) {
   InputHub hub;
   std::thread source([&] {
     for (int i = 0; i < 900; ++i) {
-      hub.push(1, motion(i * kMs, pose_at(0.001 * i)), kStart + i * kMs);
-      hub.push(2, wind(i * kMs, {1, 0, 0}), kStart + i * kMs);
+      hub.push(1, motion(i * kMsInNs, pose_at(0.001 * i)), kStart + i * kMsInNs);
+      hub.push(2, wind(i * kMsInNs, {1, 0, 0}), kStart + i * kMsInNs);
     }
     hub.remove_source(2);
   });
-  for (int i = 0; i < 900; ++i) EXPECT_TRUE(is_finite(hub.sample(kStart + i * kMs).world_from_head));
+  for (int i = 0; i < 900; ++i) EXPECT_TRUE(is_finite(hub.sample(kStart + i * kMsInNs).world_from_head));
   source.join();
   EXPECT_EQ(hub.counters().accepted, 1800u - hub.counters().rejected());
-  EXPECT_EQ(hub.sample(kStart + 900 * kMs).world_from_head, pose_at(0.899));
+  EXPECT_EQ(hub.sample(kStart + 900 * kMsInNs).world_from_head, pose_at(0.899));
 }
 
 /// A sample with joints of the body.
@@ -439,23 +439,23 @@ TEST(InputHub, JointsGoWithTheHeadsSamples) {
   InputHub hub;
   EXPECT_TRUE(hub.sample(kStart).joints.name.empty());
   hub.push(1, with_joints(0, 0.0, {{0, 0, 0}, {1, 0, 0}}), kStart);
-  hub.push(1, with_joints(10 * kMs, 0.1, {{0, 0.5f, 0}, {1, 1, 0}}), kStart + kMs);
-  hub.push(2, with_joints(10 * kMs, 0.1, {{2, 2, 2}, {2, 2, 2}}), kStart + kMs);  // not the owner
-  const int64_t offset_ns = kStart + kMs - 10 * kMs;                              // by the fastest sample
-  const InputFrame half = hub.sample(offset_ns + 5 * kMs);
+  hub.push(1, with_joints(10 * kMsInNs, 0.1, {{0, 0.5f, 0}, {1, 1, 0}}), kStart + kMsInNs);
+  hub.push(2, with_joints(10 * kMsInNs, 0.1, {{2, 2, 2}, {2, 2, 2}}), kStart + kMsInNs);  // not the owner
+  const int64_t offset_ns = kStart + kMsInNs - 10 * kMsInNs;  // by the fastest sample
+  const InputFrame half = hub.sample(offset_ns + 5 * kMsInNs);
   EXPECT_EQ(half.joints.name, (std::vector<std::string>{"neck", "chest"}));
   ASSERT_EQ(half.joints.place_m.size(), 2u);
   EXPECT_NEAR(glm::distance(half.joints.place_m[0], glm::dvec3(0, 0.25, 0)), 0.0, 1e-6)
       << "between, as the head is";
   EXPECT_NEAR(half.world_from_head.position_m.x, 0.05, 1e-6);
-  EXPECT_EQ(hub.sample(offset_ns + 10 * kMs).joints.place_m[1], glm::dvec3(1, 1, 0));
+  EXPECT_EQ(hub.sample(offset_ns + 10 * kMsInNs).joints.place_m[1], glm::dvec3(1, 1, 0));
   EXPECT_EQ(hub.counters().not_owner, 1u);
   // Other names, or none: nothing is between the two.
-  hub.push(1, with_joints(20 * kMs, 0.1, {{7, 0, 0}}, {"tail"}), kStart + 11 * kMs);
-  EXPECT_EQ(hub.sample(offset_ns + 15 * kMs).joints.name.size(), 2u);
-  EXPECT_EQ(hub.sample(offset_ns + 20 * kMs).joints.name, std::vector<std::string>{"tail"});
-  hub.push(1, motion(30 * kMs, pose_at(0.1)), kStart + 21 * kMs);
-  EXPECT_TRUE(hub.sample(offset_ns + 30 * kMs).joints.place_m.empty()) << "an older source";
+  hub.push(1, with_joints(20 * kMsInNs, 0.1, {{7, 0, 0}}, {"tail"}), kStart + 11 * kMsInNs);
+  EXPECT_EQ(hub.sample(offset_ns + 15 * kMsInNs).joints.name.size(), 2u);
+  EXPECT_EQ(hub.sample(offset_ns + 20 * kMsInNs).joints.name, std::vector<std::string>{"tail"});
+  hub.push(1, motion(30 * kMsInNs, pose_at(0.1)), kStart + 21 * kMsInNs);
+  EXPECT_TRUE(hub.sample(offset_ns + 30 * kMsInNs).joints.place_m.empty()) << "an older source";
 }
 
 TEST(InputHub, ImpossibleJointsAreRefusedWithTheirSample) {
@@ -470,4 +470,4 @@ TEST(InputHub, ImpossibleJointsAreRefusedWithTheirSample) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::input_hub_test

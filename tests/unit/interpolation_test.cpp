@@ -1,5 +1,6 @@
 // What is shown between states, against motions whose truth is known at every moment.
 #include "common/replay/interpolation.h"
+#include "common/base/units.h"
 
 #include <cmath>
 #include <numbers>
@@ -7,10 +8,9 @@
 
 #include "common/replay/position_blend.h"
 
-namespace strandcast {
+namespace strandcast::interpolation_test {
 namespace {
 
-constexpr double kNsPerS = 1e9;
 constexpr int kParts = 16;  // moments looked at between two states
 
 int64_t ns(double seconds) {
@@ -374,4 +374,4 @@ TEST(Interpolation, TakesTheCubicWhereFourStatesAreNearEnough) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::interpolation_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace strandcast {
+namespace strandcast::ip_address_test {
 namespace {
 
 TEST(IpAddress, ReadsNumericTextOnly) {
@@ -74,4 +74,4 @@ TEST(AddressRange, RefusesAllElse) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::ip_address_test

@@ -6,7 +6,7 @@
 #include "common/pictures/picture.h"
 #include "tests/support/test_pictures.h"
 
-namespace strandcast {
+namespace strandcast::jpeg_tiles_test {
 namespace {
 
 using test::in_grey;
@@ -192,4 +192,4 @@ TEST_F(HostileTiles, DamageAnywhereNeverCrashesAndNeverLeavesHalfAPicture) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::jpeg_tiles_test

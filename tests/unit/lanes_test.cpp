@@ -13,7 +13,7 @@
 #include "common/simd/lane_matrices.h"
 #include "common/simd/variants.h"
 
-namespace strandcast {
+namespace strandcast::lanes_test {
 namespace {
 
 using simd::InstructionSet;
@@ -153,4 +153,4 @@ TEST(Laws, StrandsComeOutOfTheSkinAlikeForAnySteps) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::lanes_test

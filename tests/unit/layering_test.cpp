@@ -8,7 +8,7 @@
 
 #include "common/base/file.h"
 
-namespace strandcast {
+namespace strandcast::layering_test {
 namespace {
 
 using testing::HasSubstr;
@@ -269,4 +269,4 @@ TEST(Layering, LeavesRightIncludesAlone) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::layering_test

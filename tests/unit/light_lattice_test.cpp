@@ -9,7 +9,7 @@
 #include "common/groom/mesh.h"
 #include "common/render/tiles/tile_frame.h"
 
-namespace strandcast {
+namespace strandcast::light_lattice_test {
 namespace {
 
 // Of the lattice: a strand takes out 0.6 of the light that falls on its width, and is met at pi / 4 on
@@ -251,4 +251,4 @@ TEST_F(LightLatticeTest, StrandsThatAreNoNumbersCastNothing) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::light_lattice_test

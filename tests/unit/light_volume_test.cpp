@@ -3,7 +3,7 @@
 #include <cmath>
 #include <glm/glm.hpp>
 
-namespace strandcast {
+namespace strandcast::light_volume_test {
 namespace {
 
 constexpr float kCellM = 0.01f;
@@ -156,4 +156,4 @@ TEST(LightVolume, CoordinatesThatAreNoNumbersAreIgnored) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::light_volume_test

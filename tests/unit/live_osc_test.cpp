@@ -2,7 +2,7 @@
 #include "server/input/live/osc_reader.h"
 #include "tests/support/live_packets.h"
 
-namespace strandcast {
+namespace strandcast::live_osc_test {
 namespace {
 
 using test::osc;
@@ -158,4 +158,4 @@ TEST(OscReader, LeavesOutWhatNobodyKnows) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::live_osc_test

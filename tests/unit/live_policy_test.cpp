@@ -1,19 +1,18 @@
 // What every live input has to hold, whatever is sent: the head is always somewhere, in order of time, no
 // faster than a head, and counts say what became of each pose. Time is virtual.
 #include "server/input/live/live_policy.h"
+#include "common/base/units.h"
 
 #include <algorithm>
+#include <numbers>
 #include <random>
 
 #include "server/input/input_hub.h"
 
-namespace strandcast {
+namespace strandcast::live_policy_test {
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
-constexpr int64_t kStart = 1'000 * kMs;
+constexpr int64_t kStart = 1'000 * kMsInNs;
 constexpr int64_t kPeriod = 16'666'667;
-constexpr double kPi = 3.14159265358979323846;
 
 /// A head that walks and looks around, as fast as people do.
 Pose walking(int64_t time_ns) {
@@ -43,7 +42,7 @@ class Stage {
  public:
   explicit Stage(bool turns_only = false) : policy(turns_only) {}
   void until(int64_t time_ns) {
-    for (; now_ns < time_ns; now_ns += 5 * kMs) keep(now_ns);
+    for (; now_ns < time_ns; now_ns += 5 * kMsInNs) keep(now_ns);
     now_ns = time_ns;
     keep(now_ns);
   }
@@ -99,10 +98,10 @@ void expect_counts(const LivePolicyCounters& found, const LivePolicyCounters& ex
 
 TEST(LivePolicy, WhatIsRightPassesAsItIs) {
   Stage stage;
-  for (uint32_t i = 0; i < 300; ++i) stage.send(numbered(i), kStart + i * kPeriod + 2 * kMs);
+  for (uint32_t i = 0; i < 300; ++i) stage.send(numbered(i), kStart + i * kPeriod + 2 * kMsInNs);
   ASSERT_EQ(stage.heads.size(), 300u);
   for (uint32_t i = 0; i < 300; ++i) {
-    EXPECT_EQ(stage.heads[i].time_ns, kStart + i * kPeriod + 2 * kMs);
+    EXPECT_EQ(stage.heads[i].time_ns, kStart + i * kPeriod + 2 * kMsInNs);
     EXPECT_LT(
         glm::distance(stage.heads[i].world_from_head.position_m, walking(kStart + i * kPeriod).position_m),
         1e-12);
@@ -117,7 +116,7 @@ TEST(LivePolicy, TimesAreThoseOfTheSourceWithoutItsJitter) {
   Stage stage;
   std::mt19937 random(3);
   for (uint32_t i = 0; i < 200; ++i)
-    stage.send(numbered(i), kStart + i * kPeriod + static_cast<int64_t>(i == 0 ? 0 : random() % 8) * kMs);
+    stage.send(numbered(i), kStart + i * kPeriod + static_cast<int64_t>(i == 0 ? 0 : random() % 8) * kMsInNs);
   for (uint32_t i = 0; i < 200; ++i) EXPECT_EQ(stage.heads[i].time_ns, kStart + i * kPeriod);
 }
 
@@ -145,7 +144,7 @@ TEST(LivePolicy, WhateverComesTheHeadIsSomewhereAndNoFasterThanAHead) {
       LivePose pose = numbered(i);
       // Some come a place late.
       const int64_t delay_ms = is_needed ? 0 : chance(15) ? 18 + random() % 8 : random() % 4;
-      const int64_t arrival_ns = time_ns + delay_ms * kMs;
+      const int64_t arrival_ns = time_ns + delay_ms * kMsInNs;
       if (!is_needed && chance(4)) {
         ++impossible;
         ++never_sent;  // to the order it never came
@@ -155,7 +154,7 @@ TEST(LivePolicy, WhateverComesTheHeadIsSomewhereAndNoFasterThanAHead) {
           pose.world_from_subject.position_m.y = kNothing;
       } else if (!is_needed && chance(5)) {
         ++twice;
-        sent.push_back({arrival_ns + 4 * kMs, pose});
+        sent.push_back({arrival_ns + 4 * kMsInNs, pose});
       }
       sent.push_back({arrival_ns, pose});
     }
@@ -163,7 +162,7 @@ TEST(LivePolicy, WhateverComesTheHeadIsSomewhereAndNoFasterThanAHead) {
                      [](const Sent& a, const Sent& b) { return a.arrival_ns < b.arrival_ns; });
     Stage stage;
     for (const Sent& one : sent) stage.send(one.pose, one.arrival_ns);
-    stage.until(sent.back().arrival_ns + 30 * kMs);
+    stage.until(sent.back().arrival_ns + 30 * kMsInNs);
     stage.expect_always_somewhere();
     stage.expect_no_faster_than_a_head();
     const LivePolicyCounters& counters = stage.policy.counters();
@@ -185,20 +184,20 @@ LivePose framed(uint32_t frame) {
 TEST(LivePolicy, OrderIsThatOfTheNumbersAsFarAsIsWaited) {
   Stage stage;
   int64_t time_ns = kStart;
-  for (uint32_t i : {0u, 1u, 3u, 2u, 4u}) stage.send(framed(i), time_ns += 10 * kMs);
+  for (uint32_t i : {0u, 1u, 3u, 2u, 4u}) stage.send(framed(i), time_ns += 10 * kMsInNs);
   ASSERT_EQ(stage.heads.size(), 5u);
   for (uint32_t i = 0; i < 5; ++i)
     EXPECT_NEAR(stage.heads[i].world_from_head.position_m.x, 1e-3 * i, 1e-9) << i;
   expect_counts(stage.policy.counters(), {.resequenced = 1});
 
   // One that never comes is waited for 20 ms.
-  stage.send(framed(6), time_ns += 10 * kMs);
-  stage.until(time_ns + 19 * kMs);
+  stage.send(framed(6), time_ns += 10 * kMsInNs);
+  stage.until(time_ns + 19 * kMsInNs);
   EXPECT_EQ(stage.heads.size(), 5u);
-  stage.until(time_ns + 20 * kMs);
+  stage.until(time_ns + 20 * kMsInNs);
   ASSERT_EQ(stage.heads.size(), 6u);
   EXPECT_NEAR(stage.last().position_m.x, 6e-3, 1e-9);
-  stage.send(framed(5), time_ns + 21 * kMs);
+  stage.send(framed(5), time_ns + 21 * kMsInNs);
   EXPECT_EQ(stage.heads.size(), 6u);
   expect_counts(stage.policy.counters(), {.resequenced = 1, .late = 1, .lost = 1});
 }
@@ -206,9 +205,9 @@ TEST(LivePolicy, OrderIsThatOfTheNumbersAsFarAsIsWaited) {
 TEST(LivePolicy, NoMoreThanThreeWait) {
   Stage stage;
   stage.send(framed(0), kStart);
-  for (uint32_t i : {2u, 3u, 4u}) stage.send(framed(i), kStart + i * kMs);
+  for (uint32_t i : {2u, 3u, 4u}) stage.send(framed(i), kStart + i * kMsInNs);
   EXPECT_EQ(stage.heads.size(), 1u);
-  stage.send(framed(5), kStart + 5 * kMs);
+  stage.send(framed(5), kStart + 5 * kMsInNs);
   EXPECT_EQ(stage.heads.size(), 5u);
   expect_counts(stage.policy.counters(), {.lost = 1});
 }
@@ -261,11 +260,11 @@ TEST(LivePolicy, ASteadySourceWithTimesAloneIsPutInOrderToo) {
     return pose;
   };
   for (uint32_t i = 0; i < 40; ++i) stage.send(timed(i), kStart + i * kPeriod);
-  stage.send(timed(41), kStart + 40 * kPeriod + kMs);
+  stage.send(timed(41), kStart + 40 * kPeriod + kMsInNs);
   EXPECT_EQ(stage.heads.size(), 40u);
-  stage.send(timed(40), kStart + 40 * kPeriod + 2 * kMs);
+  stage.send(timed(40), kStart + 40 * kPeriod + 2 * kMsInNs);
   EXPECT_EQ(stage.heads.size(), 42u);
-  stage.send(timed(40), kStart + 40 * kPeriod + 3 * kMs);
+  stage.send(timed(40), kStart + 40 * kPeriod + 3 * kMsInNs);
   EXPECT_EQ(stage.policy.counters().resequenced, 1u);
   EXPECT_EQ(stage.policy.counters().late, 1u);
 }
@@ -274,9 +273,9 @@ TEST(LivePolicy, ABodyThatIsElsewhereForAMomentWasAnotherOne) {
   Stage stage;
   const Pose here{{0.0, 1.6, 0.0}, {1, 0, 0, 0}};
   const Pose there{{0.0, 1.6, 0.76}, {1, 0, 0, 0}};
-  for (int i = 0; i < 10; ++i) stage.send(live_pose(here), kStart + i * 10 * kMs);
-  for (int i = 10; i < 14; ++i) stage.send(live_pose(there), kStart + i * 10 * kMs);
-  for (int i = 14; i < 20; ++i) stage.send(live_pose(i % 2 ? here : there), kStart + i * 10 * kMs);
+  for (int i = 0; i < 10; ++i) stage.send(live_pose(here), kStart + i * 10 * kMsInNs);
+  for (int i = 10; i < 14; ++i) stage.send(live_pose(there), kStart + i * 10 * kMsInNs);
+  for (int i = 14; i < 20; ++i) stage.send(live_pose(i % 2 ? here : there), kStart + i * 10 * kMsInNs);
   for (const LiveHead& head : stage.heads)
     EXPECT_LT(glm::distance(head.world_from_head.position_m, here.position_m), 1e-12);
   EXPECT_EQ(stage.policy.counters().gated, 7u);
@@ -286,19 +285,19 @@ TEST(LivePolicy, ABodyThatStaysElsewhereHasJumped) {
   Stage stage;
   const Pose here{{0.0, 1.6, 0.0}, {1, 0, 0, 0}};
   const Pose there{{0.0, 1.6, 3.0}, {1, 0, 0, 0}};
-  for (int i = 0; i < 10; ++i) stage.send(live_pose(here), kStart + i * 10 * kMs);
+  for (int i = 0; i < 10; ++i) stage.send(live_pose(here), kStart + i * 10 * kMsInNs);
   int64_t believed_ns = 0;
   for (int i = 10; i < 40; ++i) {
-    stage.send(live_pose(there), kStart + i * 10 * kMs);
-    if (believed_ns == 0 && stage.last().position_m.z > 0.1) believed_ns = kStart + i * 10 * kMs;
+    stage.send(live_pose(there), kStart + i * 10 * kMsInNs);
+    if (believed_ns == 0 && stage.last().position_m.z > 0.1) believed_ns = kStart + i * 10 * kMsInNs;
   }
-  EXPECT_EQ(believed_ns, kStart + 100 * kMs + kGateNs);
+  EXPECT_EQ(believed_ns, kStart + 100 * kMsInNs + kGateNs);
   EXPECT_EQ(stage.policy.counters().gated, 10u);
   // The hub takes it for a jump, which strands are carried through, not for a head at 300 m/s.
   InputHub hub;
   bool has_teleported = false;
   size_t next = 0;
-  for (int64_t time_ns = kStart; time_ns < kStart + 400 * kMs; time_ns += 16 * kMs) {
+  for (int64_t time_ns = kStart; time_ns < kStart + 400 * kMsInNs; time_ns += 16 * kMsInNs) {
     for (; next < stage.heads.size() && stage.heads[next].time_ns <= time_ns; ++next)
       hub.push(1, MotionSamples{{{stage.heads[next].time_ns, stage.heads[next].world_from_head}}}, time_ns);
     const InputFrame frame = hub.sample(time_ns);
@@ -315,8 +314,8 @@ TEST(LivePolicy, ABodyThatStaysElsewhereHasJumped) {
 TEST(LivePolicy, AStepIsTakenAtTheSpeedOfAHead) {
   Stage stage;
   const Pose turned{{0.7, 0.0, 0.0}, glm::angleAxis(2.5, glm::dvec3(0, 1, 0))};
-  for (int i = 0; i < 10; ++i) stage.send(live_pose({}), kStart + i * 10 * kMs);
-  for (int i = 10; i < 40; ++i) stage.send(live_pose(turned), kStart + i * 10 * kMs);
+  for (int i = 0; i < 10; ++i) stage.send(live_pose({}), kStart + i * 10 * kMsInNs);
+  for (int i = 10; i < 40; ++i) stage.send(live_pose(turned), kStart + i * 10 * kMsInNs);
   stage.expect_no_faster_than_a_head();
   EXPECT_LT(glm::distance(stage.last().position_m, turned.position_m), 1e-12);
   EXPECT_LT(angle_between_rad(stage.last().rotation, turned.rotation), 1e-6);
@@ -332,7 +331,7 @@ TEST(LivePolicy, BurstsOfAHeadThatMovesAsHeadsDoAreNotClamped) {
     pose.frame.reset();
     pose.source_time_ns.reset();
     // Every second one comes late, right before the next.
-    stage.send(pose, kStart + i * kPeriod + (i % 2 ? 16 * kMs : 0));
+    stage.send(pose, kStart + i * kPeriod + (i % 2 ? 16 * kMsInNs : 0));
   }
   EXPECT_EQ(stage.policy.counters().clamped, 0u);
 }
@@ -345,10 +344,10 @@ TEST(LivePolicy, LossIsHeldThenEasedToRestThenStale) {
     const double t_s = 0.01 * i;
     return Pose{speed_mps * t_s, glm::angleAxis(turn_rad_per_s * t_s, glm::dvec3(0, 1, 0))};
   };
-  for (int i = 0; i <= 100; ++i) stage.send(live_pose(moving(i)), kStart + i * 10 * kMs);
-  const int64_t lost_ns = kStart + 1'000 * kMs;
+  for (int i = 0; i <= 100; ++i) stage.send(live_pose(moving(i)), kStart + i * 10 * kMsInNs);
+  const int64_t lost_ns = kStart + 1'000 * kMsInNs;
   const size_t before = stage.heads.size();
-  stage.until(lost_ns + kHoldNs - 5 * kMs);
+  stage.until(lost_ns + kHoldNs - 5 * kMsInNs);
   EXPECT_EQ(stage.heads.size(), before) << "the newest is held";
   stage.until(lost_ns + kMotionStaleNs);
   EXPECT_FALSE(stage.policy.is_stale(stage.now_ns));
@@ -365,7 +364,7 @@ TEST(LivePolicy, LossIsHeldThenEasedToRestThenStale) {
   }
   EXPECT_LT(glm::distance(stage.last().position_m, moving(100).position_m + speed_mps * on_s), 1e-6);
   const Pose at_rest = stage.last();
-  stage.until(lost_ns + kMotionStaleNs + 5 * kMs);
+  stage.until(lost_ns + kMotionStaleNs + 5 * kMsInNs);
   EXPECT_TRUE(stage.policy.is_stale(stage.now_ns));
   const size_t at_end = stage.heads.size();
   stage.until(lost_ns + 3 * kMotionStaleNs);
@@ -380,7 +379,7 @@ TEST(LivePolicy, LossIsHeldThenEasedToRestThenStale) {
 TEST(LivePolicy, AfterAGapTheHeadComesAfter) {
   Stage stage;
   for (uint32_t i = 0; i < 60; ++i) stage.send(live_pose({}), kStart + i * kPeriod);
-  const int64_t back_ns = kStart + 60 * kPeriod + 500 * kMs;
+  const int64_t back_ns = kStart + 60 * kPeriod + 500 * kMsInNs;
   const Pose moved{{0.6, 0.0, 0.0}, glm::angleAxis(1.0, glm::dvec3(0, 1, 0))};
   for (uint32_t i = 0; i < 30; ++i) stage.send(live_pose(moved), back_ns + i * kPeriod);
   stage.expect_no_faster_than_a_head();
@@ -389,8 +388,8 @@ TEST(LivePolicy, AfterAGapTheHeadComesAfter) {
 
 TEST(LivePolicy, WhatComesAfterASilenceIsBelievedWhereverItIs) {
   Stage stage;
-  for (int i = 0; i < 10; ++i) stage.send(live_pose({}), kStart + i * 10 * kMs);
-  stage.send(live_pose({{5.0, 0.0, 0.0}, {1, 0, 0, 0}}), kStart + 2'000 * kMs);
+  for (int i = 0; i < 10; ++i) stage.send(live_pose({}), kStart + i * 10 * kMsInNs);
+  stage.send(live_pose({{5.0, 0.0, 0.0}, {1, 0, 0, 0}}), kStart + 2'000 * kMsInNs);
   EXPECT_DOUBLE_EQ(stage.last().position_m.x, 5.0);
   EXPECT_EQ(stage.policy.counters().gated, 0u);
   EXPECT_EQ(stage.policy.counters().clamped, 0u);
@@ -398,9 +397,9 @@ TEST(LivePolicy, WhatComesAfterASilenceIsBelievedWhereverItIs) {
 
 TEST(LivePolicy, AnotherSubjectIsBelievedAtOnce) {
   Stage stage;
-  for (int i = 0; i < 10; ++i) stage.send(live_pose({}), kStart + i * 10 * kMs);
+  for (int i = 0; i < 10; ++i) stage.send(live_pose({}), kStart + i * 10 * kMsInNs);
   stage.policy.begin_another();
-  stage.send(live_pose({{2.0, 0.0, 0.0}, {1, 0, 0, 0}}), kStart + 100 * kMs);
+  stage.send(live_pose({{2.0, 0.0, 0.0}, {1, 0, 0, 0}}), kStart + 100 * kMsInNs);
   EXPECT_DOUBLE_EQ(stage.last().position_m.x, 2.0);
 }
 
@@ -426,7 +425,7 @@ TEST(LivePolicy, ImpossiblePosesAreCountedAndLeftOut) {
                            Pose{{0, 0, 0}, {kNan, 0, 0, 0}}, Pose{{0, 0, 0}, {0, 0, 0, 0}},
                            Pose{{0, 0, 0}, {0.49, 0, 0, 0}}, Pose{{0, 0, 0}, {2.01, 0, 0, 0}},
                            Pose{{2e4, 0, 0}, {1, 0, 0, 0}}, Pose{{1e308, 1e308, 1e308}, {1, 0, 0, 0}}})
-    stage.send(live_pose(pose), kStart + static_cast<int64_t>(++sent) * kMs);
+    stage.send(live_pose(pose), kStart + static_cast<int64_t>(++sent) * kMsInNs);
   EXPECT_EQ(stage.policy.counters().impossible, sent);
   EXPECT_EQ(stage.heads.size(), 1u);
 }
@@ -435,7 +434,7 @@ TEST(LivePolicy, WhatIsSeenWhenCalibratedIsRest) {
   Stage stage;
   EXPECT_FALSE(stage.policy.calibrate(kStart)) << "nothing is seen";
   // The performer faces +X of the stage, the tracker leans forward on the head.
-  const glm::dquat heading = glm::angleAxis(kPi / 2, glm::dvec3(0, 1, 0));
+  const glm::dquat heading = glm::angleAxis(std::numbers::pi / 2, glm::dvec3(0, 1, 0));
   const glm::dquat mount = glm::angleAxis(0.4, glm::normalize(glm::dvec3(1, 0, 0.3)));
   const auto seen = [&](const Pose& head) {
     return live_pose(
@@ -443,7 +442,7 @@ TEST(LivePolicy, WhatIsSeenWhenCalibratedIsRest) {
   };
   int64_t time_ns = kStart;
   const auto show = [&](const Pose& head) {
-    for (int i = 0; i < 60; ++i) stage.send(seen(head), time_ns += 10 * kMs);
+    for (int i = 0; i < 60; ++i) stage.send(seen(head), time_ns += 10 * kMsInNs);
   };
   show({});
   ASSERT_TRUE(stage.policy.calibrate(time_ns));
@@ -474,7 +473,7 @@ TEST(LivePolicy, CalibrationTakesOutHeadingAndTiltExactly) {
       const auto show = [&](const Pose& head) {
         for (int i = 0; i < 60; ++i)
           stage.send(live_pose({heading * head.position_m, heading * head.rotation * mount}),
-                     time_ns += 10 * kMs);
+                     time_ns += 10 * kMsInNs);
       };
       show({});
       ASSERT_TRUE(stage.policy.calibrate(time_ns));
@@ -487,7 +486,7 @@ TEST(LivePolicy, CalibrationTakesOutHeadingAndTiltExactly) {
 
 TEST(LivePolicy, JointsAreToldFromTheHead) {
   Stage stage;
-  LivePose pose = live_pose({{1.0, 1.5, 2.0}, glm::angleAxis(kPi / 2, glm::dvec3(0, 1, 0))});
+  LivePose pose = live_pose({{1.0, 1.5, 2.0}, glm::angleAxis(std::numbers::pi / 2, glm::dvec3(0, 1, 0))});
   pose.joint_names = {"neck", "neck", "", "far", std::string(33, 'x'), "left_shoulder"};
   pose.joint_m = {{1.0, 1.4, 2.0}, {0, 0, 0}, {0, 0, 0}, {99, 0, 0}, {1, 1, 1}, {1.0, 1.3, 1.8}};
   stage.send(pose, kStart);
@@ -503,17 +502,17 @@ TEST(LivePolicy, JointsAreToldFromTheHead) {
 TEST(LivePolicy, AHeadThatOnlyTurnsStaysWhereItIs) {
   Stage turns(true), told;
   for (int i = 0; i < 50; ++i) {
-    LivePose pose = live_pose(walking(kStart + i * 10 * kMs));
-    turns.send(pose, kStart + i * 10 * kMs);
+    LivePose pose = live_pose(walking(kStart + i * 10 * kMsInNs));
+    turns.send(pose, kStart + i * 10 * kMsInNs);
     pose.has_position = false;
-    told.send(pose, kStart + i * 10 * kMs);
+    told.send(pose, kStart + i * 10 * kMsInNs);
   }
   for (const Stage* stage : {&turns, &told}) {
     ASSERT_EQ(stage->heads.size(), 50u);
     for (const LiveHead& head : stage->heads) EXPECT_EQ(head.world_from_head.position_m, glm::dvec3(0.0));
-    EXPECT_LT(angle_between_rad(stage->last().rotation, walking(kStart + 490 * kMs).rotation), 1e-6);
+    EXPECT_LT(angle_between_rad(stage->last().rotation, walking(kStart + 490 * kMsInNs).rotation), 1e-6);
   }
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::live_policy_test

@@ -1,20 +1,19 @@
 // Whom a live input hears, who drives the head, and what it says of all that. Time is virtual; packets are
 // those of real protocols.
 #include "server/input/live/live_source.h"
+#include "common/base/units.h"
 
 #include "server/input/input_hub.h"
 #include "tests/support/live_packets.h"
 
-namespace strandcast {
+namespace strandcast::live_source_test {
 namespace {
 
 using testing::Contains;
 using testing::Field;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-constexpr int64_t kMs = 1'000'000;
-constexpr int64_t kStart = 1'000 * kMs;
+constexpr int64_t kStart = 1'000 * kMsInNs;
 const std::string kFirst = "127.0.0.1:50001";
 const std::string kSecond = "127.0.0.1:50002";
 
@@ -55,12 +54,12 @@ std::vector<std::string> texts(std::vector<LiveNote> notes) {
 TEST(LiveSource, TheFirstWhoSendsIsHeardUntilNothingComes) {
   const auto source = make({.protocol = "opentrack"});
   for (int i = 0; i <= 100; ++i) {
-    EXPECT_TRUE(source->take(kFirst, at_x(10), kStart + i * 10 * kMs));
-    EXPECT_TRUE(source->take(kSecond, at_x(50), kStart + i * 10 * kMs + kMs));
-    for (const glm::dvec3& place : places(source->advance(kStart + i * 10 * kMs + kMs)))
+    EXPECT_TRUE(source->take(kFirst, at_x(10), kStart + i * 10 * kMsInNs));
+    EXPECT_TRUE(source->take(kSecond, at_x(50), kStart + i * 10 * kMsInNs + kMsInNs));
+    for (const glm::dvec3& place : places(source->advance(kStart + i * 10 * kMsInNs + kMsInNs)))
       EXPECT_NEAR(place.x, 0.1, 1e-12);
   }
-  LiveInputStatus status = source->status(kStart + 1'000 * kMs);
+  LiveInputStatus status = source->status(kStart + 1'000 * kMsInNs);
   EXPECT_EQ(status.sender, kFirst);
   EXPECT_EQ(status.packets, 101u);
   EXPECT_EQ(status.received_bytes, 101u * 48u);
@@ -70,16 +69,16 @@ TEST(LiveSource, TheFirstWhoSendsIsHeardUntilNothingComes) {
   EXPECT_NEAR(status.age_ms, 0.0, 1e-9);
   EXPECT_FALSE(status.is_stale);
   // The first stops; the second is heard a second later, not before.
-  const int64_t last_ns = kStart + 1'000 * kMs;
+  const int64_t last_ns = kStart + 1'000 * kMsInNs;
   ASSERT_TRUE(source->take(kSecond, at_x(50), last_ns + kMotionStaleNs));
   EXPECT_EQ(source->status(last_ns + kMotionStaleNs).sender, kFirst);
-  const LiveSource::Due ended = source->advance(last_ns + kMotionStaleNs + kMs);
+  const LiveSource::Due ended = source->advance(last_ns + kMotionStaleNs + kMsInNs);
   EXPECT_TRUE(ended.has_ended);
-  EXPECT_TRUE(source->status(last_ns + kMotionStaleNs + kMs).is_stale);
-  EXPECT_TRUE(source->status(last_ns + kMotionStaleNs + kMs).sender.empty());
-  EXPECT_FALSE(source->advance(last_ns + kMotionStaleNs + 2 * kMs).has_ended) << "once";
-  ASSERT_TRUE(source->take(kSecond, at_x(50), last_ns + kMotionStaleNs + 2 * kMs));
-  status = source->status(last_ns + kMotionStaleNs + 2 * kMs);
+  EXPECT_TRUE(source->status(last_ns + kMotionStaleNs + kMsInNs).is_stale);
+  EXPECT_TRUE(source->status(last_ns + kMotionStaleNs + kMsInNs).sender.empty());
+  EXPECT_FALSE(source->advance(last_ns + kMotionStaleNs + 2 * kMsInNs).has_ended) << "once";
+  ASSERT_TRUE(source->take(kSecond, at_x(50), last_ns + kMotionStaleNs + 2 * kMsInNs));
+  status = source->status(last_ns + kMotionStaleNs + 2 * kMsInNs);
   EXPECT_EQ(status.sender, kSecond);
   EXPECT_FALSE(status.is_stale);
   const auto notes = texts(source->take_notes());
@@ -97,20 +96,20 @@ TEST(LiveSource, MalformedPacketsAreCountedAndHearNobody) {
   EXPECT_EQ(source->status(kStart).packets, 0u);
   EXPECT_TRUE(source->status(kStart).sender.empty());
   EXPECT_THAT(texts(source->take_notes()), Contains(HasSubstr("malformed packet from 127.0.0.1:50001")));
-  EXPECT_TRUE(source->take(kSecond, at_x(1), kStart + kMs));
-  EXPECT_EQ(source->status(kStart + kMs).sender, kSecond);
+  EXPECT_TRUE(source->take(kSecond, at_x(1), kStart + kMsInNs));
+  EXPECT_EQ(source->status(kStart + kMsInNs).sender, kSecond);
   // A flood of them fills no memory.
-  for (int i = 0; i < 10'000; ++i) (void)source->take(kSecond, test::PacketBytes(3), kStart + kMs);
+  for (int i = 0; i < 10'000; ++i) (void)source->take(kSecond, test::PacketBytes(3), kStart + kMsInNs);
   EXPECT_LE(source->take_notes().size(), 64u);
 }
 
 TEST(LiveSource, AThousandPacketsASecondAreTakenAndNoMore) {
   const auto source = make({.protocol = "opentrack"});
   int64_t time_ns = kStart;
-  for (int i = 0; i < 10'000; ++i) ASSERT_TRUE(source->take(kFirst, at_x(1), time_ns += kMs));
+  for (int i = 0; i < 10'000; ++i) ASSERT_TRUE(source->take(kFirst, at_x(1), time_ns += kMsInNs));
   EXPECT_EQ(source->status(time_ns).over_rate, 0u);
   // Ten times as many: what is beyond goes, and the next second is served again.
-  for (int i = 0; i < 100'000; ++i) ASSERT_TRUE(source->take(kFirst, at_x(1), time_ns += kMs / 10));
+  for (int i = 0; i < 100'000; ++i) ASSERT_TRUE(source->take(kFirst, at_x(1), time_ns += kMsInNs / 10));
   const LiveInputStatus status = source->status(time_ns);
   EXPECT_EQ(status.packets + status.over_rate, 110'000u);
   EXPECT_NEAR(static_cast<double>(status.packets), 10'000 + 10'000 + kMaxSampleBurst, 20);
@@ -119,8 +118,8 @@ TEST(LiveSource, AThousandPacketsASecondAreTakenAndNoMore) {
 TEST(LiveSource, BytesAreBoundedToo) {
   const auto source = make({.protocol = "vmc", .max_datagram_bytes = 65'507});
   test::PacketBytes large = test::osc("/VMC/Ext/Opt", {std::string(60'000, 'x')});
-  for (int i = 0; i < 1'000; ++i) (void)source->take(kFirst, large, kStart + i * kMs);
-  const LiveInputStatus status = source->status(kStart + 1'000 * kMs);
+  for (int i = 0; i < 1'000; ++i) (void)source->take(kFirst, large, kStart + i * kMsInNs);
+  const LiveInputStatus status = source->status(kStart + 1'000 * kMsInNs);
   EXPECT_LE(static_cast<double>(status.received_bytes), 2 * kMaxLiveBytesPerS);
   EXPECT_GT(status.over_rate, 900u);
 }
@@ -134,11 +133,11 @@ TEST(LiveSource, WhatCameBeforeAStepIsInIt) {
   double newest_m = 0.0;
   for (int i = 0; i < 2'000; ++i) {
     // 1,000 a second, the head at 0.5 m/s.
-    const int64_t time_ns = kStart + i * kMs;
+    const int64_t time_ns = kStart + i * kMsInNs;
     for (; next_step_ns <= time_ns; next_step_ns += step) {
       const InputFrame frame = hub.sample(next_step_ns);
       EXPECT_NEAR(frame.world_from_head.position_m.x, newest_m, 1e-9) << i;
-      EXPECT_LE(next_step_ns - frame.motion_time_ns, kMs) << i;
+      EXPECT_LE(next_step_ns - frame.motion_time_ns, kMsInNs) << i;
     }
     newest_m = 5e-4 * i;
     ASSERT_TRUE(source->take(kFirst, at_x(100.0 * newest_m), time_ns));
@@ -151,7 +150,7 @@ TEST(LiveSource, AHeadIsChosenElseTheFirst) {
   const auto source = make({.protocol = "vmc"});
   int64_t time_ns = kStart;
   const auto show = [&](const std::string& name, float height_m) {
-    (void)source->take(kFirst, tracker(name, height_m), time_ns += 10 * kMs);
+    (void)source->take(kFirst, tracker(name, height_m), time_ns += 10 * kMsInNs);
     return source->advance(time_ns);
   };
   EXPECT_EQ(places(show("waist", 1.0f)).size(), 1u);
@@ -174,11 +173,11 @@ TEST(LiveSource, ThePerformersHeadGoesBeforeTrackers) {
   EXPECT_EQ(source->status(kStart).subject, "LHR-1");
   for (int i = 1; i < 5; ++i) {
     (void)source->take(kFirst, test::vmc_head({0, 1.6f, 0}, {0, 0, 0, 1}, 0.01f * static_cast<float>(i)),
-                       kStart + i * 10 * kMs);
-    (void)source->take(kFirst, tracker("LHR-1", 1.0f), kStart + i * 10 * kMs + kMs);
+                       kStart + i * 10 * kMsInNs);
+    (void)source->take(kFirst, tracker("LHR-1", 1.0f), kStart + i * 10 * kMsInNs + kMsInNs);
   }
-  EXPECT_EQ(source->status(kStart + 50 * kMs).subject, "(no name)");
-  const auto seen = places(source->advance(kStart + 50 * kMs));
+  EXPECT_EQ(source->status(kStart + 50 * kMsInNs).subject, "(no name)");
+  const auto seen = places(source->advance(kStart + 50 * kMsInNs));
   ASSERT_FALSE(seen.empty());
   EXPECT_NEAR(seen.back().y, 1.6, 1e-6);
 }
@@ -193,10 +192,10 @@ TEST(LiveSource, ASkeletonsHeadIsAHead) {
   for (uint32_t i = 0; i < 3; ++i) {
     packet.frame = 10 + i;
     packet.time_s = 0.01 * i;
-    (void)source->take(kFirst, test::natnet(packet), kStart + i * 10 * kMs);
+    (void)source->take(kFirst, test::natnet(packet), kStart + i * 10 * kMsInNs);
   }
-  EXPECT_EQ(source->status(kStart + 30 * kMs).subject, "Actor/Head");
-  EXPECT_THAT(source->status(kStart + 30 * kMs).subjects, HasSubstr("Sword"));
+  EXPECT_EQ(source->status(kStart + 30 * kMsInNs).subject, "Actor/Head");
+  EXPECT_THAT(source->status(kStart + 30 * kMsInNs).subjects, HasSubstr("Sword"));
 }
 
 TEST(LiveSource, ANamedSubjectIsWaitedFor) {
@@ -205,12 +204,12 @@ TEST(LiveSource, ANamedSubjectIsWaitedFor) {
   EXPECT_TRUE(source->take(kFirst, camera(1, 1'000), time_ns));
   EXPECT_THAT(places(source->advance(time_ns)), IsEmpty());
   EXPECT_TRUE(source->status(time_ns).is_stale);
-  EXPECT_TRUE(source->take(kFirst, camera(2, 1'500), time_ns += kMs));
+  EXPECT_TRUE(source->take(kFirst, camera(2, 1'500), time_ns += kMsInNs));
   ASSERT_EQ(places(source->advance(time_ns)).size(), 1u);
   // Another one by command, which jumps there.
   source->choose_subject("1");
-  EXPECT_TRUE(source->take(kFirst, camera(2, 1'500), time_ns += kMs));
-  EXPECT_TRUE(source->take(kFirst, camera(1, 1'000), time_ns += kMs));
+  EXPECT_TRUE(source->take(kFirst, camera(2, 1'500), time_ns += kMsInNs));
+  EXPECT_TRUE(source->take(kFirst, camera(1, 1'000), time_ns += kMsInNs));
   const auto seen = places(source->advance(time_ns));
   ASSERT_FALSE(seen.empty());
   EXPECT_NEAR(seen.back().y, 1.0, 1e-9);
@@ -222,8 +221,8 @@ TEST(LiveSource, NamesOfStrangersAreFewAndPrintable) {
   const auto source = make({.protocol = "vmc"});
   (void)source->take(kFirst, tracker("a\x1b[2J\nb", 1.0f), kStart);
   for (int i = 0; i < 1'000; ++i)
-    (void)source->take(kFirst, tracker("t" + std::to_string(i), 1.0f), kStart + i * kMs / 10);
-  const LiveInputStatus status = source->status(kStart + 100 * kMs);
+    (void)source->take(kFirst, tracker("t" + std::to_string(i), 1.0f), kStart + i * kMsInNs / 10);
+  const LiveInputStatus status = source->status(kStart + 100 * kMsInNs);
   EXPECT_EQ(status.subjects.find('\x1b'), std::string::npos);
   EXPECT_EQ(status.subjects.find('\n'), std::string::npos);
   EXPECT_LE(std::count(status.subjects.begin(), status.subjects.end(), ','),
@@ -252,7 +251,7 @@ TEST(LiveSource, WindComesAlong) {
   const LiveSource::Due due = source->advance(kStart);
   ASSERT_EQ(due.wind.size(), 1u);
   EXPECT_EQ(due.wind[0].samples.front().velocity_mps, glm::vec3(1, 2, -3));
-  EXPECT_THAT(source->advance(kStart + kMs).wind, IsEmpty());
+  EXPECT_THAT(source->advance(kStart + kMsInNs).wind, IsEmpty());
 }
 
 TEST(LiveSource, WrongInputsAreToldWithTheirField) {
@@ -278,10 +277,10 @@ Walk walk(double scale, double step_cm, int steps) {
   const auto source = make({.protocol = "opentrack", .scale = scale});
   Walk walk;
   for (int i = 0; i <= steps; ++i) {
-    EXPECT_TRUE(source->take(kFirst, at_x(step_cm * i), kStart + i * 10 * kMs));
-    for (const glm::dvec3& place_m : places(source->advance(kStart + i * 10 * kMs))) walk.end_m = place_m;
+    EXPECT_TRUE(source->take(kFirst, at_x(step_cm * i), kStart + i * 10 * kMsInNs));
+    for (const glm::dvec3& place_m : places(source->advance(kStart + i * 10 * kMsInNs))) walk.end_m = place_m;
   }
-  walk.status = source->status(kStart + steps * 10 * kMs);
+  walk.status = source->status(kStart + steps * 10 * kMsInNs);
   return walk;
 }
 
@@ -296,7 +295,7 @@ TEST(LiveSource, PlacesAreScaledBeforeTheirSpeedIsJudged) {
   EXPECT_EQ(smaller.status.clamped, 0u) << "20 m/s are 5";
   // Four times as large it is 20 m/s, of which a head gets 10 m/s and the burst of the window.
   const Walk larger = walk(4.0, 5.0, kSteps);
-  const double most_m = kMaxLiveSpeedMps * (kSteps * 10 * kMs + kClampWindowNs) * 1e-9;
+  const double most_m = kMaxLiveSpeedMps * (kSteps * 10 * kMsInNs + kClampWindowNs) * 1e-9;
   EXPECT_GT(larger.status.clamped, 10u);
   EXPECT_LE(larger.end_m.x, most_m + 1e-9);
   EXPECT_GT(larger.end_m.x, most_m - kMaxLiveSpeedMps * kClampWindowNs * 1e-9 - 1e-9);
@@ -337,4 +336,4 @@ TEST(LiveSource, JointsAreScaledWithTheHead) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::live_source_test

@@ -6,7 +6,7 @@
 #include "tests/support/live_packets.h"
 #include "tests/support/live_poses.h"
 
-namespace strandcast {
+namespace strandcast::live_systems_test {
 namespace {
 
 using test::live_parser_of;
@@ -268,4 +268,4 @@ TEST(VrpnParser, HoldsItsLimits) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::live_systems_test

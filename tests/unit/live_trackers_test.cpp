@@ -7,7 +7,7 @@
 #include "tests/support/live_packets.h"
 #include "tests/support/live_poses.h"
 
-namespace strandcast {
+namespace strandcast::live_trackers_test {
 namespace {
 
 using test::live_parser_of;
@@ -229,4 +229,4 @@ TEST(LiveLinkFaceParser, TakesPacketsWithoutAFaceAndRefusesBrokenOnes) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::live_trackers_test

@@ -6,7 +6,7 @@
 #include "tests/support/live_packets.h"
 #include "tests/support/live_poses.h"
 
-namespace strandcast {
+namespace strandcast::live_vmc_test {
 namespace {
 
 using test::live_parser_of;
@@ -296,4 +296,4 @@ TEST(VmcParser, DescribesWhatCame) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::live_vmc_test

@@ -1,24 +1,23 @@
 // How much others may write into the log.
 #include "server/net/log_budget.h"
+#include "common/base/units.h"
 
 #include <gtest/gtest.h>
 
-namespace strandcast {
+namespace strandcast::log_budget_test {
 namespace {
-
-constexpr int64_t kSecondNs = 1'000'000'000;
-constexpr int64_t kStartNs = 5 * kSecondNs;
+constexpr int64_t kStartNs = 5 * kSInNs;
 
 TEST(LogBudget, TenLinesAMinuteForAnAddress) {
   LogBudget budget({});
   for (int i = 0; i < 10; ++i) EXPECT_TRUE(budget.take("a", kStartNs + i).is_written) << i;
   EXPECT_FALSE(budget.take("a", kStartNs + 10).is_written) << "one over";
   EXPECT_TRUE(budget.take("b", kStartNs + 10).is_written) << "others have theirs";
-  EXPECT_FALSE(budget.take("a", kStartNs + 60 * kSecondNs - 1).is_written);
-  const LogBudget::Verdict next = budget.take("a", kStartNs + 60 * kSecondNs);
+  EXPECT_FALSE(budget.take("a", kStartNs + 60 * kSInNs - 1).is_written);
+  const LogBudget::Verdict next = budget.take("a", kStartNs + 60 * kSInNs);
   EXPECT_TRUE(next.is_written);
   EXPECT_EQ(next.left_out, 2u) << "it is told how many there were";
-  EXPECT_EQ(budget.take("a", kStartNs + 60 * kSecondNs + 1).left_out, 0u) << "once";
+  EXPECT_EQ(budget.take("a", kStartNs + 60 * kSInNs + 1).left_out, 0u) << "once";
 }
 
 TEST(LogBudget, ThreeHundredLinesAMinuteForAllAndNoMoreAddressesInMemory) {
@@ -28,11 +27,11 @@ TEST(LogBudget, ThreeHundredLinesAMinuteForAllAndNoMoreAddressesInMemory) {
     written += budget.take(std::to_string(i), kStartNs + i).is_written ? 1 : 0;
   EXPECT_EQ(written, 300);
   EXPECT_LE(budget.size(), 300u);
-  const LogBudget::Verdict next = budget.take("new", kStartNs + 61 * kSecondNs);
+  const LogBudget::Verdict next = budget.take("new", kStartNs + 61 * kSInNs);
   EXPECT_TRUE(next.is_written);
   EXPECT_EQ(next.left_out, 100'000u - 300u);
   EXPECT_EQ(budget.size(), 1u);
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::log_budget_test

@@ -12,7 +12,7 @@
 #include "common/log/line_writer.h"
 #include "tests/support/log_capture.h"
 
-namespace strandcast {
+namespace strandcast::log_test {
 namespace {
 
 /// A pipe of a few pages; each line may begin a page of its own.
@@ -126,4 +126,4 @@ TEST(Log, AsJsonEveryLineIsOneObject) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::log_test

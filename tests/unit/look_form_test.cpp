@@ -13,18 +13,17 @@
 #include "client/app/save_scene.h"
 #include "client/window/form_panel.h"
 #include "common/base/file.h"
+#include "common/base/units.h"
 #include "common/scene/scene_file.h"
 #include "tests/support/look_variants.h"
 #include "tests/support/sample_look.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::look_form_test {
 namespace {
 
 using testing::Contains;
 using testing::HasSubstr;
-
-constexpr int64_t kS = 1'000'000'000;
 
 const FormField& field_of(const std::vector<FormField>& fields, const std::string& path) {
   const auto found =
@@ -113,13 +112,13 @@ TEST(LookForm, ColoursOfOnesOwnBeginWithThoseThatAreSeen) {
   LookDesc look = sample_look();
   look.hair_color = "red";
   control.follow({look, {}}, false);
-  ASSERT_TRUE(control.edit({{"hair_color", std::string("custom")}}, kS));
-  EXPECT_EQ(control.shown(kS).hair_color, "custom");
-  EXPECT_EQ(control.shown(kS).root_color, colors_of(look).root);
-  EXPECT_EQ(control.shown(kS).tip_color, colors_of(look).tip);
-  ASSERT_TRUE(control.edit({{"tip_color", glm::vec3(0.5f)}}, kS));
-  ASSERT_TRUE(control.edit({{"hair_color", std::string("custom")}}, kS));
-  EXPECT_EQ(control.shown(kS).tip_color, glm::vec3(0.5f)) << "they are one's own already";
+  ASSERT_TRUE(control.edit({{"hair_color", std::string("custom")}}, kSInNs));
+  EXPECT_EQ(control.shown(kSInNs).hair_color, "custom");
+  EXPECT_EQ(control.shown(kSInNs).root_color, colors_of(look).root);
+  EXPECT_EQ(control.shown(kSInNs).tip_color, colors_of(look).tip);
+  ASSERT_TRUE(control.edit({{"tip_color", glm::vec3(0.5f)}}, kSInNs));
+  ASSERT_TRUE(control.edit({{"hair_color", std::string("custom")}}, kSInNs));
+  EXPECT_EQ(control.shown(kSInNs).tip_color, glm::vec3(0.5f)) << "they are one's own already";
 }
 
 TEST(Form, DirectionsAreTwoAngles) {
@@ -146,16 +145,16 @@ LookChange scene_with(const LookDesc& look) {
 TEST(LookControl, WhoSteersChangesTheSceneForAll) {
   LookControl control;
   control.follow(scene_with(sample_look()), true);
-  EXPECT_FALSE(control.take_assignment(kS)) << "nothing was done";
-  ASSERT_TRUE(control.edit({{"exposure", 1.5}, {"style.clump", 0.5}}, kS));
-  const auto first = control.take_assignment(kS);
+  EXPECT_FALSE(control.take_assignment(kSInNs)) << "nothing was done";
+  ASSERT_TRUE(control.edit({{"exposure", 1.5}, {"style.clump", 0.5}}, kSInNs));
+  const auto first = control.take_assignment(kSInNs);
   ASSERT_TRUE(first);
   EXPECT_THAT(*first, testing::AllOf(HasSubstr("exposure: 1.5"), HasSubstr("style { clump: 0.5 }")));
   size_t sent = 0;
   std::string last;
-  int64_t time_ns = kS;
+  int64_t time_ns = kSInNs;
   for (int i = 1; i <= 100; ++i) {
-    time_ns += kS / 100;
+    time_ns += kSInNs / 100;
     ASSERT_TRUE(control.edit({{"exposure", 1.5 + 0.01 * i}}, time_ns));
     if (const auto assignment = control.take_assignment(time_ns)) {
       ++sent;
@@ -174,43 +173,44 @@ TEST(LookControl, ASliderStaysWhereItWasPutUntilTheServerSaysSomethingElse) {
   LookControl control;
   LookDesc look = sample_look();
   control.follow(scene_with(look), true);
-  ASSERT_TRUE(control.edit({{"exposure", 2.0}}, kS));
-  ASSERT_TRUE(control.take_assignment(kS));
+  ASSERT_TRUE(control.edit({{"exposure", 2.0}}, kSInNs));
+  ASSERT_TRUE(control.take_assignment(kSInNs));
   const auto exposure = [&](int64_t time_ns) {
     const FormState form = control.form(false, time_ns);
     return std::get<double>(field_of(form.fields, "exposure").value);
   };
-  EXPECT_EQ(exposure(kS + 1), 2.0);
+  EXPECT_EQ(exposure(kSInNs + 1), 2.0);
   look.ambient = 0.75f;
   control.follow(scene_with(look), true);
-  EXPECT_EQ(exposure(kS + 1), 2.0) << "a change of somebody else on its way";
-  EXPECT_EQ(control.shown(kS + 1).ambient, 0.75f);
-  EXPECT_EQ(exposure(kS + kLookHoldNs), sample_look().exposure) << "it was refused, or changed by another";
+  EXPECT_EQ(exposure(kSInNs + 1), 2.0) << "a change of somebody else on its way";
+  EXPECT_EQ(control.shown(kSInNs + 1).ambient, 0.75f);
+  EXPECT_EQ(exposure(kSInNs + kLookHoldNs), sample_look().exposure)
+      << "it was refused, or changed by another";
   // What could not be sent goes with the next.
-  ASSERT_TRUE(control.edit({{"exposure", 3.0}}, 5 * kS));
-  ASSERT_TRUE(control.take_assignment(5 * kS));
+  ASSERT_TRUE(control.edit({{"exposure", 3.0}}, 5 * kSInNs));
+  ASSERT_TRUE(control.take_assignment(5 * kSInNs));
   control.put_back();
-  EXPECT_EQ(control.take_assignment(6 * kS), "look={ exposure: 3 }");
+  EXPECT_EQ(control.take_assignment(6 * kSInNs), "look={ exposure: 3 }");
 }
 
 TEST(LookControl, WhoOnlyWatchesSeesALookOfTheirOwn) {
   LookControl control;
   control.follow(scene_with(sample_look()), false);
-  EXPECT_THAT(control.form(false, kS).notes, Contains(HasSubstr("you alone see")));
-  EXPECT_TRUE(control.form(false, kS).undo.empty());
-  ASSERT_TRUE(control.edit({{"hair_color", std::string("grey")}}, kS));
-  EXPECT_FALSE(control.take_assignment(kS)) << "nothing goes to the server";
+  EXPECT_THAT(control.form(false, kSInNs).notes, Contains(HasSubstr("you alone see")));
+  EXPECT_TRUE(control.form(false, kSInNs).undo.empty());
+  ASSERT_TRUE(control.edit({{"hair_color", std::string("grey")}}, kSInNs));
+  EXPECT_FALSE(control.take_assignment(kSInNs)) << "nothing goes to the server";
   ASSERT_TRUE(control.own_look());
   EXPECT_EQ(control.own_look()->hair_color, "grey");
   EXPECT_EQ(control.own_look()->exposure, sample_look().exposure);
-  const FormState form = control.form(true, kS);
+  const FormState form = control.form(true, kSInNs);
   EXPECT_THAT(form.notes, Contains(HasSubstr("Nobody else")));
   EXPECT_THAT(form.notes, Contains(HasSubstr("the server's pictures")));
   EXPECT_THAT(form.save_note, HasSubstr("Look and view alone"));
   ASSERT_FALSE(form.undo.empty());
   control.undo();
   EXPECT_FALSE(control.own_look());
-  EXPECT_EQ(control.shown(kS), sample_look());
+  EXPECT_EQ(control.shown(kSInNs), sample_look());
 }
 
 TEST(LookControl, NonsenseIsRefusedInOneSentenceAndTheRestCounts) {
@@ -218,12 +218,13 @@ TEST(LookControl, NonsenseIsRefusedInOneSentenceAndTheRestCounts) {
     LookControl control;
     control.follow(scene_with(sample_look()), is_steering);
     const Status status = control.edit(
-        {{"hair_color", std::string("purple")}, {"exposure", 2.0}, {"light_direction", glm::vec3(0.0f)}}, kS);
+        {{"hair_color", std::string("purple")}, {"exposure", 2.0}, {"light_direction", glm::vec3(0.0f)}},
+        kSInNs);
     ASSERT_FALSE(status);
     EXPECT_THAT(status.error().to_string(), HasSubstr("look.hair_color must be"));
-    EXPECT_EQ(control.shown(kS).exposure, 2.0f);
-    EXPECT_EQ(control.shown(kS).hair_color, sample_look().hair_color);
-    EXPECT_EQ(control.shown(kS).light_direction, sample_look().light_direction);
+    EXPECT_EQ(control.shown(kSInNs).exposure, 2.0f);
+    EXPECT_EQ(control.shown(kSInNs).hair_color, sample_look().hair_color);
+    EXPECT_EQ(control.shown(kSInNs).light_direction, sample_look().light_direction);
   }
 }
 
@@ -292,7 +293,7 @@ TEST(FormPanel, StaysInsideTheWindowWhateverItsSize) {
   FormActions actions;
   for (const ImVec2 area : {ImVec2{1280.0f, 720.0f}, ImVec2{320.0f, 240.0f}, ImVec2{16.0f, 16.0f}}) {
     PanelSize size;
-    for (int i = 0; i < 3; ++i) size = bench.turn(control.form(true, kS), actions, area);
+    for (int i = 0; i < 3; ++i) size = bench.turn(control.form(true, kSInNs), actions, area);
     EXPECT_LE(size.width, area.x);
     EXPECT_LE(size.height, std::max(area.y - ImGui::GetFontSize(), 0.0f)) << "with a margin";
   }
@@ -305,14 +306,14 @@ TEST(FormPanel, AnEditIsWhatThePersonTurned) {
   LookControl control;
   control.follow(scene_with(sample_look()), true);
   FormBench bench;
-  bench.picture(control.form(false, kS));
+  bench.picture(control.form(false, kSInNs));
   ImGuiIO& io = ImGui::GetIO();
   std::set<std::string> turned;
-  int64_t time_ns = kS;
+  int64_t time_ns = kSInNs;
   const auto turn = [&](const ImVec2& pointer, bool is_down) {
     io.MousePos = pointer;
     io.MouseDown[0] = is_down;
-    time_ns += kS / 60;
+    time_ns += kSInNs / 60;
     const FormState form = control.form(false, time_ns);
     const FormActions done = bench.picture(form);
     for (const FormEdit& edit : done.edits) {
@@ -331,7 +332,7 @@ TEST(FormPanel, AnEditIsWhatThePersonTurned) {
     }
   // A preset has the colour of roots and tips; sections that are folded show nothing to turn.
   EXPECT_EQ(turned, (std::set<std::string>{"background", "skin_color", "save"}));
-  const auto assignment = control.take_assignment(time_ns + kS);
+  const auto assignment = control.take_assignment(time_ns + kSInNs);
   ASSERT_TRUE(assignment);
   EXPECT_THAT(*assignment, testing::AllOf(HasSubstr("background {"), HasSubstr("skin_color {")));
   const auto changed = change_of(*assignment);
@@ -344,4 +345,4 @@ TEST(FormPanel, AnEditIsWhatThePersonTurned) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::look_form_test

@@ -1,6 +1,7 @@
 // What ModePolicy predicts and chooses, against numbers worked out by hand from its rules: rate is the least
 // of what stream, link, server and viewer allow; a picture 250 ms late is worth half.
 #include "server/app/mode_policy.h"
+#include "common/base/units.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,13 +9,11 @@
 #include "server/app/mode_facts.h"
 #include "server/net/flow_control.h"
 
-namespace strandcast {
+namespace strandcast::mode_policy_test {
 namespace {
 
 using testing::HasSubstr;
 using Limit = ModePrediction::Limit;
-
-constexpr int64_t kS = 1'000'000'000;
 
 /// Strands of 1 MB/s at 60 Hz or 0.2 MB/s at 10 Hz; pictures of 10 kB, 15 a second, drawn in 20 ms.
 ModeFacts facts() {
@@ -170,19 +169,19 @@ TEST(ModePolicy, DwellsAndDoublesWhenAChangeIsUndone) {
   slow.strand_draw_ms = 500.0;
   ModePolicy policy;
   EXPECT_EQ(choose_for(policy, StreamMode::Strands, slow, 1.0, 1.0).mode, StreamMode::Frames);
-  policy.note_change(2 * kS);
+  policy.note_change(2 * kSInNs);
   // Better at once, but the dwell of 5 s holds.
   EXPECT_EQ(choose_for(policy, StreamMode::Frames, facts(), 2.0, 4.75).mode, StreamMode::Frames);
   EXPECT_EQ(choose_for(policy, StreamMode::Frames, facts(), 7.0, 0.0).mode, StreamMode::Strands);
-  policy.note_change(7 * kS);
+  policy.note_change(7 * kSInNs);
   EXPECT_EQ(policy.dwell_ns(), 2 * kFirstDwellNs) << "undone after 5 s";
   EXPECT_EQ(choose_for(policy, StreamMode::Strands, slow, 7.0, 9.75).mode, StreamMode::Strands);
   EXPECT_EQ(choose_for(policy, StreamMode::Strands, slow, 17.0, 0.0).mode, StreamMode::Frames);
-  policy.note_change(17 * kS);
+  policy.note_change(17 * kSInNs);
   EXPECT_EQ(policy.dwell_ns(), 4 * kFirstDwellNs);
-  policy.note_change(60 * kS);
+  policy.note_change(60 * kSInNs);
   EXPECT_EQ(policy.dwell_ns(), kFirstDwellNs) << "it had lasted for more than twice 20 s";
-  for (int i = 0; i < 10; ++i) policy.note_change((61 + i) * kS);
+  for (int i = 0; i < 10; ++i) policy.note_change((61 + i) * kSInNs);
   EXPECT_EQ(policy.dwell_ns(), kLongestDwellNs);
 }
 
@@ -241,11 +240,12 @@ TEST(ModePolicy, WhatIsImpossibleWaitsForNoDwellButAFailureDoes) {
   ModeFacts blind = facts();
   blind.device = DrawingDevice::None;
   ModePolicy policy;
-  policy.note_change(kS);
-  EXPECT_EQ(policy.choose(StreamMode::Strands, blind, kS + 1).mode, StreamMode::Frames);
-  policy.note_failure(2 * kS);
-  EXPECT_EQ(policy.choose(StreamMode::Strands, blind, 2 * kS + 1).mode, StreamMode::Strands);
-  EXPECT_EQ(policy.choose(StreamMode::Strands, blind, 2 * kS + policy.dwell_ns()).mode, StreamMode::Frames);
+  policy.note_change(kSInNs);
+  EXPECT_EQ(policy.choose(StreamMode::Strands, blind, kSInNs + 1).mode, StreamMode::Frames);
+  policy.note_failure(2 * kSInNs);
+  EXPECT_EQ(policy.choose(StreamMode::Strands, blind, 2 * kSInNs + 1).mode, StreamMode::Strands);
+  EXPECT_EQ(policy.choose(StreamMode::Strands, blind, 2 * kSInNs + policy.dwell_ns()).mode,
+            StreamMode::Frames);
 }
 
 TEST(ModeFacts, GuessesUntilSomethingWasMeasured) {
@@ -287,4 +287,4 @@ TEST(ModeFacts, GuessesUntilSomethingWasMeasured) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::mode_policy_test

@@ -6,7 +6,7 @@
 #include "tests/support/claims.h"
 #include "tests/support/shared_data.h"
 
-namespace strandcast {
+namespace strandcast::motion_set_test {
 namespace {
 
 RunSetting rod_setting(uint32_t vertex_count, double rate_hz) {
@@ -289,4 +289,4 @@ TEST(StrandRun, EffortsStayWithinTheRow) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::motion_set_test

@@ -6,7 +6,7 @@
 
 #include "common/motion/wind_csv.h"
 
-namespace strandcast {
+namespace strandcast::motion_test {
 namespace {
 
 using testing::HasSubstr;
@@ -298,4 +298,4 @@ TEST(WindCsv, BridgesGapsAndCountsThem) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::motion_test

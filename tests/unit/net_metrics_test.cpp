@@ -4,7 +4,7 @@
 #include "server/net/net_server.h"
 #include "tests/support/metrics_text.h"
 
-namespace strandcast {
+namespace strandcast::net_metrics_test {
 namespace {
 
 struct Told {
@@ -52,4 +52,4 @@ TEST(NetMetrics, EveryCounterIsToldUnderItsOwnName) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::net_metrics_test

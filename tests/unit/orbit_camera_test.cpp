@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace strandcast {
+namespace strandcast::orbit_camera_test {
 namespace {
 
 constexpr float kTolerance = 1e-5f;
@@ -102,4 +102,4 @@ TEST(OrbitCamera, ResetReturnsHomeAndADegenerateHomeIsReplaced) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::orbit_camera_test

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace strandcast {
+namespace strandcast::page_test {
 namespace {
 
 using testing::HasSubstr;
@@ -66,4 +66,4 @@ TEST(PagePolicy, AllowsOwnScriptsAndConnectionsAndNothingElse) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::page_test

@@ -6,7 +6,7 @@
 #include "server/report/pareto.h"
 #include "server/report/swing_fit.h"
 
-namespace strandcast {
+namespace strandcast::pareto_test {
 namespace {
 
 using testing::ElementsAre;
@@ -95,4 +95,4 @@ TEST(SwingFit, FindsGrowthAndSwing) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::pareto_test

@@ -1,6 +1,6 @@
 #include "common/gl/pass_list.h"
 
-namespace strandcast::gl {
+namespace strandcast::gl::pass_list_test {
 namespace {
 
 using testing::ElementsAre;
@@ -159,4 +159,4 @@ TEST_F(PassListTest, AnImpossibleWishLeavesTheOldDecision) {
 }
 
 }  // namespace
-}  // namespace strandcast::gl
+}  // namespace strandcast::gl::pass_list_test

@@ -3,7 +3,7 @@
 #include <random>
 #include <set>
 
-namespace strandcast::gl {
+namespace strandcast::gl::pass_plan_test {
 namespace {
 
 using testing::ElementsAre;
@@ -168,4 +168,4 @@ TEST(PassPlan, RandomPlansObeyTheirLaws) {
 }
 
 }  // namespace
-}  // namespace strandcast::gl
+}  // namespace strandcast::gl::pass_plan_test

@@ -2,7 +2,7 @@
 
 #include "tests/support/test_pictures.h"
 
-namespace strandcast {
+namespace strandcast::picture_decoder_test {
 namespace {
 
 using test::waving_lines;
@@ -89,4 +89,4 @@ TEST_F(Decoding, WhatIsNoPictureIsRefused) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::picture_decoder_test

@@ -6,7 +6,7 @@
 #include "server/encode/picture_ladder.h"
 #include "tests/support/test_pictures.h"
 
-namespace strandcast {
+namespace strandcast::picture_encoder_test {
 namespace {
 
 using test::psnr;
@@ -232,4 +232,4 @@ TEST(PictureLadder, FallsInQualityThenRateThenSizeAndAlwaysInCost) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::picture_encoder_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace strandcast {
+namespace strandcast::picture_error_test {
 namespace {
 
 Image plain(uint32_t width, uint32_t height, uint8_t value) {
@@ -71,4 +71,4 @@ TEST(PictureError, ShrinkingKeepsTheLight) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::picture_error_test

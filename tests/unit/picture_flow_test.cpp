@@ -5,21 +5,19 @@
 #include <deque>
 #include <map>
 
+#include "common/base/units.h"
 #include "server/encode/picture_encoder.h"
 #include "server/encode/picture_ladder.h"
 #include "server/net/flow_control.h"
 #include "server/net/send_queue.h"
 
-namespace strandcast {
+namespace strandcast::picture_flow_test {
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
-constexpr int64_t kS = 1'000 * kMs;
 constexpr double kRateHz = 15.0;
 constexpr int kUsualQuality = 80;
-constexpr size_t kBestBytes = 40'000;    // of a picture of 640 x 360 in motion, quality 95
-constexpr int64_t kPingIntervalNs = kS;  // as a session asks for the bare round trip
-constexpr double kWholeFactor = 1.5;     // all tiles against those that changed; a video keyframe needs more
+constexpr size_t kBestBytes = 40'000;        // of a picture of 640 x 360 in motion, quality 95
+constexpr int64_t kPingIntervalNs = kSInNs;  // as a session asks for the bare round trip
+constexpr double kWholeFactor = 1.5;  // all tiles against those that changed; a video keyframe needs more
 
 /// A picture without pixels: of a given size, and like tiles or like video.
 class PaperPicture : public Picture {
@@ -54,7 +52,7 @@ class Viewer {
   Viewer(PictureCodec codec, double link_bytes_per_s, int64_t round_trip_ms)
       : codec_(codec),
         link_bytes_per_s_(link_bytes_per_s),
-        round_trip_ns_(round_trip_ms * kMs),
+        round_trip_ns_(round_trip_ms * kMsInNs),
         ladder_(make_picture_ladder(codec, kUsualQuality)) {
     step = find_step(ladder_, kUsualQuality);
     flow_.expect_acks();
@@ -63,7 +61,7 @@ class Viewer {
   }
 
   void run(int64_t duration_ns) {
-    for (const int64_t end_ns = time_ns + duration_ns; time_ns < end_ns; time_ns += kMs) tick();
+    for (const int64_t end_ns = time_ns + duration_ns; time_ns < end_ns; time_ns += kMsInNs) tick();
   }
 
   double rate_hz(int64_t from_ns) const {
@@ -78,7 +76,7 @@ class Viewer {
     return worst_ns;
   }
 
-  int64_t time_ns = kS;
+  int64_t time_ns = kSInNs;
   size_t step = 0;
   size_t changes = 0;
   size_t keyframes = 0;
@@ -100,7 +98,7 @@ class Viewer {
     const bool wants_keyframe = codec_ == PictureCodec::Vp8 && queue_.needs_picture() &&
                                 flow_.may_start(time_ns) && time_ns >= keyframe_ns_ + kKeyframePauseNs;
     if (wants_keyframe) offer(1);
-    if (time_ns % (50 * kMs) == 0) adapt();
+    if (time_ns % (50 * kMsInNs) == 0) adapt();
     ping();
     most_capacity_bytes_per_s = std::max(most_capacity_bytes_per_s, flow_.capacity_bytes_per_s(time_ns));
     pump();
@@ -148,7 +146,7 @@ class Viewer {
     step = chosen;
     ++changes;
     queue_.start_pictures();
-    keyframe_ns_ = -kS;  // another class
+    keyframe_ns_ = -kSInNs;  // another class
   }
 
   void pump() {
@@ -180,7 +178,7 @@ class Viewer {
   std::deque<OnItsWay> on_its_way_;
   std::deque<Arrival> arrivals_;
   std::map<uint32_t, int64_t> made_of_;
-  int64_t made_ns_ = 0, free_ns_ = 0, keyframe_ns_ = -kS;
+  int64_t made_ns_ = 0, free_ns_ = 0, keyframe_ns_ = -kSInNs;
   int64_t ping_ns_ = 0, pong_ns_ = 0;  // pong 0: none is under way
   uint32_t sequence_ = 0;
 };
@@ -191,9 +189,10 @@ TEST(PictureFlow, AFastLinkGetsTheBestQuality) {
   for (const PictureCodec codec : {PictureCodec::JpegTiles, PictureCodec::Vp8})
     for (const int64_t round_trip_ms : {1, 50, 150, 300}) {
       Viewer viewer(codec, 100.0 * kMbit, round_trip_ms);
-      viewer.run(30 * kS);
+      viewer.run(30 * kSInNs);
       EXPECT_EQ(viewer.step, 0u) << to_string(codec) << ", " << round_trip_ms << " ms";
-      EXPECT_GE(viewer.rate_hz(2 * kS), 0.9 * kRateHz) << to_string(codec) << ", " << round_trip_ms << " ms";
+      EXPECT_GE(viewer.rate_hz(2 * kSInNs), 0.9 * kRateHz)
+          << to_string(codec) << ", " << round_trip_ms << " ms";
       EXPECT_LE(viewer.keyframes, 2u);
     }
 }
@@ -202,17 +201,17 @@ TEST(PictureFlow, ASlowLinkSettlesWithinThreeSecondsAndStays) {
   for (const PictureCodec codec : {PictureCodec::JpegTiles, PictureCodec::Vp8})
     for (const double mbit : {2.0, 1.0, 0.5}) {
       Viewer viewer(codec, mbit * kMbit, 40);
-      viewer.run(3 * kS);
+      viewer.run(3 * kSInNs);
       const std::string what = fmt::format("{} at {} Mbit/s", to_string(codec), mbit);
       EXPECT_GT(viewer.step, 1u) << what;
       const int64_t from_ns = viewer.time_ns;
-      viewer.run(57 * kS);
+      viewer.run(57 * kSInNs);
       EXPECT_LE(viewer.changes, 12u) << what;
       EXPECT_GE(viewer.rate_hz(from_ns), 5.0) << what;
-      EXPECT_LE(viewer.worst_age_ns(from_ns), 700 * kMs) << what;
+      EXPECT_LE(viewer.worst_age_ns(from_ns), 700 * kMsInNs) << what;
       EXPECT_LE(viewer.most_capacity_bytes_per_s, 1.1 * mbit * kMbit) << what << ": more than there is";
     }
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::picture_flow_test

@@ -1,24 +1,23 @@
 #include "client/app/picture_latency.h"
+#include "common/base/units.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 
-namespace strandcast {
+namespace strandcast::picture_latency_test {
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
-constexpr int64_t kAheadNs = 70'000 * kMs;  // the server's clock
+constexpr int64_t kAheadNs = 70'000 * kMsInNs;  // the server's clock
 
 class Latency : public testing::Test {
  protected:
   // A probe without a way: the offset is exact.
   Latency() { clock_.add(0, kAheadNs, kAheadNs, 0); }
   void picture(int64_t sim_ms, int64_t decoded_ms) {
-    latency_.add_picture(sim_ms * kMs, decoded_ms * kMs, clock_);
+    latency_.add_picture(sim_ms * kMsInNs, decoded_ms * kMsInNs, clock_);
   }
   void motion(int64_t sim_ms, int64_t arrival_ms) {
-    const PictureMotion told[] = {{sim_ms * kMs, kAheadNs + arrival_ms * kMs}};
+    const PictureMotion told[] = {{sim_ms * kMsInNs, kAheadNs + arrival_ms * kMsInNs}};
     latency_.add_motions(told, clock_);
   }
   double newest_ms() const { return latency_.timer().quantile_ms(1.0); }
@@ -75,19 +74,20 @@ TEST_F(Latency, WhatWasDrawnBeforeThisViewerCameDoesNotCount) {
 
 TEST_F(Latency, NeedsAClockAndBelievesNoTimeThatNobodyCanMean) {
   PictureLatency without;
-  without.add_picture(100 * kMs, 0, ClockOffset());
-  without.add_picture(150 * kMs, 0, ClockOffset());
-  const PictureMotion told[] = {{150 * kMs, 5}};
+  without.add_picture(100 * kMsInNs, 0, ClockOffset());
+  without.add_picture(150 * kMsInNs, 0, ClockOffset());
+  const PictureMotion told[] = {{150 * kMsInNs, 5}};
   without.add_motions(told, ClockOffset());
   EXPECT_EQ(without.timer().count(), 0u);
   constexpr int64_t kLeast = std::numeric_limits<int64_t>::min(), kMost = std::numeric_limits<int64_t>::max();
   picture(100, 1000);
   picture(150, 1050);
-  const PictureMotion mad[] = {{kLeast, kMost}, {kMost, kLeast}, {150 * kMs, kLeast}, {150 * kMs, kMost}};
+  const PictureMotion mad[] = {
+      {kLeast, kMost}, {kMost, kLeast}, {150 * kMsInNs, kLeast}, {150 * kMsInNs, kMost}};
   for (int i = 0; i < 100; ++i) latency_.add_motions(mad, clock_);
   latency_.add_picture(kMost, kMost, clock_);
   EXPECT_EQ(samples(), 0u);
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::picture_latency_test

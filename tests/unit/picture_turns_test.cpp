@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-namespace strandcast {
+namespace strandcast::picture_turns_test {
 namespace {
 
 constexpr double kPeriodMs = 1000.0 / 15.0;
@@ -180,4 +180,4 @@ TEST(PictureTurns, AfterADrawingOfUnknownCostTheRestMakesUpForIt) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::picture_turns_test

@@ -5,7 +5,7 @@
 #include <random>
 #include <string>
 
-namespace strandcast {
+namespace strandcast::picture_views_test {
 namespace {
 
 using testing::HasSubstr;
@@ -272,4 +272,4 @@ TEST(PictureViews, RefusesViewsThatCannotBeDrawn) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::picture_views_test

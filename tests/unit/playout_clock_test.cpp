@@ -1,13 +1,12 @@
 #include "common/replay/playout_clock.h"
+#include "common/base/units.h"
 
 #include <cmath>
 
 #include "common/base/hash.h"
 
-namespace strandcast {
+namespace strandcast::playout_clock_test {
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
 constexpr int64_t kStepNs = 16'666'667;
 constexpr int64_t kStartNs = 5'000'000'000'000;  // client clocks do not start at zero
 
@@ -17,8 +16,8 @@ TEST(PlayoutClock, StaysOneFrameBehindAnEvenStream) {
   for (int64_t i = 0; i < 100; ++i) clock.add(kStartNs + i * kStepNs, i * kStepNs);
   ASSERT_TRUE(clock.has_value());
   EXPECT_NEAR(static_cast<double>(clock.delay_ns()), kStepNs, 1000.0);
-  const int64_t now_ns = kStartNs + 99 * kStepNs + 4 * kMs;
-  EXPECT_NEAR(static_cast<double>(clock.sim_time_at(now_ns)), 98.0 * kStepNs + 4 * kMs, 1000.0);
+  const int64_t now_ns = kStartNs + 99 * kStepNs + 4 * kMsInNs;
+  EXPECT_NEAR(static_cast<double>(clock.sim_time_at(now_ns)), 98.0 * kStepNs + 4 * kMsInNs, 1000.0);
 }
 
 TEST(PlayoutClock, StaysTwoFramesBehindASlowStreamForTheCubic) {
@@ -49,7 +48,7 @@ TEST(PlayoutClock, AStreamThatBecomesSlowerShowsInAFewFrames) {
   // One frame that was lost is none of that.
   PlayoutClock lossy;
   for (tick = 0; tick < 100; tick += tick == 96 ? 2 : 1) lossy.add(kStartNs + tick * kStepNs, tick * kStepNs);
-  EXPECT_LT(lossy.delay_ns(), kStepNs + 2 * kMs);
+  EXPECT_LT(lossy.delay_ns(), kStepNs + 2 * kMsInNs);
 }
 
 TEST(PlayoutClock, FollowsASlowServer) {
@@ -57,14 +56,14 @@ TEST(PlayoutClock, FollowsASlowServer) {
   for (int64_t i = 0; i < 100; ++i)
     clock.add(kStartNs + 3 * i * kStepNs, i * kStepNs);  // a third of real time
   const int64_t now_ns = kStartNs + 3 * 99 * kStepNs;
-  const int64_t later_ns = now_ns + 30 * kMs;
-  EXPECT_NEAR(static_cast<double>(clock.sim_time_at(later_ns) - clock.sim_time_at(now_ns)), 10.0 * kMs,
-              0.05 * kMs);
-  EXPECT_NEAR(static_cast<double>(clock.sim_time_at(now_ns)), 98.0 * kStepNs, 0.1 * kMs);
+  const int64_t later_ns = now_ns + 30 * kMsInNs;
+  EXPECT_NEAR(static_cast<double>(clock.sim_time_at(later_ns) - clock.sim_time_at(now_ns)), 10.0 * kMsInNs,
+              0.05 * kMsInNs);
+  EXPECT_NEAR(static_cast<double>(clock.sim_time_at(now_ns)), 98.0 * kStepNs, 0.1 * kMsInNs);
 }
 
 TEST(PlayoutClock, JitterGrowsTheDelayButNotBeyondItsLimit) {
-  for (const int64_t jitter_ns : {5 * kMs, 20 * kMs, 1000 * kMs}) {
+  for (const int64_t jitter_ns : {5 * kMsInNs, 20 * kMsInNs, 1000 * kMsInNs}) {
     PlayoutClock clock;
     int64_t last_ns = 0;
     for (int64_t i = 0; i < 200; ++i) {
@@ -74,7 +73,7 @@ TEST(PlayoutClock, JitterGrowsTheDelayButNotBeyondItsLimit) {
           last_ns, kStartNs + i * kStepNs + static_cast<int64_t>(late * static_cast<double>(jitter_ns)));
       clock.add(last_ns, i * kStepNs);
     }
-    EXPECT_GT(clock.delay_ns(), kStepNs + std::min(jitter_ns / 8, 10 * kMs)) << jitter_ns;
+    EXPECT_GT(clock.delay_ns(), kStepNs + std::min(jitter_ns / 8, 10 * kMsInNs)) << jitter_ns;
     EXPECT_LE(clock.delay_ns(), kMaxPlayoutDelayNs + 2 * kStepNs) << jitter_ns;
   }
 }
@@ -85,12 +84,12 @@ TEST(PlayoutClock, SmoothPlayoutNeedsNoFrameThatIsNotThereYet) {
   int starved = 0;
   for (int64_t i = 0; i < 400; ++i) {
     const double late = unit_float(mix_u32(static_cast<uint32_t>(i) + 77u));
-    clock.add(kStartNs + i * kStepNs + static_cast<int64_t>(late * 8.0 * kMs), i * kStepNs);
+    clock.add(kStartNs + i * kStepNs + static_cast<int64_t>(late * 8.0 * kMsInNs), i * kStepNs);
     if (i < 64) continue;
     // Just before the next frame comes at its latest, playout must still be within what has arrived.
     const double next_late = unit_float(mix_u32(static_cast<uint32_t>(i) + 78u));
     const int64_t before_next_ns =
-        kStartNs + (i + 1) * kStepNs + static_cast<int64_t>(next_late * 8.0 * kMs) - 1;
+        kStartNs + (i + 1) * kStepNs + static_cast<int64_t>(next_late * 8.0 * kMsInNs) - 1;
     ++shown;
     if (clock.sim_time_at(before_next_ns) > i * kStepNs) ++starved;
   }
@@ -111,33 +110,34 @@ TEST(PlayoutClock, ForgetsThePastAfterAResetOrAPause) {
 TEST(PlayoutClock, SurvivesABurstAndEqualTimes) {
   PlayoutClock clock;
   for (int64_t i = 0; i < 100; ++i) clock.add(kStartNs, i * kStepNs);
-  EXPECT_TRUE(std::isfinite(static_cast<double>(clock.sim_time_at(kStartNs + kMs))));
+  EXPECT_TRUE(std::isfinite(static_cast<double>(clock.sim_time_at(kStartNs + kMsInNs))));
   EXPECT_LE(clock.delay_ns(), kMaxPlayoutDelayNs);
 }
 
 TEST(PlayoutCursor, CatchesUpWithoutJumpFreezeOrStepBack) {
   // Wanted time jumps ahead or back once; the shown time must run on, within its limits, and meet it.
-  for (const int64_t jump_ns : {300 * kMs, -300 * kMs}) {
+  for (const int64_t jump_ns : {300 * kMsInNs, -300 * kMsInNs}) {
     PlayoutCursor cursor;
     int64_t shown_ns = cursor.advance(kStartNs, 0);
-    for (int64_t t_ns = kMs; t_ns <= 2'000 * kMs; t_ns += kMs) {
-      const int64_t wanted_ns = t_ns + (t_ns > 500 * kMs ? jump_ns : 0);
+    for (int64_t t_ns = kMsInNs; t_ns <= 2'000 * kMsInNs; t_ns += kMsInNs) {
+      const int64_t wanted_ns = t_ns + (t_ns > 500 * kMsInNs ? jump_ns : 0);
       const int64_t next_ns = cursor.advance(kStartNs + t_ns, wanted_ns);
-      const auto moved = static_cast<double>(next_ns - shown_ns) / kMs;
-      EXPECT_GE(moved, 1.0 - kCatchUpRate - 1e-3) << t_ns / kMs;
-      EXPECT_LE(moved, 2.0 + kCatchUpRate + 1e-3) << t_ns / kMs;
+      const auto moved = static_cast<double>(next_ns - shown_ns) / kMsInNs;
+      EXPECT_GE(moved, 1.0 - kCatchUpRate - 1e-3) << t_ns / kMsInNs;
+      EXPECT_LE(moved, 2.0 + kCatchUpRate + 1e-3) << t_ns / kMsInNs;
       shown_ns = next_ns;
     }
-    EXPECT_NEAR(static_cast<double>(shown_ns), 2'000.0 * kMs + static_cast<double>(jump_ns), 2.0 * kMs);
+    EXPECT_NEAR(static_cast<double>(shown_ns), 2'000.0 * kMsInNs + static_cast<double>(jump_ns),
+                2.0 * kMsInNs);
   }
 }
 
 TEST(PlayoutCursor, JumpsOnlyOverLargeDifferences) {
   PlayoutCursor cursor;
   EXPECT_EQ(cursor.advance(kStartNs, 7), 7);
-  EXPECT_EQ(cursor.advance(kStartNs + kMs, 10 * kCatchUpLimitNs), 10 * kCatchUpLimitNs);
-  EXPECT_EQ(cursor.advance(kStartNs + 2 * kMs, 0), 0);
+  EXPECT_EQ(cursor.advance(kStartNs + kMsInNs, 10 * kCatchUpLimitNs), 10 * kCatchUpLimitNs);
+  EXPECT_EQ(cursor.advance(kStartNs + 2 * kMsInNs, 0), 0);
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::playout_clock_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/proxy_header.h"
 
-namespace strandcast {
+namespace strandcast::proxy_test {
 namespace {
 
 using test::bytes_of;
@@ -116,4 +116,4 @@ TEST(ForwardedFor, FollowsAFewProxiesOnly) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::proxy_test

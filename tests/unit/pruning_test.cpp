@@ -11,7 +11,7 @@
 #include "server/source/sim_detail.h"
 #include "tests/support/sim_devices.h"
 
-namespace strandcast {
+namespace strandcast::pruning_test {
 namespace {
 
 SceneDesc few_strands(SceneDesc scene, uint32_t strand_count) {
@@ -136,4 +136,4 @@ TEST(DetailPictures, FewerStrandsAreNotSeenFromWhereTheyAreFewer) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::pruning_test

@@ -9,7 +9,7 @@
 #include "tests/support/own_workers.h"
 #include "tests/support/plain_publisher.h"
 
-namespace strandcast {
+namespace strandcast::publish_blocks_test {
 namespace {
 
 using testing::ElementsAreArray;
@@ -201,4 +201,4 @@ TEST(PublishedSnapshots, NeverChangeWhileAnybodyHasThem) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::publish_blocks_test

@@ -7,7 +7,7 @@
 #include "server/publish/snapshot_slot.h"
 #include "tests/support/eventually.h"
 
-namespace strandcast {
+namespace strandcast::publisher_test {
 namespace {
 
 using testing::ElementsAre;
@@ -317,4 +317,4 @@ TEST(SnapshotSlot, StopAndNotifyWakeReaders) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::publisher_test

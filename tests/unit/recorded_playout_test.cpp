@@ -10,7 +10,7 @@
 #include "server/sim/executor/lanes_executor.h"
 #include "tests/support/shared_data.h"
 
-namespace strandcast {
+namespace strandcast::recorded_playout_test {
 namespace {
 
 constexpr StreamSize kSize = {200, 16};
@@ -130,4 +130,4 @@ TEST_P(RecordedPlayout, CubicsAreNearerThanLinesOnACapturedWalk) {
 INSTANTIATE_TEST_SUITE_P(Solvers, RecordedPlayout, testing::Values("dftl", "direct_rod"));
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::recorded_playout_test

@@ -9,6 +9,7 @@
 #include "client/export/export_strands.h"
 #include "common/base/file.h"
 #include "common/base/hash.h"
+#include "common/base/units.h"
 #include "common/pictures/video_codec.h"
 #include "common/pictures/webm_writer.h"
 #include "common/record/record_file.h"
@@ -18,7 +19,7 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_pictures.h"
 
-namespace strandcast {
+namespace strandcast::recording_player_test {
 namespace {
 
 using ::testing::AllOf;
@@ -313,27 +314,26 @@ TEST(RecordingFilm, NamesSayWhatIsMade) {
 }
 
 TEST(PlaybackClock, PlaysPausesLoopsAndGoesWhereItIsPut) {
-  constexpr int64_t kSecondNs = 1'000'000'000;
   PlaybackClock clock(10.0);
-  clock.advance(5 * kSecondNs);
+  clock.advance(5 * kSInNs);
   EXPECT_EQ(clock.time_s(), 0.0) << "time begins with the first call";
-  clock.advance(7 * kSecondNs);
+  clock.advance(7 * kSInNs);
   EXPECT_DOUBLE_EQ(clock.time_s(), 2.0);
   clock.set_speed(2.0);
-  clock.advance(8 * kSecondNs);
+  clock.advance(8 * kSInNs);
   EXPECT_DOUBLE_EQ(clock.time_s(), 4.0);
   clock.toggle();
-  clock.advance(20 * kSecondNs);
+  clock.advance(20 * kSInNs);
   EXPECT_DOUBLE_EQ(clock.time_s(), 4.0);
   clock.toggle();
-  clock.advance(30 * kSecondNs);
+  clock.advance(30 * kSInNs);
   EXPECT_DOUBLE_EQ(clock.time_s(), 10.0);
   EXPECT_FALSE(clock.is_playing()) << "it stops at the end";
   clock.toggle();
   EXPECT_EQ(clock.time_s(), 0.0) << "and begins anew";
   clock.set_looping(true);
   clock.set_speed(1.0);
-  clock.advance(42 * kSecondNs);
+  clock.advance(42 * kSInNs);
   EXPECT_DOUBLE_EQ(clock.time_s(), 2.0);
   clock.go_to(-3.0);
   EXPECT_EQ(clock.time_s(), 0.0);
@@ -342,4 +342,4 @@ TEST(PlaybackClock, PlaysPausesLoopsAndGoesWhereItIsPut) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::recording_player_test

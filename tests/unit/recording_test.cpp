@@ -14,7 +14,7 @@
 #include "tests/support/sample_recording.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::recording_test {
 namespace {
 
 using test::sample_asset_frame;
@@ -632,4 +632,4 @@ TEST(RecordFile, EndsWholeWhereTheDiskIsFull) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::recording_test

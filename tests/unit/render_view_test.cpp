@@ -4,7 +4,7 @@
 #include <glm/gtc/constants.hpp>
 #include <glm/gtc/quaternion.hpp>
 
-namespace strandcast {
+namespace strandcast::render_view_test {
 namespace {
 
 constexpr glm::uvec2 kSize(800, 400);
@@ -81,4 +81,4 @@ TEST(RenderView, ImpossibleCamerasAreRefused) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::render_view_test

@@ -9,7 +9,7 @@
 #include "server/report/report_folder.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::report_files_test {
 namespace {
 
 using testing::ElementsAre;
@@ -151,4 +151,4 @@ TEST(ReportFolder, IsMadeOrRefusedInOneSentence) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::report_files_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/sample_messages.h"
 
-namespace strandcast {
+namespace strandcast::roles_test {
 namespace {
 
 constexpr Role kRoles[] = {Role::Viewer, Role::Controller, Role::Source, Role::Admin};
@@ -132,4 +132,4 @@ TEST(Roles, ASessionStaysAsLongAsItsTokenGivesItsRole) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::roles_test

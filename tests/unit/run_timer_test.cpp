@@ -3,7 +3,7 @@
 
 #include "server/report/work_precision_page.h"
 
-namespace strandcast {
+namespace strandcast::run_timer_test {
 namespace {
 
 /// Takes so long for a substep, and twice as long for every second one.
@@ -66,4 +66,4 @@ TEST(RunTimer, EveryRowsTimeIsWhatItsSubstepsTook) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::run_timer_test

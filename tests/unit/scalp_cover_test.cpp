@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace strandcast {
+namespace strandcast::scalp_cover_test {
 namespace {
 
 // Roots on the upper half of a sphere of 0.1 m; head vertices at its top, at its bottom, and far away.
@@ -46,4 +46,4 @@ TEST(ScalpCover, AllRootsInOnePointStayCheapAndFinite) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::scalp_cover_test

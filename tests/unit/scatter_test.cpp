@@ -1,6 +1,7 @@
 // Light scattered by hair in double precision: laws first, then values that were computed independently
 // (hair index 1.55) and those that the papers and pbrt publish.
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "common/render/scatter/artist_lobes.h"
@@ -8,7 +9,7 @@
 #include "common/render/scatter/dual_scattering.h"
 #include "common/render/scatter/lobe_tables.h"
 
-namespace strandcast::scatter {
+namespace strandcast::scatter::scatter_test {
 namespace {
 
 constexpr double kIndex = kHairIndex;
@@ -127,7 +128,7 @@ TEST(Marschner, TheCubicStaysWithinTwoDegreesOfTheLawOfRefraction) {
 // Whatever enters leaves somewhere: over the azimuth each part has the mean share of its way.
 TEST(Marschner, AzimuthalPartsIntegrateToTheMeanShares) {
   const SmoothFibre fibre;
-  const double turn = 2.0 * kPi;
+  const double turn = 2.0 * std::numbers::pi;
   EXPECT_NEAR(integral(0.0, turn, 40'000, [&](double phi) { return azimuthal(0, fibre, 0.0, phi); }), .07496,
               2e-5);
   EXPECT_NEAR(integral(0.0, turn, 40'000, [&](double phi) { return azimuthal(1, fibre, 0.0, phi); }), .86179,
@@ -158,7 +159,7 @@ TEST(Marschner, TrtHasALobeOnEachSideInsteadOfInfinity) {
   const SmoothFibre fibre;
   const double phi_c = trt_caustic(kIndex).phi;
   for (double diff = 0.0; diff < 1.5; diff += 0.05)
-    for (double phi = 0.0; phi <= kPi; phi += 0.01) {
+    for (double phi = 0.0; phi <= std::numbers::pi; phi += 0.01) {
       const double value = azimuthal_trt(fibre, diff, phi);
       ASSERT_TRUE(std::isfinite(value) && value >= 0.0 && value < 0.5) << diff << ' ' << phi << ' ' << value;
       ASSERT_NEAR(azimuthal_trt(fibre, diff, -phi), value, 1e-9);
@@ -167,7 +168,8 @@ TEST(Marschner, TrtHasALobeOnEachSideInsteadOfInfinity) {
   const CausticTerms terms;
   const Caustic caustic = trt_caustic(kIndex);
   const double c = std::asin(1.0 / kIndex);
-  const double bend = 96.0 * c / std::pow(kPi, 3.0) * caustic.gamma / std::pow(std::cos(caustic.gamma), 2.0);
+  const double bend =
+      96.0 * c / std::pow(std::numbers::pi, 3.0) * caustic.gamma / std::pow(std::cos(caustic.gamma), 2.0);
   const double width_h = std::min(0.5, 2.0 * std::sqrt(2.0 * terms.width / bend));
   EXPECT_NEAR(azimuthal_trt(fibre, 0.0, phi_c),
               2.5 * lobe_shares({kIndex, 0.0, caustic.h, 0.0})[2] * width_h *
@@ -180,7 +182,7 @@ TEST(Marschner, HalfOfTheGaussianKeepsTheLight) {
   const std::vector<std::pair<double, double>> rows{
       {5, 1.955}, {7.5, 1.90}, {10, 1.83}, {15, 1.65}, {20, 1.45}};
   for (const auto& [width, twice] : rows)
-    EXPECT_NEAR(integral(-kPi / 2, kPi / 2, 20'000,
+    EXPECT_NEAR(integral(-std::numbers::pi / 2, std::numbers::pi / 2, 20'000,
                          [&, w = width](double out) {
                            return longitudinal({0.0, w * kDegree}, out / 2) * std::pow(std::cos(out), 2.0) /
                                   std::pow(std::cos(out / 2), 2.0);
@@ -219,7 +221,7 @@ TEST(Marschner, ShiftsAndWidthsAreInTheRatiosOfThePaper) {
 TEST(Marschner, AnEllipticFibreHasAnotherIndexAcrossEachOfItsAxes) {
   EXPECT_NEAR(elliptic_index(kIndex, 1.0, 0.7), kIndex, 1e-12);
   EXPECT_NEAR(elliptic_index(kIndex, 0.9, 0.0), 2.0 * 0.55 * 0.81 + 0.45, 1e-12);
-  EXPECT_NEAR(elliptic_index(kIndex, 0.9, kPi / 2), 2.0 * 0.55 / 0.81 + 0.45, 1e-12);
+  EXPECT_NEAR(elliptic_index(kIndex, 0.9, std::numbers::pi / 2), 2.0 * 0.55 / 0.81 + 0.45, 1e-12);
 }
 
 TEST(KajiyaKay, HasItsPublishedValues) {
@@ -255,7 +257,7 @@ TEST(Karis, StaysNearTheFibreItFits) {
   EXPECT_NEAR(fit(0).trt.x, .0811, 1e-4);
   const double tt = 2.0 * integral(0.0, 180.0, 720, [&](double phi) { return fit(phi).tt.x; }) * kDegree;
   EXPECT_NEAR(tt, .86179, 0.1 * .86179) << "integral of TT";
-  EXPECT_NEAR(fit(180).tt.x, azimuthal_exact(1, fibre, 0.0, kPi), 0.05 * .64052) << "peak of TT";
+  EXPECT_NEAR(fit(180).tt.x, azimuthal_exact(1, fibre, 0.0, std::numbers::pi), 0.05 * .64052) << "peak of TT";
   // Beyond, where Schlick's Fresnel and the exact one part at grazing angles, R is off by up to a quarter.
   for (const double phi : {0.0, 30.0, 60.0, 90.0, 150.0})
     EXPECT_NEAR(fit(phi).r / azimuthal(0, fibre, 0.0, phi * kDegree), 1.0, 0.2) << phi;
@@ -279,7 +281,7 @@ TEST(Chiang, SpotValuesAreThoseOfPbrt) {
     return lobes[0] + lobes[1] + lobes[2] + lobes[3];
   };
   EXPECT_NEAR(at({0, 0, 0}, 0.1), .091762, 1e-6);
-  EXPECT_NEAR(at({0.2, -0.1, kPi}, 0.0), 2.952336, 1e-6);
+  EXPECT_NEAR(at({0.2, -0.1, std::numbers::pi}, 0.0), 2.952336, 1e-6);
   EXPECT_NEAR(at({-0.3, 0.2, 2.0}, 0.5), .015669, 1e-6);
   EXPECT_NEAR(at({0.1, 0.1, 0.5}, -0.7), .000261, 1e-6);
   const std::vector<std::pair<double, double>> far{{0, .03408},   {30, .02034},  {60, .01481}, {90, .03734},
@@ -299,12 +301,14 @@ TEST(Chiang, RoughnessHasItsPublishedMeaning) {
 TEST(Chiang, EachPartOfALobeIntegratesToOne) {
   for (const double variance : {0.003, 0.0846, 0.5, 3.1})
     for (const double out : {0.0, 0.4, -1.2, 1.5})
-      EXPECT_NEAR(integral(-kPi / 2, kPi / 2, 40'000,
+      EXPECT_NEAR(integral(-std::numbers::pi / 2, std::numbers::pi / 2, 40'000,
                            [&](double in) { return rough_longitudinal(variance, in, out) * std::cos(in); }),
                   1.0, 1e-4)
           << variance << ' ' << out;
   for (const double scale : {0.05, 0.117, 1.0})
-    EXPECT_NEAR(integral(-kPi, kPi, 20'000, [&](double x) { return trimmed_logistic(scale, x); }), 1.0, 1e-6);
+    EXPECT_NEAR(integral(-std::numbers::pi, std::numbers::pi, 20'000,
+                         [&](double x) { return trimmed_logistic(scale, x); }),
+                1.0, 1e-6);
 }
 
 // The white furnace: a fibre that absorbs nothing shows as much light as comes from all around.
@@ -315,8 +319,8 @@ TEST(Chiang, AWhiteFibreVanishesInAWhiteFurnace) {
   for (const double roughness : {0.1, 0.3, 0.5, 0.7, 0.9})
     for (const double out : {0.0, 0.7}) {
       fibre.along = roughness;
-      const double sum = integral(-kPi / 2, kPi / 2, 240, [&](double in) {
-        return std::cos(in) * integral(-kPi, kPi, 240, [&](double phi) {
+      const double sum = integral(-std::numbers::pi / 2, std::numbers::pi / 2, 240, [&](double in) {
+        return std::cos(in) * integral(-std::numbers::pi, std::numbers::pi, 240, [&](double phi) {
                  const auto lobes = rough_lobes(fibre, {in, out, phi}, 0.37);
                  return lobes[0] + lobes[1] + lobes[2] + lobes[3];
                });
@@ -330,8 +334,8 @@ TEST(Marschner, AWhiteFibreIsNotBrighterThanItsFurnace) {
   const SmoothFibre fibre;
   for (const double width : {5.0, 10.0}) {
     const auto shapes = lobe_shapes(width * kDegree, 0.0);
-    const double sum = integral(-kPi / 2, kPi / 2, 180, [&](double in) {
-      return std::cos(in) * integral(-kPi, kPi, 361, [&](double phi) {
+    const double sum = integral(-std::numbers::pi / 2, std::numbers::pi / 2, 180, [&](double in) {
+      return std::cos(in) * integral(-std::numbers::pi, std::numbers::pi, 361, [&](double phi) {
                const auto lobes = marschner_lobes(fibre, shapes, in, 0.0, phi);
                return lobes[0] + lobes[1] + lobes[2];
              });
@@ -377,8 +381,8 @@ TEST(DualScattering, ShiftAndWidthFollowTheirEquations) {
                   (0.2 * std::sqrt(2.0 * 0.0049 + 0.0144) + 0.008 * std::sqrt(2.0 * 0.0049 + 3.0 * 0.0144)) /
                   (0.2 + 0.008 * (2.0 * 0.07 + 3.0 * 0.12)),
               1e-12);
-  EXPECT_NEAR(back_lobe(back, back.shift, 1.0, 0.0), back.albedo / (kPi * back.width * std::sqrt(2.0 * kPi)),
-              1e-12);
+  EXPECT_NEAR(back_lobe(back, back.shift, 1.0, 0.0),
+              back.albedo / (std::numbers::pi * back.width * std::sqrt(2.0 * std::numbers::pi)), 1e-12);
   EXPECT_LT(back_lobe(back, back.shift, 1.0, 0.01), back_lobe(back, back.shift, 1.0, 0.0));
 }
 
@@ -399,10 +403,11 @@ TEST(DualScattering, TheMeanTransmittanceIsThatOfAPoissonCrowd) {
 TEST(DualScattering, ForwardAzimuthsAreTheMeanOfTheBackHalf) {
   const SmoothFibre fibre{kIndex, 0.1, {}};
   for (size_t p = 0; p < 2; ++p)
-    EXPECT_NEAR(
-        forward_azimuthal(p, fibre, 0.3),
-        2.0 / kPi * integral(kPi / 2, kPi, 20'000, [&](double phi) { return azimuthal(p, fibre, 0.3, phi); }),
-        2e-3 * forward_azimuthal(p, fibre, 0.3));
+    EXPECT_NEAR(forward_azimuthal(p, fibre, 0.3),
+                2.0 / std::numbers::pi *
+                    integral(std::numbers::pi / 2, std::numbers::pi, 20'000,
+                             [&](double phi) { return azimuthal(p, fibre, 0.3, phi); }),
+                2e-3 * forward_azimuthal(p, fibre, 0.3));
   EXPECT_GT(forward_azimuthal(1, fibre, 0.3), 10.0 * forward_azimuthal(0, fibre, 0.3)) << "TT goes on";
 }
 
@@ -446,4 +451,4 @@ TEST(LobeTables, HoldOnlyNumbers) {
 }
 
 }  // namespace
-}  // namespace strandcast::scatter
+}  // namespace strandcast::scatter::scatter_test

@@ -3,7 +3,7 @@
 
 #include "common/scene/scenario_file.h"
 
-namespace strandcast {
+namespace strandcast::scenario_file_test {
 namespace {
 
 using testing::HasSubstr;
@@ -160,4 +160,4 @@ TEST(ScenarioFile, EveryShippedScenarioParses) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::scenario_file_test

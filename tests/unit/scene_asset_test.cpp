@@ -5,7 +5,7 @@
 
 #include "tests/support/sample_asset.h"
 
-namespace strandcast {
+namespace strandcast::scene_asset_test {
 namespace {
 
 void expect_same(const SceneAsset& a, const SceneAsset& b) {
@@ -89,4 +89,4 @@ TEST(SceneAsset, CountsAreCheckedBeforeAnythingElse) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::scene_asset_test

@@ -8,7 +8,7 @@
 #include "common/wire/messages.h"
 #include "server/sim/solver_registry.h"
 
-namespace strandcast {
+namespace strandcast::scene_change_test {
 namespace {
 
 using testing::HasSubstr;
@@ -153,4 +153,4 @@ TEST(SceneChange, StepsOutsideTheStableRangeAreRefusedWhateverChangesThem) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::scene_change_test

@@ -15,7 +15,7 @@
 #include "tests/support/shared_data.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::scene_content_test {
 namespace {
 
 /// How deep the deepest vertex of the hair as loaded lies in what collides, m.
@@ -118,7 +118,7 @@ TEST(SceneContent, OtherHairIsATargetWhereItIsOnTheSameHead) {
   // A strand of a metre beside a head of ten centimetres.
   const TemporaryFolder folder;
   FileGroomDesc far;
-  testing::ByteFile hair;
+  test::ByteFile hair;
   for (const char letter : std::string("HAIR")) hair.add(letter);
   hair.add(1u).add(2u).add(2u).add(1u).zeros(128 - 20);  // a strand, two points, which is all there is
   for (const float number : {5.0f, 0.0f, 0.0f, 5.0f, -1.0f, 0.0f}) hair.add(number);
@@ -258,9 +258,9 @@ TEST(SceneContent, WhatWasGuessedIsSaid) {
 }
 
 /// Strands of two vertices out of a ball about the origin, as a .hair file.
-testing::ByteFile hair_on_a_ball(float radius_m) {
+test::ByteFile hair_on_a_ball(float radius_m) {
   constexpr uint32_t kStrands = 40, kPoints = 2;
-  testing::ByteFile file;
+  test::ByteFile file;
   for (const char c : {'H', 'A', 'I', 'R'}) file.add(c);
   file.add(kStrands).add(kPoints * kStrands).add(kPoints).add(kPoints - 1);
   file.add(0.1f).add(0.0f).add(0.5f).add(0.4f).add(0.3f).zeros(88);
@@ -313,4 +313,4 @@ TEST(SceneContent, MissingFilesAreNamed) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::scene_content_test

@@ -11,7 +11,7 @@
 
 #include "strandcast/v1/scene.pb.h"
 
-namespace strandcast {
+namespace strandcast::scene_file_test {
 namespace {
 
 using testing::AllOf;
@@ -56,59 +56,59 @@ SceneDesc unusual_scene() {
   s.colliders = {{{0.1f, 0.2f, 0.3f}, 0.05f}, {{}, 0.2f}};
   s.has_auto_collider = false;
   s.wind = {.mean_mps = {1, 2, 3}, .gust_intensity = 0.7f, .gust_length_m = 3.3f, .seed = 4'000'000'000u};
-  s.look = {.hair_color = "melanin",
-            .root_color = {0.1f, 0.2f, 0.3f},
-            .tip_color = {0.4f, 0.5f, 0.6f},
-            .eumelanin = 0.25f,
-            .pheomelanin = 0.75f,
-            .strand_radius_m = 1e-4f,
-            .tip_scale = 0.7f,
-            .followers = 5,
-            .segments = 2,
-            .style = {.clump = 0.1f,
-                      .locks = 7,
-                      .spread = 0.2f,
-                      .wave_m = 0.01f,
-                      .wave_count = 4.5f,
-                      .frizz_m = 0.002f,
-                      .frizz_count = 11.0f,
-                      .stray_share = 0.3f,
-                      .stray_spread = 2.0f,
-                      .length_spread = 0.4f,
-                      .short_share = 0.5f,
-                      .tip_fade = 0.6f},
-            .shading = {.diffuse = 0.1f,
-                        .scatter = 0.2f,
-                        .highlight = 0.3f,
-                        .transmission = 0.4f,
-                        .second_highlight = 0.6f,
-                        .highlight_width_deg = 9.0f,
-                        .cuticle_deg = 2.0f,
-                        .cuticle_spread_deg = 3.0f,
-                        .root_darkening = 0.7f,
-                        .strand_variation = 0.8f,
-                        .lock_variation = 0.9f,
-                        .warmth_variation = 0.01f,
-                        .wetness = 0.5f},
-            .light_direction = {0, -1, 0.3f},
-            .light_color = {2, 3, 4},
-            .rim_direction = {1, 0, -2},
-            .rim_color = {5, 6, 7},
-            .ambient = 0.5f,
-            .exposure = 1.5f,
-            .background = {0, 0.5f, 1},
-            .skin_color = {1, 0, 0.5f},
-            .methods = {.shading = "chiang",
-                        .scattering = "isosurface",
-                        .evaluation = "fragment",
-                        .shadow = "volume",
-                        .transparency = "hashed",
-                        .antialiasing = "density_samples",
-                        .curve = "bezier",
-                        .joints = "split",
-                        .detail = "decimation",
-                        .culling = "occlusion",
-                        .shadow_detail = "coarse"}};
+  s.look.hair_color = "melanin";
+  s.look.root_color = {0.1f, 0.2f, 0.3f};
+  s.look.tip_color = {0.4f, 0.5f, 0.6f};
+  s.look.eumelanin = 0.25f;
+  s.look.pheomelanin = 0.75f;
+  s.look.strand_radius_m = 1e-4f;
+  s.look.tip_scale = 0.7f;
+  s.look.followers = 5;
+  s.look.segments = 2;
+  s.look.style = {.clump = 0.1f,
+                  .locks = 7,
+                  .spread = 0.2f,
+                  .wave_m = 0.01f,
+                  .wave_count = 4.5f,
+                  .frizz_m = 0.002f,
+                  .frizz_count = 11.0f,
+                  .stray_share = 0.3f,
+                  .stray_spread = 2.0f,
+                  .length_spread = 0.4f,
+                  .short_share = 0.5f,
+                  .tip_fade = 0.6f};
+  s.look.shading = {.diffuse = 0.1f,
+                    .scatter = 0.2f,
+                    .highlight = 0.3f,
+                    .transmission = 0.4f,
+                    .second_highlight = 0.6f,
+                    .highlight_width_deg = 9.0f,
+                    .cuticle_deg = 2.0f,
+                    .cuticle_spread_deg = 3.0f,
+                    .root_darkening = 0.7f,
+                    .strand_variation = 0.8f,
+                    .lock_variation = 0.9f,
+                    .warmth_variation = 0.01f,
+                    .wetness = 0.5f};
+  s.look.light_direction = {0, -1, 0.3f};
+  s.look.light_color = {2, 3, 4};
+  s.look.rim_direction = {1, 0, -2};
+  s.look.rim_color = {5, 6, 7};
+  s.look.ambient = 0.5f;
+  s.look.exposure = 1.5f;
+  s.look.background = {0, 0.5f, 1};
+  s.look.skin_color = {1, 0, 0.5f};
+  s.look.methods = {.shading = "chiang",
+                    .scattering = "isosurface",
+                    .evaluation = "fragment",
+                    .shadow = "volume",
+                    .transparency = "hashed",
+                    .antialiasing = "density_samples",
+                    .curve = "bezier",
+                    .joints = "split",
+                    .detail = "decimation",
+                    .culling = "occlusion",
+                    .shadow_detail = "coarse"};
   s.camera = {.offset_m = {0, 0, 2}, .target_m = {0.1f, 0.2f, 0.3f}, .fov_y_rad = 1.0f};
   s.stream = {.codec = "raw",
               .has_codec = true,
@@ -625,4 +625,4 @@ TEST(BodyDesc, CapsulesAreWhereTheirJointsAreAndWhatIsMissingIsNamed) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::scene_file_test

@@ -12,7 +12,7 @@
 #include "server/sim/solver_registry.h"
 #include "server/source/scene_change.h"
 
-namespace strandcast {
+namespace strandcast::scene_parameters_test {
 namespace {
 
 using testing::HasSubstr;
@@ -143,4 +143,4 @@ TEST(ParameterWatch, TellsWhoWantsItWhatIsOther) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::scene_parameters_test

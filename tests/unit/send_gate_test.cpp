@@ -1,12 +1,13 @@
 // Laws of how much may be on its way.
 #include "server/net/send_gate.h"
+#include "common/base/units.h"
 
 #include <random>
 
-namespace strandcast {
+namespace strandcast::send_gate_test {
 namespace {
 
-constexpr int64_t kBeginNs = 1'000'000 * kNsPerMs;
+constexpr int64_t kBeginNs = 1'000'000 * kMsInNs;
 constexpr auto kUsual = SendGate::Delay::Usual;
 
 FrameHeader frame(uint32_t sequence, Opcode opcode = Opcode::StrandDelta) {
@@ -41,7 +42,7 @@ TEST(SendGate, BeforeTheFirstAcknowledgementAFewBytesGo) {
 
 TEST(SendGate, WhatIsOnItsWayIsBoundedWhateverTheLinkSeemed) {
   LinkEstimate link;
-  link.on_acked({1'000'000, kBeginNs - 2 * kNsPerMs, true, true}, kBeginNs);  // without end
+  link.on_acked({1'000'000, kBeginNs - 2 * kMsInNs, true, true}, kBeginNs);  // without end
   // 512 frames, and no other once there are 4 MiB.
   constexpr size_t kFourMiB = 4'194'304;
   for (const auto& [bytes, most] : std::vector<std::pair<size_t, uint32_t>>{{1, 512},
@@ -86,33 +87,33 @@ TEST(SendGate, AnAcknowledgementTakesEverythingBeforeItAndOthersTakeNothing) {
 
 TEST(SendGate, ALateFrameHoldsTheNextOnesAndSoonerWhileABetterClassIsTried) {
   LinkEstimate link;
-  link.on_round_trip(20 * kNsPerMs, kBeginNs);
-  link.on_acked({100, kBeginNs - 20 * kNsPerMs, false, true}, kBeginNs);
+  link.on_round_trip(20 * kMsInNs, kBeginNs);
+  link.on_acked({100, kBeginNs - 20 * kMsInNs, false, true}, kBeginNs);
   SendGate gate(link);
   for (uint32_t i = 1; i <= kFreeFrames; ++i) gate.on_sent(frame(i), 100, kBeginNs);
-  const int64_t late_ns = kBeginNs + 20 * kNsPerMs + kGateDelayNs;
+  const int64_t late_ns = kBeginNs + 20 * kMsInNs + kGateDelayNs;
   EXPECT_TRUE(gate.may_send(kUsual, late_ns));
   EXPECT_FALSE(gate.may_send(kUsual, late_ns + 1));
-  const int64_t tried_ns = kBeginNs + 20 * kNsPerMs + kStartDelayNs;
+  const int64_t tried_ns = kBeginNs + 20 * kMsInNs + kStartDelayNs;
   EXPECT_TRUE(gate.may_send(SendGate::Delay::Short, tried_ns));
   EXPECT_FALSE(gate.may_send(SendGate::Delay::Short, tried_ns + 1));
 }
 
 TEST(SendGate, AnAnswerIsDueWhenTheOldestFrameCanHaveArrived) {
   LinkEstimate link;
-  link.on_round_trip(20 * kNsPerMs, kBeginNs - 5'000 * kNsPerMs);
+  link.on_round_trip(20 * kMsInNs, kBeginNs - 5'000 * kMsInNs);
   SendGate gate(link);
   EXPECT_EQ(gate.oldest_due_ns(kBeginNs), 0) << "none waits";
   gate.on_sent(frame(1), 100, kBeginNs);
-  EXPECT_EQ(gate.oldest_due_ns(kBeginNs), kBeginNs + 20 * kNsPerMs);
-  gate.on_written(frame(1), kBeginNs + 300 * kNsPerMs);
-  EXPECT_EQ(gate.oldest_due_ns(kBeginNs), kBeginNs + 320 * kNsPerMs) << "the link has taken it only now";
-  gate.on_written(frame(2), kBeginNs + 900 * kNsPerMs);
-  EXPECT_EQ(gate.oldest_due_ns(kBeginNs), kBeginNs + 320 * kNsPerMs) << "others are no sign of it";
+  EXPECT_EQ(gate.oldest_due_ns(kBeginNs), kBeginNs + 20 * kMsInNs);
+  gate.on_written(frame(1), kBeginNs + 300 * kMsInNs);
+  EXPECT_EQ(gate.oldest_due_ns(kBeginNs), kBeginNs + 320 * kMsInNs) << "the link has taken it only now";
+  gate.on_written(frame(2), kBeginNs + 900 * kMsInNs);
+  EXPECT_EQ(gate.oldest_due_ns(kBeginNs), kBeginNs + 320 * kMsInNs) << "others are no sign of it";
   gate.forget();
   EXPECT_EQ(gate.oldest_due_ns(kBeginNs), 0);
   EXPECT_EQ(gate.in_flight_bytes(), 0u);
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::send_gate_test

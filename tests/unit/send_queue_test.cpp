@@ -6,7 +6,7 @@
 
 #include <random>
 
-namespace strandcast {
+namespace strandcast::send_queue_test {
 namespace {
 
 EncodedFramePtr frame(Opcode opcode, uint32_t sequence, uint32_t base_sequence) {
@@ -101,7 +101,7 @@ TEST(SendQueue, WhoDoesNotCatchUpWithAChainLosesIt) {
   ASSERT_EQ(queue.offer_chain(chain), SendQueue::Offer::Queued);
   uint32_t sequence = 4;
   while (queue.offer_strands(delta(sequence)) == SendQueue::Offer::Queued) ++sequence;
-  EXPECT_EQ(sequence, 4 + 2 * kCatchUpShare) << "so many for each delta of the chain";
+  EXPECT_EQ(sequence, 4 + 2 * kCatchUpFrames) << "so many for each delta of the chain";
   EXPECT_FALSE(queue.take_next().has_value()) << "nothing of the broken chain may follow";
   EXPECT_TRUE(queue.needs_keyframe());
 }
@@ -313,4 +313,4 @@ TEST(SendQueue, StoppingStrandsDropsWhatWaitsAndSaysWhetherTheAssetDid) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::send_queue_test

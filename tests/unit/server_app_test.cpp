@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/base/units.h"
 #include "common/base/version.h"
 #include "common/groom/groom_asset.h"
 #include "common/scene/scene_file.h"
@@ -17,7 +18,7 @@
 #include "server/stream/demand_book.h"
 #include "tests/support/metrics_text.h"
 
-namespace strandcast {
+namespace strandcast::server_app_test {
 namespace {
 
 using testing::HasSubstr;
@@ -305,16 +306,16 @@ TEST(Viewers, FramesThatCannotBeHadAreRefusedWithTheReason) {
 
 TEST(ControlBudget, AControllerHasItsBurstThenItsRateAndOthersHaveTheirs) {
   ControlBudget budget;
-  constexpr int64_t kBeginNs = 1'000'000'000, kSecondNs = 1'000'000'000;
+  constexpr int64_t kBeginNs = kSInNs;
   const auto count = [&](SessionId session, int64_t time_ns) {
     int taken = 0;
     while (taken < 1'000 && budget.take(session, time_ns)) ++taken;
     return taken;
   };
   EXPECT_EQ(count(1, kBeginNs), static_cast<int>(kControlBurst));
-  EXPECT_EQ(count(1, kBeginNs + kSecondNs), static_cast<int>(kControlsPerS));
-  EXPECT_EQ(count(2, kBeginNs + kSecondNs), static_cast<int>(kControlBurst));
-  EXPECT_EQ(count(1, kBeginNs + 100 * kSecondNs), static_cast<int>(kControlBurst)) << "no more is saved up";
+  EXPECT_EQ(count(1, kBeginNs + kSInNs), static_cast<int>(kControlsPerS));
+  EXPECT_EQ(count(2, kBeginNs + kSInNs), static_cast<int>(kControlBurst));
+  EXPECT_EQ(count(1, kBeginNs + 100 * kSInNs), static_cast<int>(kControlBurst)) << "no more is saved up";
 }
 
 TEST(Viewers, IsDescribedForTheLogOnOneLine) {
@@ -717,4 +718,4 @@ TEST(ServerOptions, NamesWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::server_app_test

@@ -13,7 +13,7 @@
 #include "server/sim/solver_registry.h"
 #include "tests/support/metrics_text.h"
 
-namespace strandcast {
+namespace strandcast::server_passes_test {
 namespace {
 
 using gl::PassFate;
@@ -281,4 +281,4 @@ TEST(Metrics, SayThePassesAndWhatOpenGlHolds) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::server_passes_test

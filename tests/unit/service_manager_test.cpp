@@ -1,5 +1,6 @@
 // What a service manager is told and what it passes, against the words of sd_notify(3) and sd_listen_fds(3).
 #include "server/app/service_manager.h"
+#include "common/base/units.h"
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -12,12 +13,10 @@
 #include "tests/support/manager_socket.h"
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::service_manager_test {
 namespace {
 
 using testing::HasSubstr;
-
-constexpr int64_t kS = 1'000'000'000;
 
 /// Variables of the environment for the time of a test.
 class Environment {
@@ -64,12 +63,12 @@ TEST_F(ServiceManagerTest, BeatsTwiceWithinItsTimeUnlessTheSimulationHangs) {
   const Environment environment(
       {{"NOTIFY_SOCKET", path()}, {"WATCHDOG_USEC", "10000000"}, {"WATCHDOG_PID", own_id()}});
   ServiceManager manager = ServiceManager::of_environment();
-  manager.beat(100 * kS, 0);
+  manager.beat(100 * kSInNs, 0);
   EXPECT_EQ(heard_.next(), "WATCHDOG=1\n");
-  manager.beat(104 * kS, 0);  // not yet
-  manager.beat(106 * kS, 6 * kS);
+  manager.beat(104 * kSInNs, 0);  // not yet
+  manager.beat(106 * kSInNs, 6 * kSInNs);
   EXPECT_EQ(heard_.next(0), "");
-  manager.beat(107 * kS, kS);
+  manager.beat(107 * kSInNs, kSInNs);
   EXPECT_EQ(heard_.next(), "WATCHDOG=1\n");
 }
 
@@ -82,7 +81,7 @@ TEST_F(ServiceManagerTest, IsSilentWhereNobodyAsksIt) {
   const Environment environment(
       {{"NOTIFY_SOCKET", path()}, {"WATCHDOG_USEC", "10000000"}, {"WATCHDOG_PID", "1"}});
   ServiceManager other = ServiceManager::of_environment();
-  other.beat(100 * kS, 0);  // another process is watched
+  other.beat(100 * kSInNs, 0);  // another process is watched
   EXPECT_EQ(heard_.next(0), "");
   for (const std::string& address : {std::string("vsock:2:1234"), std::string("/") + std::string(200, 'x')}) {
     const Environment wrong({{"NOTIFY_SOCKET", address}});
@@ -177,4 +176,4 @@ TEST(PassedSocketTest, OtherSocketsAreRefusedWithWhatToWrite) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::service_manager_test

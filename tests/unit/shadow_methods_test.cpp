@@ -2,7 +2,7 @@
 
 #include <set>
 
-namespace strandcast {
+namespace strandcast::shadow_methods_test {
 namespace {
 
 using testing::HasSubstr;
@@ -68,4 +68,4 @@ TEST(ShadowMethods, RefuseWhatReadsTheDepthOfSamplesWhereThereIsNone) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::shadow_methods_test

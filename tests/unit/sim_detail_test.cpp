@@ -1,14 +1,14 @@
 // How much is simulated, by what readers see: never too little for a moment, and never back and forth.
 #include "server/source/sim_detail.h"
+#include "common/base/units.h"
 
 #include <cmath>
 #include <random>
 
-namespace strandcast {
+namespace strandcast::sim_detail_test {
 namespace {
 
 constexpr int64_t kFrameNs = 16'666'667;
-constexpr int64_t kSecondNs = 1'000'000'000;
 
 DetailDesc by_size() {
   DetailDesc desc;
@@ -85,7 +85,7 @@ TEST(SimDetail, GoesDownALevelAtATimeAndNoSoonerThanAfterAWhile) {
   ASSERT_EQ(watch.changes(), kDetailLevels - 1);
   int64_t before_ns = kFrameNs;
   for (const int64_t time_ns : watch.changes_ns()) {
-    EXPECT_GE(static_cast<double>(time_ns - before_ns), 0.99 * desc.settle_s * kSecondNs);
+    EXPECT_GE(static_cast<double>(time_ns - before_ns), 0.99 * desc.settle_s * kSInNs);
     before_ns = time_ns;
   }
 }
@@ -129,7 +129,7 @@ TEST(SimDetail, WhateverReadersDoItNeitherFlickersNorFallsShort) {
   ASSERT_GT(watch.down_ns().size(), 3u);
   for (size_t i = 1; i < watch.down_ns().size(); ++i)
     EXPECT_GE(static_cast<double>(watch.down_ns()[i] - watch.down_ns()[i - 1]),
-              0.99 * desc.settle_s * kSecondNs);
+              0.99 * desc.settle_s * kSInNs);
 }
 
 TEST(SimDetail, NobodyThereIsTheCheapestAfterAWhileAndTheFirstReaderGetsAll) {
@@ -158,11 +158,11 @@ TEST(SimDetail, ScenesThatWantAllOfItGetIt) {
   // Told so while it slept.
   SimDetail detail(DetailDesc{});
   (void)detail.update({.has_readers = false}, 0);
-  ASSERT_TRUE(detail.update({.has_readers = false}, 100 * kSecondNs));
+  ASSERT_TRUE(detail.update({.has_readers = false}, 100 * kSInNs));
   detail.change(desc);
-  EXPECT_TRUE(detail.update({.has_readers = false}, 101 * kSecondNs));
+  EXPECT_TRUE(detail.update({.has_readers = false}, 101 * kSInNs));
   EXPECT_EQ(detail.level(), DetailLevel::Full);
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::sim_detail_test

@@ -5,7 +5,7 @@
 #include "common/strands/frame_header.h"
 #include "common/strands/snapshot.h"
 
-namespace strandcast {
+namespace strandcast::snapshot_test {
 namespace {
 
 std::vector<glm::vec3> random_points(size_t count, float reach_m, uint32_t seed) {
@@ -175,4 +175,4 @@ TEST(FrameHeader, PayloadLimitIsExact) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::snapshot_test

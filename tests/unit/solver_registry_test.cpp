@@ -8,7 +8,7 @@
 #include "tests/support/sim_scene.h"
 #include "tests/support/solver_bounds.h"
 
-namespace strandcast {
+namespace strandcast::solver_registry_test {
 namespace {
 
 using testing::HasSubstr;
@@ -158,4 +158,4 @@ TEST(StrandLayout, LimitsWhatAStepMayAskFor) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::solver_registry_test

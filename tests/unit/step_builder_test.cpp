@@ -8,7 +8,7 @@
 #include <numbers>
 #include <vector>
 
-namespace strandcast {
+namespace strandcast::step_builder_test {
 namespace {
 
 SceneDesc still_scene() {
@@ -356,4 +356,4 @@ TEST(StepBuilder, ShoulderMovesWithinTheStepAndIsNewWhereItJumps) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::step_builder_test

@@ -12,7 +12,7 @@
 #include "tests/support/sim_scene.h"
 #include "tests/support/stepped_hair.h"
 
-namespace strandcast {
+namespace strandcast::step_codec_test {
 namespace {
 
 constexpr float kBoundM = SteppedHair::kBoundM;
@@ -644,4 +644,4 @@ TEST(StepCodec, StrandsMayBeHeldAtBothEnds) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::step_codec_test

@@ -10,7 +10,7 @@
 #include "tests/support/sim_scene.h"
 #include "tests/support/stepped_hair.h"
 
-namespace strandcast {
+namespace strandcast::step_wire_test {
 namespace {
 
 constexpr uint32_t kStrands = kWalkingStrands;
@@ -211,4 +211,4 @@ TEST(StepWire, WhatIsReadIsWhatWasWritten) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::step_wire_test

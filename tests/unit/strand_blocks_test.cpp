@@ -7,7 +7,7 @@
 #include "server/sim/solver_registry.h"
 #include "tests/support/sim_scene.h"
 
-namespace strandcast {
+namespace strandcast::strand_blocks_test {
 namespace {
 
 float value_at(uint32_t vertex, uint32_t strand, int axis) {
@@ -86,4 +86,4 @@ TEST(SolverBlocks, AreWhatReadCopies) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::strand_blocks_test

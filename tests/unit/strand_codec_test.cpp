@@ -8,7 +8,7 @@
 #include "common/strands/tangent/motion.h"
 #include "tests/support/hair_motion.h"
 
-namespace strandcast {
+namespace strandcast::strand_codec_test {
 namespace {
 
 using namespace tangent;
@@ -320,4 +320,4 @@ TEST(StrandCodecs, RefuseAnnouncedSizesBeyondTheLimits) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::strand_codec_test

@@ -10,7 +10,7 @@
 #include "common/strands/strand_prefix.h"
 #include "tests/support/eventually.h"
 
-namespace strandcast {
+namespace strandcast::strand_encode_worker_test {
 namespace {
 
 constexpr uint32_t kStrands = 6;
@@ -468,4 +468,4 @@ TEST(StrandEncodingWithCodec, EveryKeyframeIsAWayIntoTheChain) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::strand_encode_worker_test

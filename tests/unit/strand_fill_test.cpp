@@ -6,7 +6,7 @@
 #include "common/strands/strand_prefix.h"
 #include "tests/support/hair_motion.h"
 
-namespace strandcast {
+namespace strandcast::strand_fill_test {
 namespace {
 
 constexpr uint32_t kStrands = 400;
@@ -159,4 +159,4 @@ TEST_F(Fill, PicturesKeepAllStrandsWhileTheStreamChanges) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::strand_fill_test

@@ -12,7 +12,7 @@
 #include "server/sim/solver_registry.h"
 #include "tests/support/sim_devices.h"
 
-namespace strandcast {
+namespace strandcast::strand_follow_test {
 namespace {
 
 constexpr uint32_t kStrands = 200;
@@ -394,4 +394,4 @@ TEST_P(FollowedSolvers, HairWakesAsFastAsTheHeadAndIsNotKicked) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::strand_follow_test

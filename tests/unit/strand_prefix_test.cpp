@@ -7,7 +7,7 @@
 #include "common/strands/strand_codec.h"
 #include "tests/support/hair_motion.h"
 
-namespace strandcast {
+namespace strandcast::strand_prefix_test {
 namespace {
 
 constexpr float kBoundM = 1e-4f;
@@ -126,4 +126,4 @@ TEST(PrefixOfShape, IsNothingForWhatIsNoSuchShape) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::strand_prefix_test

@@ -1,15 +1,15 @@
 #include "common/replay/strand_replay.h"
+#include "common/base/units.h"
 
 #include "tests/support/hair_motion.h"
 
-namespace strandcast {
+namespace strandcast::strand_replay_test {
 namespace {
 
 constexpr uint32_t kStrands = 30;
 constexpr uint32_t kVertices = 8;
 constexpr float kQuantumM = 1e-4f;
 constexpr int64_t kStepNs = 16'666'667;
-constexpr int64_t kMs = 1'000'000;
 
 constexpr StrandStreamLimits kLimits{kStrands, kVertices};
 
@@ -66,7 +66,7 @@ TEST_F(StrandReplayTest, LowLatencyShowsTheNewestStateExactly) {
   EXPECT_FALSE(replay_->strands_at(0));
   EXPECT_EQ(replay_->newest(), nullptr);
   for (int i = 0; i < 5; ++i) receive(next(), i * kStepNs);
-  const auto strands = replay_->strands_at(4 * kStepNs + 3 * kMs);
+  const auto strands = replay_->strands_at(4 * kStepNs + 3 * kMsInNs);
   ASSERT_TRUE(strands);
   EXPECT_EQ(strands->position_m, positions_in_head(truth_));
   EXPECT_EQ(strands->world_from_head, truth_.world_from_head);
@@ -75,7 +75,7 @@ TEST_F(StrandReplayTest, LowLatencyShowsTheNewestStateExactly) {
 TEST_F(StrandReplayTest, ALostFrameIsAGapAndAsksOnceASecond) {
   receive(next());
   (void)next();  // lost
-  for (int i = 0; i < 10; ++i) EXPECT_EQ(receive(next(), i * 150 * kMs), nullptr);
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(receive(next(), i * 150 * kMsInNs), nullptr);
   EXPECT_EQ(replay_->stats().gaps, 1u);
   EXPECT_EQ(replay_->stats().missed_frames, 1u);
   EXPECT_EQ(replay_->stats().rejected_frames, 10u);
@@ -111,13 +111,13 @@ TEST_F(StrandReplayTest, SmoothPlayoutMovesEvenlyBetweenStates) {
     const auto frame = next();
     truths.push_back(truth_);
     // Received unevenly: every other frame 4 ms late.
-    ASSERT_TRUE(receive(frame, i * kStepNs + (i % 2) * 4 * kMs));
+    ASSERT_TRUE(receive(frame, i * kStepNs + (i % 2) * 4 * kMsInNs));
   }
   const Snapshot& before = truths[truths.size() - 2];
   const Snapshot& newest = truths.back();
   double last = -1.0;
   int between = 0;
-  for (int64_t t_ns = 39 * kStepNs; t_ns < 42 * kStepNs; t_ns += kMs) {
+  for (int64_t t_ns = 39 * kStepNs; t_ns < 42 * kStepNs; t_ns += kMsInNs) {
     const auto strands = replay_->strands_at(t_ns);
     ASSERT_TRUE(strands);
     // Where the head is on its way from the last state but one to the newest, as a fraction.
@@ -220,7 +220,7 @@ TEST_F(StrandReplayTest, MeasuresMotionLatencyOncePerSampleAndStateAge) {
     hair_.step();
     truth_ = hair_.snapshot(kQuantumM);
     // Two states for each motion sample, which arrived 20 ms ago.
-    truth_.motion_time_ns = i % 2 == 0 ? now_ns() + kAheadNs - 20 * kMs : truth_.motion_time_ns;
+    truth_.motion_time_ns = i % 2 == 0 ? now_ns() + kAheadNs - 20 * kMsInNs : truth_.motion_time_ns;
     static int64_t held_ns = 0;
     if (i % 2 == 0) held_ns = truth_.motion_time_ns;
     truth_.motion_time_ns = held_ns;
@@ -275,4 +275,4 @@ TEST(Blend, MeetsBothEndsExactlyAndIsLinearBetween) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::strand_replay_test

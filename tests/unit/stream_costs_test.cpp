@@ -1,13 +1,12 @@
 // What classes of strands and pictures are said to cost, against frames of known size and time.
 #include "server/net/stream_costs.h"
+#include "common/base/units.h"
 
 #include <set>
 
-namespace strandcast {
+namespace strandcast::stream_costs_test {
 namespace {
-
-constexpr int64_t kSecondNs = 1'000'000'000;
-constexpr int64_t kStepNs = kSecondNs / 60;
+constexpr int64_t kStepNs = kSInNs / 60;
 
 FrameHeader frame_of(uint16_t stream_id, Opcode opcode = Opcode::StrandDelta) {
   FrameHeader header;
@@ -27,11 +26,11 @@ StrandCosts costs_of_built_in() {
 TEST(StrandCosts, UnmeasuredClassesFollowFromTheOneThatWas) {
   StrandCosts costs = costs_of_built_in();
   EXPECT_TRUE(costs.bytes_per_s(0).empty()) << "nothing is known yet";
-  costs.note_frame(frame_of(1, Opcode::StrandKeyframe), 1'000'000, kSecondNs);
+  costs.note_frame(frame_of(1, Opcode::StrandKeyframe), 1'000'000, kSInNs);
   EXPECT_TRUE(costs.bytes_per_s(0).empty()) << "a keyframe says nothing about deltas";
-  costs.note_frame(frame_of(static_cast<uint16_t>(costs.classes().size())), 1'000'000, kSecondNs);
+  costs.note_frame(frame_of(static_cast<uint16_t>(costs.classes().size())), 1'000'000, kSInNs);
   EXPECT_TRUE(costs.bytes_per_s(0).empty()) << "of no class";
-  costs.note_frame(frame_of(1), 5'000, kSecondNs);
+  costs.note_frame(frame_of(1), 5'000, kSInNs);
   const std::vector<double> found = costs.bytes_per_s(0);
   ASSERT_EQ(found.size(), costs.classes().size());
   const StrandClass& measured = costs.classes()[1];
@@ -81,10 +80,10 @@ TEST(StrandBytes, FewStrandsSaveLittleOfStep) {
 
 TEST(StrandCosts, WhatIsMeasuredCountsUntilItIsOld) {
   StrandCosts costs = costs_of_built_in();
-  costs.note_frame(frame_of(0), 10'000, kSecondNs);
-  costs.note_frame(frame_of(2), 1'000, kSecondNs + kStepNs);
+  costs.note_frame(frame_of(0), 10'000, kSInNs);
+  costs.note_frame(frame_of(2), 1'000, kSInNs + kStepNs);
   EXPECT_DOUBLE_EQ(costs.bytes_per_s(0)[0], 10'000 * costs.classes()[0].frame_rate_hz);
-  costs.note_frame(frame_of(2), 1'000, 10 * kSecondNs);
+  costs.note_frame(frame_of(2), 1'000, 10 * kSInNs);
   EXPECT_NEAR(costs.bytes_per_s(0)[0],
               expected_bytes_per_s(bytes_of("tangent"), {costs.classes()[2], 1'000}, costs.classes()[0]),
               1e-6);
@@ -93,15 +92,15 @@ TEST(StrandCosts, WhatIsMeasuredCountsUntilItIsOld) {
 TEST(StrandCosts, WhatOneCodecTakesSaysNothingOfTheOther) {
   const size_t class_count = costs_of_built_in().classes().size();
   StrandCosts costs(costs_of_built_in().classes(), {bytes_of("step"), bytes_of("tangent")});
-  costs.note_frame(frame_of(stream_id_of({1, 2})), 1'000, kSecondNs);
+  costs.note_frame(frame_of(stream_id_of({1, 2})), 1'000, kSInNs);
   EXPECT_TRUE(costs.bytes_per_s(0).empty());
   EXPECT_DOUBLE_EQ(costs.bytes_per_s(1)[2], 1'000 * costs.classes()[2].frame_rate_hz);
-  costs.note_frame(frame_of(stream_id_of({0, 0})), 500, kSecondNs);
+  costs.note_frame(frame_of(stream_id_of({0, 0})), 500, kSInNs);
   EXPECT_DOUBLE_EQ(costs.bytes_per_s(0)[0], 500 * costs.classes()[0].frame_rate_hz);
   EXPECT_GT(costs.bytes_per_s(1)[0], costs.bytes_per_s(0)[0]) << "estimated from its own class 2";
   const std::vector<double> before = costs.bytes_per_s(1);
   for (const StrandStream nowhere : {StrandStream{1, class_count}, StrandStream{2, 0}})
-    costs.note_frame(frame_of(stream_id_of(nowhere)), 1'000'000, kSecondNs);
+    costs.note_frame(frame_of(stream_id_of(nowhere)), 1'000'000, kSInNs);
   EXPECT_EQ(costs.bytes_per_s(1), before) << "of no class or codec";
 }
 
@@ -132,27 +131,27 @@ TEST(StrandStreams, AreFew) {
 
 TEST(StrandCosts, AChangeShowsWithinASecond) {
   StrandCosts costs = costs_of_built_in();
-  costs.note_frame(frame_of(0), 10'000, kSecondNs);
-  for (int i = 1; i <= 60; ++i) costs.note_frame(frame_of(0), 20'000, kSecondNs + i * kStepNs);
+  costs.note_frame(frame_of(0), 10'000, kSInNs);
+  for (int i = 1; i <= 60; ++i) costs.note_frame(frame_of(0), 20'000, kSInNs + i * kStepNs);
   EXPECT_NEAR(costs.bytes_per_s(0)[0], 20'000 * 60.0, 0.05 * 20'000 * 60.0);
 }
 
 TEST(PictureCosts, AreBytesTimesRateWhileThePictureChanges) {
   PictureCosts costs;
   EXPECT_EQ(costs.bytes_per_s(7), 0.0);
-  costs.note_picture(7, 500'000, kSecondNs);
+  costs.note_picture(7, 500'000, kSInNs);
   EXPECT_EQ(costs.bytes_per_s(7), 0.0) << "the first one is whole";
-  for (int i = 1; i <= 5; ++i) costs.note_picture(7, 8'000, kSecondNs + i * kSecondNs / 20);
+  for (int i = 1; i <= 5; ++i) costs.note_picture(7, 8'000, kSInNs + i * kSInNs / 20);
   EXPECT_NEAR(costs.bytes_per_s(7), 8'000 * 20.0, 1.0);
-  costs.note_picture(7, 8'000, 30 * kSecondNs);
+  costs.note_picture(7, 8'000, 30 * kSInNs);
   EXPECT_NEAR(costs.bytes_per_s(7), 8'000 * 20.0, 1.0) << "a pause is no lower rate";
-  costs.note_picture(8, 1'000, 100 * kSecondNs);
+  costs.note_picture(8, 1'000, 100 * kSInNs);
   EXPECT_EQ(costs.bytes_per_s(7), 0.0) << "forgotten after a minute";
-  costs.note_picture(8, 1'000, 100 * kSecondNs + kSecondNs / 10);
+  costs.note_picture(8, 1'000, 100 * kSInNs + kSInNs / 10);
   EXPECT_GT(costs.bytes_per_s(8), 0.0);
   costs.forget(8);
   EXPECT_EQ(costs.bytes_per_s(8), 0.0);
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::stream_costs_test

@@ -9,7 +9,7 @@
 #include "server/report/peers/frame_order.h"
 #include "server/report/peers/temporal_predictor.h"
 
-namespace strandcast {
+namespace strandcast::stream_peers_test {
 namespace {
 
 constexpr double kBoundM = 1e-4;
@@ -203,4 +203,4 @@ TEST(FrameOrder, SortsStrandsAndPutsThemBack) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::stream_peers_test

@@ -13,7 +13,7 @@
 #include "server/report/stream_view_page.h"
 #include "server/report/view_painter.h"
 
-namespace strandcast {
+namespace strandcast::stream_view_test {
 namespace {
 
 using testing::HasSubstr;
@@ -202,4 +202,4 @@ TEST(StreamPlayout, AStateThatWasThereIsShownAsItWas) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::stream_view_test

@@ -18,7 +18,7 @@
 #include "tests/support/claims.h"
 #include "tests/support/shared_data.h"
 
-namespace strandcast {
+namespace strandcast::streaming_test {
 namespace {
 
 using testing::HasSubstr;
@@ -688,4 +688,4 @@ TEST(SvgBars, DrawsABarPerNumber) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::streaming_test

@@ -15,7 +15,7 @@
 #include "tests/support/hair_motion.h"
 #include "tests/support/own_workers.h"
 
-namespace strandcast {
+namespace strandcast::tangent_codec_test {
 namespace {
 
 using namespace tangent;
@@ -304,7 +304,7 @@ glm::dvec3 to_head(const Pose& world_from_head, const glm::dvec3& point) {
 
 TEST(TangentHead, StepsMovePointsThatRestInTheWorld) {
   constexpr float kStepM = 4e-7f;
-  HeadMotion head;
+  tangent::HeadMotion head;
   head.pose = jittered_pose(0);
   for (uint32_t frame = 1; frame < 10; ++frame) {
     head = head.followed_by(jittered_pose(frame), kStepM);
@@ -323,7 +323,7 @@ TEST(TangentHead, StepsMovePointsThatRestInTheWorld) {
   // A head that stays has steps of nothing at all, however long its quaternion is.
   Pose longer = jittered_pose(1);
   longer.rotation *= 1.0004;
-  head = HeadMotion{longer, {}}.followed_by(longer, kStepM);
+  head = tangent::HeadMotion{longer, {}}.followed_by(longer, kStepM);
   for (const auto& row : head.step[0].row)
     for (const double coefficient : row) EXPECT_EQ(coefficient, 0.0);
 }
@@ -428,4 +428,4 @@ TEST(TangentLayout, TheFirstSlicesThinTheGroomEvenly) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::tangent_codec_test

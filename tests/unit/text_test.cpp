@@ -1,6 +1,6 @@
 #include "common/base/text.h"
 
-namespace strandcast {
+namespace strandcast::text_test {
 namespace {
 
 /// By the table of RFC 3629, section 3.
@@ -66,4 +66,4 @@ TEST(Text, OneLineShowsNothingThatActsOnATerminal) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::text_test

@@ -8,7 +8,7 @@
 #include "common/render/tiles/tile_bins.h"
 #include "tests/support/grown_hair.h"
 
-namespace strandcast {
+namespace strandcast::tile_limits_test {
 namespace {
 
 using testing::HasSubstr;
@@ -141,4 +141,4 @@ TEST(TileLimits, AnEyeInTheHairAndOneWhoseDepthHasNoLengthGiveAPicture) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::tile_limits_test

@@ -19,7 +19,7 @@
 #include "tests/support/grown_hair.h"
 #include "tests/support/sample_look.h"
 
-namespace strandcast {
+namespace strandcast::tile_renderer_test {
 namespace {
 
 TEST(TileRenderer, ThreadsAndInstructionSetsDoNotShow) {
@@ -583,4 +583,4 @@ TEST(TileRenderer, HalvesAreExact) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::tile_renderer_test

@@ -2,13 +2,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/base/units.h"
 #include "common/replay/snapshot_timeline.h"
 
-namespace strandcast {
+namespace strandcast::timeline_player_test {
 namespace {
-
-constexpr double kNsPerS = 1e9;
-constexpr int64_t kMs = 1'000'000;
 constexpr int64_t kTickNs = 16'666'667;
 constexpr int64_t kSettled = 60;  // states until the clock has settled
 
@@ -91,7 +89,7 @@ Played play(const std::vector<int>& ticks, double seconds, double look_from_s) {
   size_t next = 0;
   double last_s = -1.0;
   for (int64_t picture = 0; picture < std::llround(seconds * 60.0); ++picture) {
-    const int64_t client_ns = picture * kTickNs + 3 * kMs;
+    const int64_t client_ns = picture * kTickNs + 3 * kMsInNs;
     for (; tick * kTickNs <= client_ns; tick += ticks[std::min(next++, ticks.size() - 1)])
       timeline.add(played_state(tick * kTickNs), tick * kTickNs, Continuity::SameStream);
     const auto strands = player.strands_at(timeline, client_ns);
@@ -169,9 +167,9 @@ TEST(TimelinePlayer, WhatWasChosenStaysUntilTheNextState) {
     return player.interpolation();
   };
   EXPECT_EQ(at(100.3), Interpolation::Linear) << "between 99 and 100, and there is no 101";
-  timeline.add(played_state(101 * kTickNs), 100 * kTickNs + 5 * kMs, Continuity::SameStream);
+  timeline.add(played_state(101 * kTickNs), 100 * kTickNs + 5 * kMsInNs, Continuity::SameStream);
   EXPECT_EQ(at(100.6), Interpolation::Linear) << "a change in the middle would be seen";
-  timeline.add(played_state(102 * kTickNs), 101 * kTickNs + kMs, Continuity::SameStream);
+  timeline.add(played_state(102 * kTickNs), 101 * kTickNs + kMsInNs, Continuity::SameStream);
   EXPECT_EQ(at(101.5), Interpolation::Cubic) << "between 100 and 101, and 102 is early";
   timeline.set_playout(Playout::LowLatency);
   EXPECT_EQ(at(101.6), Interpolation::None);
@@ -203,7 +201,7 @@ TEST(TimelinePlayer, AResetServerStartsOnTheLine) {
   };
   EXPECT_EQ(play_on(0, kSettled), Interpolation::Cubic);
   EXPECT_EQ(play_on(0, kSettled), Interpolation::Cubic) << "reset";
-  client_ns += 2'000 * kMs;
+  client_ns += 2'000 * kMsInNs;
   EXPECT_EQ(play_on(kSettled, 2 * kSettled), Interpolation::Cubic) << "paused and resumed";
 }
 
@@ -245,10 +243,10 @@ TEST(TimelinePlayer, OfHugeStatesTheLineIsShown) {
   TimelinePlayer player;
   for (int64_t i = 0; i < kSettled; ++i) {
     timeline.add(played_state(2 * i * kTickNs), 2 * i * kTickNs, Continuity::SameStream);
-    ASSERT_TRUE(player.strands_at(timeline, 2 * i * kTickNs + kMs));
+    ASSERT_TRUE(player.strands_at(timeline, 2 * i * kTickNs + kMsInNs));
     EXPECT_TRUE(i < 10 || player.interpolation() == Interpolation::Linear) << i;
   }
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::timeline_player_test

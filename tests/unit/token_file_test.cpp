@@ -10,7 +10,7 @@
 
 #include "tests/support/temporary_folder.h"
 
-namespace strandcast {
+namespace strandcast::token_file_test {
 namespace {
 
 using testing::HasSubstr;
@@ -144,4 +144,4 @@ TEST_F(TokenFiles, ALineMayEnd) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::token_file_test

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-namespace strandcast {
+namespace strandcast::value_coder_test {
 namespace {
 
 SymbolTable even_table() {
@@ -193,4 +193,4 @@ TEST(ValueCoder, MissingOrLeftOverBytesAreNoticed) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::value_coder_test

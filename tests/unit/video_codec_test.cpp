@@ -5,7 +5,7 @@
 #include "common/pictures/picture_decoder.h"
 #include "tests/support/test_pictures.h"
 
-namespace strandcast {
+namespace strandcast::video_codec_test {
 namespace {
 
 using test::in_grey;
@@ -299,4 +299,4 @@ TEST(Vp8, HostileSizesNeverReachTheDecoder) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::video_codec_test

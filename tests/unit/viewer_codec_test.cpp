@@ -1,11 +1,12 @@
 // Which codec a viewer gets, with codecs that are invented: one that predicts and the one behind it.
 #include "server/app/viewer_codec.h"
+#include "common/base/units.h"
 
 #include "common/scene/scene_fields.h"
 #include "common/wire/messages.h"
 #include "server/net/strand_class.h"
 
-namespace strandcast {
+namespace strandcast::viewer_codec_test {
 namespace {
 
 using testing::HasSubstr;
@@ -141,8 +142,6 @@ TEST(ViewerCodec, ReasonsFitIntoAWelcome) {
     }
   }
 }
-
-constexpr int64_t kS = 1'000'000'000;
 /// Of a state at 60 Hz.
 DecodeLoad load_of(double share) {
   return {share * 1e3 / 60.0, 60.0};
@@ -151,17 +150,17 @@ DecodeLoad load_of(double share) {
 /// What a viewer that is looked at four times a second is told, and when.
 std::optional<int64_t> told_after(ViewerCodecWatch& watch, const ViewerCodecFacts& facts,
                                   const DecodeLoad& load, int64_t begin_ns) {
-  for (int64_t time_ns = begin_ns; time_ns <= begin_ns + 60 * kS; time_ns += kS / 4)
+  for (int64_t time_ns = begin_ns; time_ns <= begin_ns + 60 * kSInNs; time_ns += kSInNs / 4)
     if (watch.look(predicting_and_plain(), facts, load, time_ns)) return time_ns - begin_ns;
   return std::nullopt;
 }
 
 TEST(ViewerCodecWatch, WhoDecodesTooSlowlyForLongGetsTheFallback) {
   ViewerCodecWatch quick(able_viewer(), kPredicting), slow(able_viewer(), kPredicting);
-  EXPECT_EQ(told_after(quick, able_viewer(), load_of(0.99 * kSlowDecodeShare), kS), std::nullopt);
-  EXPECT_EQ(told_after(slow, able_viewer(), load_of(1.01 * kSlowDecodeShare), kS), kSlowDecodeNs);
+  EXPECT_EQ(told_after(quick, able_viewer(), load_of(0.99 * kSlowDecodeShare), kSInNs), std::nullopt);
+  EXPECT_EQ(told_after(slow, able_viewer(), load_of(1.01 * kSlowDecodeShare), kSInNs), kSlowDecodeNs);
   // As it decodes the other one in no time, it stays with that.
-  EXPECT_EQ(told_after(slow, able_viewer(), load_of(0.01), 100 * kS), std::nullopt);
+  EXPECT_EQ(told_after(slow, able_viewer(), load_of(0.01), 100 * kSInNs), std::nullopt);
 
   ViewerCodecWatch told(able_viewer(), kPredicting);
   EXPECT_EQ(told.look(predicting_and_plain(), able_viewer(), load_of(0.9), 0), std::nullopt);
@@ -189,7 +188,7 @@ TEST(ViewerCodecWatch, OtherStepsAreChosenForAnew) {
   ViewerCodecFacts facts = able_viewer();
   facts.step_ns = 0.5 * kPredictionShare * 1e9 / (2'000 * 60.0);  // half of the share
   const auto look = [&](ViewerCodecWatch& watch) {
-    return watch.look(predicting_and_plain(), facts, {}, kS);
+    return watch.look(predicting_and_plain(), facts, {}, kSInNs);
   };
   ViewerCodecWatch watch(facts, kPredicting);
   EXPECT_FALSE(look(watch));
@@ -204,7 +203,7 @@ TEST(ViewerCodecWatch, OtherStepsAreChosenForAnew) {
   ASSERT_TRUE(cheaper);
   EXPECT_EQ(cheaper->codec, kPredicting);
   // Who was too slow for one solver may try with another that costs the same.
-  EXPECT_TRUE(told_after(watch, facts, load_of(2.0), 100 * kS));
+  EXPECT_TRUE(told_after(watch, facts, load_of(2.0), 100 * kSInNs));
   facts.solver = "another";
   const auto again = look(watch);
   ASSERT_TRUE(again);
@@ -216,16 +215,17 @@ TEST(ViewerCodecWatch, WhoLearnsToPredictIsChosenForAnewOnce) {
   ViewerCodecFacts facts = able_viewer();
   facts.step_ns = 0.0;
   ViewerCodecWatch watch(facts, kFallback);
-  EXPECT_EQ(told_after(watch, facts, load_of(0.01), kS), std::nullopt);
-  const auto learnt = watch.look(predicting_and_plain(), able_viewer(), load_of(0.01), 100 * kS);
+  EXPECT_EQ(told_after(watch, facts, load_of(0.01), kSInNs), std::nullopt);
+  const auto learnt = watch.look(predicting_and_plain(), able_viewer(), load_of(0.01), 100 * kSInNs);
   ASSERT_TRUE(learnt);
   EXPECT_EQ(learnt->codec, kPredicting);
-  EXPECT_EQ(told_after(watch, able_viewer(), load_of(2.0), 100 * kS), kSettledDecodeNs + kSlowDecodeNs);
-  EXPECT_EQ(told_after(watch, able_viewer(), load_of(0.01), 200 * kS), std::nullopt) << "it was too slow";
+  EXPECT_EQ(told_after(watch, able_viewer(), load_of(2.0), 100 * kSInNs), kSettledDecodeNs + kSlowDecodeNs);
+  EXPECT_EQ(told_after(watch, able_viewer(), load_of(0.01), 200 * kSInNs), std::nullopt) << "it was too slow";
 
   ViewerCodecWatch slow(facts, kFallback);
   facts.step_ns = kPredictionShare * 1e9;
-  EXPECT_EQ(told_after(slow, facts, load_of(0.01), kS), std::nullopt) << "it learnt that it cannot afford it";
+  EXPECT_EQ(told_after(slow, facts, load_of(0.01), kSInNs), std::nullopt)
+      << "it learnt that it cannot afford it";
 }
 
 // Reports are of the last states, and those may be of what was simulated before.
@@ -233,8 +233,8 @@ TEST(ViewerCodecWatch, ReportsOfOtherStepsDoNotCount) {
   ViewerCodecFacts facts = able_viewer();
   ViewerCodecWatch watch(facts, kPredicting);
   facts.solver = "another";
-  EXPECT_FALSE(watch.look(predicting_and_plain(), facts, load_of(2.0), kS));
-  EXPECT_EQ(told_after(watch, facts, load_of(2.0), kS), kSettledDecodeNs + kSlowDecodeNs);
+  EXPECT_FALSE(watch.look(predicting_and_plain(), facts, load_of(2.0), kSInNs));
+  EXPECT_EQ(told_after(watch, facts, load_of(2.0), kSInNs), kSettledDecodeNs + kSlowDecodeNs);
 }
 
 TEST(ViewerCodecWatch, WhoAskedForACodecKeepsIt) {
@@ -242,9 +242,9 @@ TEST(ViewerCodecWatch, WhoAskedForACodecKeepsIt) {
   for (const auto& [wish, codec] : {std::pair{"oracle", kPredicting}, {"plain", kFallback}}) {
     facts.wish = wish;
     ViewerCodecWatch watch(facts, codec);
-    EXPECT_EQ(told_after(watch, facts, load_of(5.0), kS), std::nullopt) << wish;
+    EXPECT_EQ(told_after(watch, facts, load_of(5.0), kSInNs), std::nullopt) << wish;
     facts.substeps *= 1e6;
-    EXPECT_EQ(told_after(watch, facts, load_of(5.0), 100 * kS), std::nullopt) << wish;
+    EXPECT_EQ(told_after(watch, facts, load_of(5.0), 100 * kSInNs), std::nullopt) << wish;
   }
 }
 
@@ -252,8 +252,8 @@ TEST(ViewerCodecWatch, WhereNothingElseIsServedNothingChanges) {
   const std::vector<StrandCodecInfo> alone = {{"oracle", "", true, "", 0.1}};
   ViewerCodecFacts facts = able_viewer();
   ViewerCodecWatch watch(facts, 0);
-  for (int64_t time_ns = 0; time_ns < 60 * kS; time_ns += kS) {
-    if (time_ns == 30 * kS) facts.substeps = 1e6;
+  for (int64_t time_ns = 0; time_ns < 60 * kSInNs; time_ns += kSInNs) {
+    if (time_ns == 30 * kSInNs) facts.substeps = 1e6;
     EXPECT_FALSE(watch.look(alone, facts, load_of(5.0), time_ns));
   }
 }
@@ -294,4 +294,4 @@ TEST(ServedCodecs, WhatPredictsHasAFallbackThatDoesNot) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::viewer_codec_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace strandcast {
+namespace strandcast::wet_hair_test {
 namespace {
 
 TEST(WetHair, DryHairIsAsItWas) {
@@ -62,4 +62,4 @@ TEST(WetHair, ANewSolverIsNeededForAnotherWetness) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::wet_hair_test

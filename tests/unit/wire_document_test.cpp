@@ -14,7 +14,7 @@
 #include "common/wire/messages.h"
 #include "server/net/strand_class.h"
 
-namespace strandcast {
+namespace strandcast::wire_document_test {
 namespace {
 
 using namespace tangent;
@@ -175,4 +175,4 @@ TEST(WireDocument, ExampleHeaderHasItsBytes) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::wire_document_test

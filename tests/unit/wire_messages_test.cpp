@@ -3,13 +3,14 @@
 #include <map>
 #include <random>
 
+#include "common/base/units.h"
 #include "common/replay/clock_offset.h"
 #include "common/scene/scene_fields.h"
 #include "common/strands/frame_header.h"
 #include "common/wire/messages.h"
 #include "tests/support/sample_messages.h"
 
-namespace strandcast {
+namespace strandcast::wire_messages_test {
 namespace {
 
 using testing::HasSubstr;
@@ -493,16 +494,14 @@ TEST(WireMessages, ClientLimitsAreExact) {
   EXPECT_FALSE(decode_client_message(encode(ClientMessage(SetParameter{"a\nb"}))));
 }
 
-constexpr int64_t kMs = 1'000'000;
-
 TEST(ClockOffset, SymmetricPathsGiveTheExactOffset) {
-  for (const int64_t truth_ns : {int64_t{0}, int64_t{-3'600'000} * kMs, int64_t{7} * kMs}) {
+  for (const int64_t truth_ns : {int64_t{0}, int64_t{-3'600'000} * kMsInNs, int64_t{7} * kMsInNs}) {
     ClockOffset clock;
     EXPECT_FALSE(clock.has_value());
-    clock.add(100 * kMs, 105 * kMs + truth_ns, 108 * kMs + truth_ns, 113 * kMs);
+    clock.add(100 * kMsInNs, 105 * kMsInNs + truth_ns, 108 * kMsInNs + truth_ns, 113 * kMsInNs);
     ASSERT_TRUE(clock.has_value());
     EXPECT_EQ(clock.offset_ns(), truth_ns);
-    EXPECT_EQ(clock.error_ns(), 5 * kMs);
+    EXPECT_EQ(clock.error_ns(), 5 * kMsInNs);
     EXPECT_EQ(clock.to_server_ns(1), truth_ns + 1);
   }
 }
@@ -513,10 +512,10 @@ TEST(ClockOffset, ErrorStaysBelowHalfTheBestRoundTripForAnyDelays) {
     const auto truth_ns = static_cast<int64_t>(random() % 1'000'000'000'000);
     ClockOffset clock;
     for (int probe = 0; probe < 20; ++probe) {
-      const auto there_ns = static_cast<int64_t>(random() % (50 * kMs));
-      const auto held_ns = static_cast<int64_t>(random() % kMs);
-      const auto back_ns = static_cast<int64_t>(random() % (50 * kMs));
-      const int64_t send_ns = probe * 100 * kMs;
+      const auto there_ns = static_cast<int64_t>(random() % (50 * kMsInNs));
+      const auto held_ns = static_cast<int64_t>(random() % kMsInNs);
+      const auto back_ns = static_cast<int64_t>(random() % (50 * kMsInNs));
+      const int64_t send_ns = probe * 100 * kMsInNs;
       clock.add(send_ns, send_ns + there_ns + truth_ns, send_ns + there_ns + held_ns + truth_ns,
                 send_ns + there_ns + held_ns + back_ns);
       EXPECT_LE(std::abs(clock.offset_ns() - truth_ns), clock.error_ns());
@@ -527,10 +526,10 @@ TEST(ClockOffset, ErrorStaysBelowHalfTheBestRoundTripForAnyDelays) {
 TEST(ClockOffset, KeepsTheBestProbeOfTheWindowOnly) {
   ClockOffset clock;
   clock.add(0, 1, 1, 2);  // excellent, but soon out of date
-  for (size_t i = 0; i + 1 < kClockWindow; ++i) clock.add(0, 50 * kMs, 50 * kMs, 90 * kMs);
+  for (size_t i = 0; i + 1 < kClockWindow; ++i) clock.add(0, 50 * kMsInNs, 50 * kMsInNs, 90 * kMsInNs);
   EXPECT_EQ(clock.error_ns(), 1);
-  clock.add(0, 50 * kMs, 50 * kMs, 90 * kMs);
-  EXPECT_EQ(clock.error_ns(), 45 * kMs);
+  clock.add(0, 50 * kMsInNs, 50 * kMsInNs, 90 * kMsInNs);
+  EXPECT_EQ(clock.error_ns(), 45 * kMsInNs);
 }
 
 TEST(ClockOffset, IgnoresImpossibleProbes) {
@@ -550,4 +549,4 @@ TEST(ClockOffset, IgnoresImpossibleProbes) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::wire_messages_test

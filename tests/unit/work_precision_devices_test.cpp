@@ -3,7 +3,7 @@
 
 #include "server/report/work_precision_page.h"
 
-namespace strandcast {
+namespace strandcast::work_precision_devices_test {
 namespace {
 
 using testing::AllOf;
@@ -105,4 +105,4 @@ TEST(WorkPrecisionDevices, ThePageShowsBothFrontsAndWhatLanesSave) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::work_precision_devices_test

@@ -12,7 +12,7 @@
 #include <numeric>
 #include <string>
 
-namespace strandcast {
+namespace strandcast::worker_pool_test {
 namespace {
 
 using testing::Each;
@@ -196,4 +196,4 @@ TEST(WorkerPool, OtherProgramsGoFirst) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::worker_pool_test

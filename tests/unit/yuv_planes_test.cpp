@@ -5,7 +5,7 @@
 
 #include "tests/support/test_pictures.h"
 
-namespace strandcast {
+namespace strandcast::yuv_planes_test {
 namespace {
 
 /// There and back, without a codec between.
@@ -54,4 +54,4 @@ TEST(YuvPlanes, GreyStaysGreyAndOddEdgesAreKept) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::yuv_planes_test

@@ -19,7 +19,7 @@
 #include "tests/support/sample_asset.h"
 #include "tests/support/sample_messages.h"
 
-namespace strandcast {
+namespace strandcast::wire_bad_test {
 namespace {
 
 using namespace tangent;
@@ -505,4 +505,4 @@ TEST(PictureBytes, DamagedJpegsNeverCrash) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::wire_bad_test

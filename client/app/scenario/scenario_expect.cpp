@@ -7,6 +7,7 @@
 #include "client/app/scenario/scenario_run.h"
 #include "common/base/file.h"
 #include "common/base/text.h"
+#include "common/base/units.h"
 #include "common/log/log.h"
 #include "common/pictures/picture_error.h"
 #include "common/render/render_device.h"
@@ -18,9 +19,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPoll{50};
-constexpr double kBitsPerByte = 8.0;
-constexpr size_t kMaxShownChars = 300;
+constexpr milliseconds kExpectPoll{50};
+constexpr size_t kMaxExpectedChars = 300;
 constexpr double kRefusalTimeoutS = 10.0;
 
 /// The value of a line of /metrics; none where there is no such line.
@@ -176,7 +176,7 @@ bool ScenarioRun::await(double seconds, const std::function<bool()>& condition) 
   while (!condition()) {
     if (elapsed_s() - begin_s >= seconds || !go_on()) return false;
     // What else comes meanwhile is not to pile up.
-    for (const ClientEvent& event : client_->wait(kPoll)) take(event);
+    for (const ClientEvent& event : client_->wait(kExpectPoll)) take(event);
     trace();
   }
   return true;
@@ -186,7 +186,7 @@ void ScenarioRun::expect_slow_motion(const ScenarioExpect& expect) {
   const auto says_slow = [this] { return status_ns_ != 0 && !status_.slow_motion.empty(); };
   const bool is_so = await(expect.within_s, [&] { return says_slow() == *expect.is_slow; });
   report("what the server says", *expect.is_slow ? "slow motion" : "real time",
-         says_slow() ? excerpt(status_.slow_motion, kMaxShownChars)
+         says_slow() ? excerpt(status_.slow_motion, kMaxExpectedChars)
                      : std::string("it does not say that it is slow"),
          is_so);
 }
@@ -344,7 +344,7 @@ Status ScenarioRun::carry_out(const ScenarioRefusal& refusal) {
          refusal.says.empty() ? std::string("refused with a sentence")
                               : fmt::format("refused: '{}'", refusal.says),
          answer.empty() ? std::string("it was not refused")
-                        : "the server says: " + excerpt(answer, kMaxShownChars),
+                        : "the server says: " + excerpt(answer, kMaxExpectedChars),
          is_said);
   // And goes on as if nothing had been.
   const auto text = metrics();

@@ -7,11 +7,11 @@
 
 #include "client/app/ctl_commands.h"
 #include "common/base/thread_name.h"
+#include "common/base/units.h"
 
 namespace strandcast {
 namespace {
 
-constexpr double kNsPerS = 1e9;
 constexpr uint64_t kMostSamples = kMaxSamplesPerMessage;
 
 }  // namespace

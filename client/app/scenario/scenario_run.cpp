@@ -12,6 +12,7 @@
 #include "common/base/file.h"
 #include "common/base/hash.h"
 #include "common/base/text.h"
+#include "common/base/units.h"
 #include "common/scene/scenario_file.h"
 
 namespace strandcast {
@@ -26,11 +27,10 @@ constexpr double kStateS = 0.5;           // likewise behind the others
 constexpr int kMostMisses = 3;            // then a viewer is waited for no more
 constexpr double kSeenRateHz = 60.0;      // of the states that viewers see while it is stepped
 constexpr uint64_t kBlindChunk = 64;      // steps at once where nobody watches
-constexpr milliseconds kPoll{5};
+constexpr milliseconds kRunPoll{5};
 constexpr milliseconds kHttpTimeout{3'000};
 constexpr double kTraceS = 0.25;
 constexpr double kLifetimeMarginS = 30.0;
-constexpr double kBitsPerByte = 8.0;
 
 /// A folder that nobody else has.
 Result<std::filesystem::path> make_folder() {
@@ -249,7 +249,7 @@ Status ScenarioRun::carry_out(const ScenarioRunTime& run) {
   status_ns_ = 0;
   while (elapsed_s() - begin_s < run.seconds) {
     RETURN_IF_ERROR(go_on());
-    for (const ClientEvent& event : client_->wait(kPoll)) take(event);
+    for (const ClientEvent& event : client_->wait(kRunPoll)) take(event);
     if (lost_) return *lost_;
     if (first_ns == 0 && status_ns_ != 0) {
       first_tick = status_.tick;
@@ -380,7 +380,7 @@ Status ScenarioRun::carry_out(const ScenarioView& view) {
   const ScenarioViewer& joined = *viewers_[view.name];
   while (joined.look().counts.frames == 0) {
     RETURN_IF_ERROR(go_on());
-    std::this_thread::sleep_for(kPoll);
+    std::this_thread::sleep_for(kRunPoll);
   }
   return {};
 }

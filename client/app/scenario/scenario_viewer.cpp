@@ -9,16 +9,16 @@
 #include "client/app/step_speed.h"
 #include "client/app/view_options.h"
 #include "common/base/thread_name.h"
+#include "common/base/units.h"
 
 namespace strandcast {
 namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPumpWait{5};
+constexpr milliseconds kScenarioPumpWait{5};
 constexpr int64_t kReportNs = 1'000'000'000;
 constexpr double kBytesPerMbit = 125e3;
-constexpr double kUsPerMs = 1e3;
 
 Result<std::unique_ptr<chaos::ChaosRelay>> make_link(const ScenarioView& view, const Address& server) {
   if (view.link_mbit <= 0.0 && view.delay_ms <= 0.0) return std::unique_ptr<chaos::ChaosRelay>();
@@ -70,7 +70,7 @@ void ScenarioViewer::run(LiveConnection& live) {
   int64_t reported_ns = 0;
   while (!is_leaving_) {
     const ViewerCounts before = counts_of(live.session());
-    if (live.pump(kPumpWait)) {
+    if (live.pump(kScenarioPumpWait)) {
       earlier_ = before;
       watch(live.session());
     }

@@ -24,7 +24,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPoll{10};
+constexpr milliseconds kProcessPoll{10};
 constexpr milliseconds kEndTimeout{8'000};  // from the wish to the kill
 constexpr int kRestarts = 20;               // the port may be taken for a moment
 constexpr milliseconds kRestartPause{100};
@@ -98,7 +98,7 @@ Status ServerProcess::wait_for_port(double timeout_s, const std::atomic<bool>& s
     if (now_ns() >= end_ns)
       return make_error(ErrorCode::Timeout, "the server did not serve within {:.0f} s: {}", timeout_s,
                         last_line());
-    std::this_thread::sleep_for(kPoll);
+    std::this_thread::sleep_for(kProcessPoll);
   }
 }
 
@@ -130,7 +130,7 @@ void ServerProcess::stop() {
   const int64_t end_ns = now_ns() + std::chrono::nanoseconds(kEndTimeout).count();
   while (now_ns() < end_ns) {
     if (has_ended()) return;
-    std::this_thread::sleep_for(kPoll);
+    std::this_thread::sleep_for(kProcessPoll);
   }
   kill(process_, SIGKILL);
   waitpid(process_, nullptr, 0);

@@ -2,17 +2,13 @@
 
 #include <iostream>
 
+#include "client/app/ctl_commands.h"
 #include "client/app/scenario/scenario_run.h"
 #include "common/base/file.h"
 #include "common/scene/scenario_file.h"
 
 namespace strandcast {
 namespace {
-
-int fail(const Error& error) {
-  std::cerr << "strandcast-ctl: " << error.to_string() << '\n';
-  return kBadInputExit;
-}
 
 Result<std::filesystem::path> find_server(const TestOptions& options) {
   std::error_code failure;
@@ -68,16 +64,16 @@ int run_test(const CtlTarget& target, const TestOptions& options, const std::ato
   std::vector<Scenario> scenarios;
   for (const std::filesystem::path& path : options.scenarios) {
     auto scenario = load_scenario(path);
-    if (!scenario) return fail(scenario.error());
+    if (!scenario) return ctl_failure(scenario.error());
     scenarios.push_back(std::move(scenario).value());
   }
-  if (const Status status = check_names(scenarios); !status) return fail(status.error());
+  if (const Status status = check_names(scenarios); !status) return ctl_failure(status.error());
   ScenarioOptions run{{}, {}, options.out, options.renews_goldens, &stop};
   if (options.uses_running) {
     run.running = target;
   } else {
     auto server = find_server(options);
-    if (!server) return fail(server.error());
+    if (!server) return ctl_failure(server.error());
     run.server = std::move(server).value();
   }
   std::vector<ScenarioResult> results;
@@ -95,7 +91,7 @@ int run_test(const CtlTarget& target, const TestOptions& options, const std::ato
   if (!options.junit.empty()) {
     const std::string xml = to_junit(results);
     if (const Status saved = save_file(options.junit, std::as_bytes(std::span(xml))); !saved)
-      return fail(saved.error());
+      return ctl_failure(saved.error());
   }
   if (failed > 0) std::cout << fmt::format("what failed: {}\n", options.out.string());
   if (stop) std::cout << "stopped\n";

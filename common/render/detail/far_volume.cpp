@@ -12,8 +12,8 @@
 namespace strandcast {
 namespace {
 
-constexpr uint32_t kCells = 64;  // along each side
-constexpr uint64_t kCellCount = uint64_t{kCells} * kCells * kCells;
+constexpr uint32_t kFarVolumeCells = 64;  // along each side
+constexpr uint64_t kCellCount = uint64_t{kFarVolumeCells} * kFarVolumeCells * kFarVolumeCells;
 constexpr uint32_t kSumsPerCell = 5;
 // Steps in which sums are counted: up to 2,048 of optical depth per cell.
 constexpr float kSumSteps = 1048576.0f;
@@ -25,7 +25,7 @@ constexpr float kStrandsAlonePx = 0.25f;
 // Behind the units of the light and of what shades.
 constexpr uint32_t kWayUnit = 8;
 constexpr uint32_t kAlongUnit = 9;
-constexpr uint32_t kDepthUnit = 10;
+constexpr uint32_t kFarDepthUnit = 10;
 
 class FarBeginPass final : public RenderPass {
  public:
@@ -105,8 +105,8 @@ class FarDrawPass final : public RenderPass {
     const gl::Program& program = screen_.program();
     set_strand_light(scene_, program, turn);
     volume_.set_uniforms(program, turn);
-    scene_.scene.depth().bind(kDepthUnit);
-    program.set("u_scene_depth", static_cast<int>(kDepthUnit));
+    scene_.scene.depth().bind(kFarDepthUnit);
+    program.set("u_scene_depth", static_cast<int>(kFarDepthUnit));
     screen_.draw();
     return {};
   }
@@ -132,8 +132,8 @@ void FarVolume::begin(const RenderScene& scene, RenderTurn& turn) {
   if (!is_seen()) return;
   if (cell_.size_bytes() == 0) {
     cell_ = gl::Buffer("far sums", kCellCount * kSumsPerCell * sizeof(int32_t));
-    way_ = gl::Texture::volume("far way", GL_RGBA32F, kCells, kCells, kCells);
-    along_ = gl::Texture::volume("far along", GL_R32F, kCells, kCells, kCells);
+    way_ = gl::Texture::volume("far way", GL_RGBA32F, kFarVolumeCells, kFarVolumeCells, kFarVolumeCells);
+    along_ = gl::Texture::volume("far along", GL_R32F, kFarVolumeCells, kFarVolumeCells, kFarVolumeCells);
   }
   cube_ = fit_hair_cube(turn.strands.position_m, shadow_margin_m(scene));
   glClearNamedBufferData(cell_.name(), GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
@@ -146,9 +146,9 @@ void FarVolume::add(const gl::Program& program, const RenderScene& scene, const 
   expanded.vertex().bind_storage(shader::kBindingExpanded);
   cell_.bind_storage(shader::kBindingFarSum);
   program.set("u_segments", expanded.segment_count);
-  program.set("u_cells", static_cast<int>(kCells));
+  program.set("u_cells", static_cast<int>(kFarVolumeCells));
   program.set("u_cube_origin_m", cube_.origin_m);
-  program.set("u_cell_m", cube_.side_m / static_cast<float>(kCells));
+  program.set("u_cell_m", cube_.side_m / static_cast<float>(kFarVolumeCells));
   program.set("u_eye_m", turn.view.eye_m);
   program.set("u_strand_width_m", expanded.width_m);
   program.set("u_tip_scale", scene.look.tip_scale);
@@ -161,10 +161,12 @@ void FarVolume::finish() const {
   glMemoryBarrier(GL_PIXEL_BUFFER_BARRIER_BIT);
   glBindBuffer(GL_PIXEL_UNPACK_BUFFER, cell_.name());
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-  glTextureSubImage3D(way_.name(), 0, 0, 0, 0, kCells, kCells, kCells, GL_RGBA, GL_INT, nullptr);
+  glTextureSubImage3D(way_.name(), 0, 0, 0, 0, kFarVolumeCells, kFarVolumeCells, kFarVolumeCells, GL_RGBA,
+                      GL_INT, nullptr);
   // Behind the four sums of all cells.
   const auto* const offset = reinterpret_cast<const void*>(uintptr_t{kCellCount * 4 * sizeof(int32_t)});
-  glTextureSubImage3D(along_.name(), 0, 0, 0, 0, kCells, kCells, kCells, GL_RED, GL_INT, offset);
+  glTextureSubImage3D(along_.name(), 0, 0, 0, 0, kFarVolumeCells, kFarVolumeCells, kFarVolumeCells, GL_RED,
+                      GL_INT, offset);
   glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
 }
 
@@ -175,7 +177,8 @@ void FarVolume::set_uniforms(const gl::Program& program, const RenderTurn& turn)
   program.set("u_along", static_cast<int>(kAlongUnit));
   program.set("u_far_origin_m", cube_.origin_m);
   program.set("u_far_side_m", cube_.side_m);
-  program.set("u_depth_per_m", static_cast<float>(kGreatestInteger / kSumSteps / (cube_.side_m / kCells)));
+  program.set("u_depth_per_m",
+              static_cast<float>(kGreatestInteger / kSumSteps / (cube_.side_m / kFarVolumeCells)));
   program.set("u_share", share_);
   program.set("u_head_from_clip", glm::inverse(turn.view.clip_from_head));
   program.set("u_pixel_step", 1.0f / glm::vec2(turn.size_px));

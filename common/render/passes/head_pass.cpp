@@ -8,7 +8,7 @@
 namespace strandcast {
 namespace {
 
-constexpr uint32_t kLightUnit = 0;
+constexpr uint32_t kHeadLightUnit = 0;
 // How far above the skin the hair's shadow is looked up.
 constexpr float kShadowLiftCells = 1.0f;
 
@@ -35,7 +35,7 @@ class HeadPass final : public RenderPass {
   Status run(RenderTurn& turn) override {
     scene_.scene.begin();
     program_.use();
-    scene_.light.set_uniforms(program_, kLightUnit);
+    scene_.light.set_uniforms(program_, kHeadLightUnit);
     if (scene_.shadow != nullptr) scene_.shadow->set_uniforms(program_, kFirstShadowUnit);
     program_.set("u_clip_from_head", turn.view.clip_from_head);
     program_.set("u_eye_m", turn.view.eye_m);

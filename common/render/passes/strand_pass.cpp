@@ -15,7 +15,7 @@ namespace strandcast {
 namespace {
 
 constexpr uint32_t kSegmentsPerDraw = StrandDraw::kSegmentsPerDraw;
-constexpr uint32_t kLightUnit = 0;
+constexpr uint32_t kStrandLightUnit = 0;
 // Behind those of the light's map and of what is blended.
 constexpr uint32_t kLongitudinalUnit = 11;
 constexpr uint32_t kAzimuthalUnit = 12;
@@ -223,7 +223,7 @@ gl::Variant strand_light_variant(const RenderScene& scene) {
 }
 
 void set_strand_light(const RenderScene& scene, const gl::Program& program, const RenderTurn& turn) {
-  scene.light.set_uniforms(program, kLightUnit);
+  scene.light.set_uniforms(program, kStrandLightUnit);
   if (scene.shadow != nullptr) scene.shadow->set_uniforms(program, kFirstShadowUnit);
   program.set("u_eye_m", turn.view.eye_m);
   set_shading(scene, program);

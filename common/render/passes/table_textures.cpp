@@ -16,7 +16,7 @@ uint64_t volume_bytes(uint64_t width, uint64_t height, uint64_t depth) {
 // A cuticle that is tilted by an angle turns what it reflects by twice as much.
 constexpr float kShiftPerTilt = -2.0f;
 // What water takes of the width of highlights, as lib/hair_light.glsl has it.
-constexpr float kWetSharp = 0.5f;
+constexpr float kWetTableSharp = 0.5f;
 
 }  // namespace
 
@@ -61,7 +61,7 @@ void DensityTexture::upload(const LightVolume& volume) {
 std::array<scatter::LobeShape, 3> lobe_shapes_of(const LookDesc& look) {
   const HairShadingDesc& shading = look.shading;
   return scatter::lobe_shapes(
-      glm::radians(shading.highlight_width_deg) * (1.0f - kWetSharp * shading.wetness),
+      glm::radians(shading.highlight_width_deg) * (1.0f - kWetTableSharp * shading.wetness),
       kShiftPerTilt * glm::radians(shading.cuticle_deg));
 }
 

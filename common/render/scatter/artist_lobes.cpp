@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace strandcast::scatter {
 namespace {
 
-constexpr double kHalfAngleNorm = 0.5;
+constexpr double kArtistHalfAngleNorm = 0.5;
 
 double bell(double width, double x) {
   return std::exp(-x * x / (2.0 * width * width));
@@ -50,12 +51,12 @@ std::array<double, 3> sadeghi_lobes(const ArtistLobes& lobes, const StrandAngles
   const double half = 0.5 * (angles.theta_in + angles.theta_out);
   const double cos_diff = std::cos(0.5 * (angles.theta_out - angles.theta_in));
   const std::array<double, 3> across{
-      std::cos(0.5 * angles.phi), bell(lobes.azimuth_tt, kPi - angles.phi),
+      std::cos(0.5 * angles.phi), bell(lobes.azimuth_tt, std::numbers::pi - angles.phi),
       std::cos(0.5 * angles.phi) + lobes.glint * bell(lobes.azimuth_glint, lobes.glint_phi - angles.phi)};
   std::array<double, 3> values{};
   for (size_t i = 0; i < values.size(); ++i)
-    values[i] = kHalfAngleNorm * gaussian(lobes.shapes[i].width, half - lobes.shapes[i].shift) * across[i] /
-                (cos_diff * cos_diff);
+    values[i] = kArtistHalfAngleNorm * gaussian(lobes.shapes[i].width, half - lobes.shapes[i].shift) *
+                across[i] / (cos_diff * cos_diff);
   return values;
 }
 

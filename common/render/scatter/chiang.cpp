@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace strandcast::scatter {
 namespace {
 
 double log_bessel_0(double x) {
   constexpr double kLarge = 12.0;
-  if (x > kLarge) return x + 0.5 * (std::log(1.0 / (2.0 * kPi * x)) + 1.0 / (4.0 * x));
+  if (x > kLarge) return x + 0.5 * (std::log(1.0 / (2.0 * std::numbers::pi * x)) + 1.0 / (4.0 * x));
   // Power series of I0.
   double term = 1.0, sum = 1.0;
   for (int i = 1; i < 60; ++i) {
@@ -26,7 +27,8 @@ double longitudinal_variance(double along) {
 }
 
 double azimuthal_scale(double across) {
-  return std::sqrt(kPi / 8.0) * (0.265 * across + 1.194 * across * across + 5.372 * std::pow(across, 22.0));
+  return std::sqrt(std::numbers::pi / 8.0) *
+         (0.265 * across + 1.194 * across * across + 5.372 * std::pow(across, 22.0));
 }
 
 double rough_longitudinal(double variance, double theta_in, double theta_out) {
@@ -41,7 +43,8 @@ double rough_longitudinal(double variance, double theta_in, double theta_out) {
 double trimmed_logistic(double scale, double x) {
   const double decay = std::exp(-std::abs(x) / scale);
   const auto below = [&](double at) { return 1.0 / (1.0 + std::exp(-at / scale)); };
-  return decay / (scale * (1.0 + decay) * (1.0 + decay)) / (below(kPi) - below(-kPi));
+  return decay / (scale * (1.0 + decay) * (1.0 + decay)) /
+         (below(std::numbers::pi) - below(-std::numbers::pi));
 }
 
 std::array<double, kLobes> rough_lobes(const RoughFibre& fibre, const FibreAngles& angles, double h) {
@@ -56,7 +59,7 @@ std::array<double, kLobes> rough_lobes(const RoughFibre& fibre, const FibreAngle
   for (size_t p = 0; p < kLobes; ++p) {
     const double across = p + 1 < kLobes
                               ? trimmed_logistic(scale, wrapped(angles.phi - exit_azimuth(p, index, h)))
-                              : 1.0 / (2.0 * kPi);
+                              : 1.0 / (2.0 * std::numbers::pi);
     lobes[p] =
         rough_longitudinal(variances[p], angles.theta_in + tilts[p], angles.theta_out) * shares[p] * across;
   }
@@ -66,11 +69,12 @@ std::array<double, kLobes> rough_lobes(const RoughFibre& fibre, const FibreAngle
 double rough_far_field(const RoughFibre& fibre, const FibreAngles& angles, size_t count) {
   double sum = 0.0;
   for (size_t i = 0; i < count; ++i) {
-    const double gamma = kPi * ((static_cast<double>(i) + 0.5) / static_cast<double>(count) - 0.5);
+    const double gamma =
+        std::numbers::pi * ((static_cast<double>(i) + 0.5) / static_cast<double>(count) - 0.5);
     const auto lobes = rough_lobes(fibre, angles, std::sin(gamma));
     sum += std::cos(gamma) * (lobes[0] + lobes[1] + lobes[2] + lobes[3]);
   }
-  return 0.5 * kPi * sum / static_cast<double>(count);
+  return 0.5 * std::numbers::pi * sum / static_cast<double>(count);
 }
 
 }  // namespace strandcast::scatter

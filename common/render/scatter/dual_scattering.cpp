@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace strandcast::scatter {
 namespace {
@@ -9,11 +10,7 @@ namespace {
 constexpr size_t kPoints = 96;
 // All further ways together carry less than one part in ten thousand.
 constexpr size_t kWays = 10;
-constexpr double kHalfAngleNorm = 0.5;
-
-double square(double x) {
-  return x * x;
-}
+constexpr double kDualHalfAngleNorm = 0.5;
 
 }  // namespace
 
@@ -23,13 +20,13 @@ FibreAverages fibre_averages(const SmoothFibre& fibre, const std::array<LobeShap
   double forward_shaped = 0.0, back_shaped = 0.0;
   // Both halves of the fibre do the same. Even in gamma = asin h all is smooth up to the edge.
   for (size_t i = 0; i < kPoints; ++i) {
-    const double step = 0.5 * kPi / kPoints, gamma = step * (static_cast<double>(i) + 0.5);
+    const double step = 0.5 * std::numbers::pi / kPoints, gamma = step * (static_cast<double>(i) + 0.5);
     const double h = std::sin(gamma);
     const double f = fresnel(fibre.index, std::cos(theta) * std::cos(gamma));
     const double t = pass_transmittance({fibre.index, theta, h, fibre.absorption});
     double share = f * step * std::cos(gamma);
     for (size_t p = 0; p < kWays; ++p) {
-      const double ahead = std::abs(wrapped(exit_azimuth(p, index, h))) / kPi;
+      const double ahead = std::abs(wrapped(exit_azimuth(p, index, h))) / std::numbers::pi;
       sums.forward += share * ahead;
       sums.back += share * (1.0 - ahead);
       if (p < shapes.size()) {
@@ -75,15 +72,15 @@ BackScatter back_scatter(const FibreAverages& averages) {
 
 double back_lobe(const BackScatter& back, double theta_half, double cos_theta_diff, double spread) {
   const double width = std::sqrt(square(back.width) + spread);
-  return 2.0 * back.albedo * kHalfAngleNorm * gaussian(width, theta_half - back.shift) /
-         (kPi * square(cos_theta_diff));
+  return 2.0 * back.albedo * kDualHalfAngleNorm * gaussian(width, theta_half - back.shift) /
+         (std::numbers::pi * square(cos_theta_diff));
 }
 
 Ways forward_azimuthal_ways(size_t p, const SmoothFibre& fibre, double theta_diff) {
   constexpr int kAzimuths = 64;
   Ways ways;
   for (int i = 0; i < kAzimuths; ++i) {
-    const double phi = kPi * (0.5 + 0.5 * (i + 0.5) / kAzimuths);
+    const double phi = std::numbers::pi * (0.5 + 0.5 * (i + 0.5) / kAzimuths);
     for (const Way& way :
          p == 2 ? azimuthal_trt_ways(fibre, theta_diff, phi) : azimuthal_ways(p, fibre, theta_diff, phi))
       ways.push_back({way.strength / kAzimuths, way.path});
@@ -110,8 +107,8 @@ double dual_scattering(const SmoothFibre& fibre, const std::array<LobeShape, 3>&
                  forward_azimuthal(p, fibre, diff) / square(cos_diff);
   const BackScatter back = back_scatter(means);
   const double around = kBackDensity * back_lobe(back, half, cos_diff, kCrowdSpread);
-  const double around_spread = kPi * kBackDensity * back_lobe(back, half, cos_diff, spread);
-  const double light = kPi * std::cos(view.theta_in);
+  const double around_spread = std::numbers::pi * kBackDensity * back_lobe(back, half, cos_diff, spread);
+  const double light = std::numbers::pi * std::cos(view.theta_in);
   return direct * (view.single + light * around) +
          kForwardDensity * light * indirect * (scattered + around_spread);
 }

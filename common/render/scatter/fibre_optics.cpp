@@ -2,13 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace strandcast::scatter {
 namespace {
-
-double square(double x) {
-  return x * x;
-}
 
 double cosine_of_sine(double sine) {
   return std::sqrt(std::max(0.0, 1.0 - sine * sine));
@@ -60,15 +57,15 @@ std::array<double, kLobes> lobe_shares(const FibreRay& ray) {
 double exit_azimuth(size_t p, double index_in_section, double h) {
   const auto passes = static_cast<double>(p);
   return 2.0 * passes * std::asin(std::clamp(h / index_in_section, -1.0, 1.0)) -
-         2.0 * std::asin(std::clamp(h, -1.0, 1.0)) + passes * kPi;
+         2.0 * std::asin(std::clamp(h, -1.0, 1.0)) + passes * std::numbers::pi;
 }
 
 double wrapped(double angle) {
-  return angle - 2.0 * kPi * std::round(angle / (2.0 * kPi));
+  return angle - 2.0 * std::numbers::pi * std::round(angle / (2.0 * std::numbers::pi));
 }
 
 double gaussian(double width, double x) {
-  return std::exp(-x * x / (2.0 * width * width)) / (width * std::sqrt(2.0 * kPi));
+  return std::exp(-x * x / (2.0 * width * width)) / (width * std::sqrt(2.0 * std::numbers::pi));
 }
 
 }  // namespace strandcast::scatter

@@ -6,11 +6,10 @@
 #include <array>
 #include <cstddef>
 #include <glm/glm.hpp>
+#include <numbers>
 
 namespace strandcast::scatter {
-
-inline constexpr double kPi = 3.14159265358979323846;
-inline constexpr double kDegree = kPi / 180.0;
+inline constexpr double kDegree = std::numbers::pi / 180.0;
 /// Refractive index of hair.
 inline constexpr double kHairIndex = 1.55;
 
@@ -45,6 +44,10 @@ double pass_transmittance(const FibreRay& ray);
 
 /// Change of azimuth on the way p, rad, not wrapped: 2 p gamma_t - 2 gamma_o + p pi.
 double exit_azimuth(size_t p, double index_in_section, double h);
+
+inline double square(double x) {
+  return x * x;
+}
 
 /// `angle` within -pi .. pi.
 double wrapped(double angle);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/packing.hpp>
+#include <numbers>
 
 #include "common/render/scatter/dual_scattering.h"
 #include "shaders/shared/lobe_tables.h"
@@ -41,7 +42,7 @@ uint64_t& texel(LookupTable& table, uint32_t x, uint32_t y, uint32_t z) {
 LookupTable make_longitudinal_table(const std::array<LobeShape, 3>& shapes) {
   LookupTable table = empty_table({shader::kHalfAngleTexels, 1, 1});
   for (uint32_t x = 0; x < table.size.x; ++x) {
-    const double half = kPi * (share_of(x, table.size.x) - 0.5);
+    const double half = std::numbers::pi * (share_of(x, table.size.x) - 0.5);
     texel(table, x, 0, 0) = packed(
         {longitudinal(shapes[0], half), longitudinal(shapes[1], half), longitudinal(shapes[2], half), 0.0});
   }
@@ -54,7 +55,7 @@ LookupTable make_azimuthal_table(const CausticTerms& caustic) {
   const SmoothFibre fibre{kHairIndex, 0.0, caustic};
   for (uint32_t y = 0; y < table.size.y; ++y)
     for (uint32_t x = 0; x < table.size.x; ++x) {
-      const double phi = kPi * share_of(x, table.size.x);
+      const double phi = std::numbers::pi * share_of(x, table.size.x);
       const double diff = std::acos(share_of(y, table.size.y));
       const double r = azimuthal(0, fibre, diff, phi);
       const Ways tt = azimuthal_ways(1, fibre, diff, phi), trt = azimuthal_trt_ways(fibre, diff, phi);

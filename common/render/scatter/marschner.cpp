@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace strandcast::scatter {
 namespace {
@@ -15,7 +16,8 @@ constexpr int kTurns = 2;
 double cubic_slope(size_t p, double index_in_section, double gamma) {
   const auto passes = static_cast<double>(p);
   const double c = std::asin(1.0 / index_in_section);
-  return 6.0 * passes * c / kPi - 2.0 - 24.0 * passes * c / (kPi * kPi * kPi) * gamma * gamma;
+  return 6.0 * passes * c / std::numbers::pi - 2.0 -
+         24.0 * passes * c / (std::numbers::pi * std::numbers::pi * std::numbers::pi) * gamma * gamma;
 }
 
 /// Real roots of a x^3 + b x + d.
@@ -33,7 +35,7 @@ std::vector<double> cubic_roots(double a, double b, double d) {
   const double radius = 2.0 * std::sqrt(-p / 3.0);
   const double angle = std::acos(std::clamp(3.0 * q / (p * radius), -1.0, 1.0)) / 3.0;
   std::vector<double> roots;
-  for (int k = 0; k < 3; ++k) roots.push_back(radius * std::cos(angle - 2.0 * kPi * k / 3.0));
+  for (int k = 0; k < 3; ++k) roots.push_back(radius * std::cos(angle - 2.0 * std::numbers::pi * k / 3.0));
   return roots;
 }
 
@@ -63,19 +65,21 @@ double longitudinal(const LobeShape& shape, double theta_half) {
 double cubic_exit(size_t p, double index_in_section, double gamma) {
   const auto passes = static_cast<double>(p);
   const double c = std::asin(1.0 / index_in_section);
-  return (6.0 * passes * c / kPi - 2.0) * gamma -
-         8.0 * passes * c / (kPi * kPi * kPi) * gamma * gamma * gamma + passes * kPi;
+  return (6.0 * passes * c / std::numbers::pi - 2.0) * gamma -
+         8.0 * passes * c / (std::numbers::pi * std::numbers::pi * std::numbers::pi) * gamma * gamma * gamma +
+         passes * std::numbers::pi;
 }
 
 std::vector<double> exit_roots(size_t p, double index_in_section, double phi) {
   const auto passes = static_cast<double>(p);
   const double c = std::asin(1.0 / index_in_section);
-  const double linear = 6.0 * passes * c / kPi - 2.0;
-  const double cubic = -8.0 * passes * c / (kPi * kPi * kPi);
+  const double linear = 6.0 * passes * c / std::numbers::pi - 2.0;
+  const double cubic = -8.0 * passes * c / (std::numbers::pi * std::numbers::pi * std::numbers::pi);
   std::vector<double> inside;
   for (int turn = -kTurns; turn <= kTurns; ++turn)
-    for (const double root : cubic_roots(cubic, linear, passes * kPi - phi - 2.0 * kPi * turn))
-      if (std::abs(root) < kPi / 2.0) inside.push_back(root);
+    for (const double root :
+         cubic_roots(cubic, linear, passes * std::numbers::pi - phi - 2.0 * std::numbers::pi * turn))
+      if (std::abs(root) < std::numbers::pi / 2.0) inside.push_back(root);
   std::sort(inside.begin(), inside.end());
   return inside;
 }
@@ -108,9 +112,10 @@ double azimuthal_exact(size_t p, const SmoothFibre& fibre, double theta_diff, do
   double sum = 0.0;
   for (int i = 0; i < kSteps; ++i) {
     // An odd number of points, so that none falls on gamma = 0 where symmetric roots lie.
-    double low = kPi * ((i + 0.25) / (kSteps + 0.5) - 0.5), high = kPi * ((i + 1.25) / (kSteps + 0.5) - 0.5);
+    double low = std::numbers::pi * ((i + 0.25) / (kSteps + 0.5) - 0.5),
+           high = std::numbers::pi * ((i + 1.25) / (kSteps + 0.5) - 0.5);
     if (std::signbit(wrapped(miss(low))) == std::signbit(wrapped(miss(high))) ||
-        std::abs(wrapped(miss(low))) > kPi / 2.0)
+        std::abs(wrapped(miss(low))) > std::numbers::pi / 2.0)
       continue;
     for (int halving = 0; halving < kHalvings; ++halving) {
       const double middle = 0.5 * (low + high);
@@ -126,11 +131,11 @@ double azimuthal_exact(size_t p, const SmoothFibre& fibre, double theta_diff, do
 
 Caustic trt_caustic(double index_in_section) {
   const double c = std::asin(1.0 / index_in_section);
-  const double bend = 12.0 * c / kPi - 2.0;
+  const double bend = 12.0 * c / std::numbers::pi - 2.0;
   if (bend <= 0.0) return {};
   Caustic caustic;
   caustic.exists = true;
-  caustic.gamma = std::sqrt(bend / (48.0 * c / (kPi * kPi * kPi)));
+  caustic.gamma = std::sqrt(bend / (48.0 * c / (std::numbers::pi * std::numbers::pi * std::numbers::pi)));
   caustic.h = std::sin(caustic.gamma);
   caustic.phi = wrapped(cubic_exit(2, index_in_section, caustic.gamma));
   return caustic;
@@ -144,7 +149,8 @@ Ways azimuthal_trt_ways(const SmoothFibre& fibre, double theta_diff, double phi)
   if (caustic.exists) {
     // Second derivative by h where the first is zero.
     const double c = std::asin(1.0 / index);
-    const double bend = 96.0 * c / (kPi * kPi * kPi) * caustic.gamma / (1.0 - caustic.h * caustic.h);
+    const double bend = 96.0 * c / (std::numbers::pi * std::numbers::pi * std::numbers::pi) * caustic.gamma /
+                        (1.0 - caustic.h * caustic.h);
     width_h = std::min(width_h, 2.0 * std::sqrt(2.0 * terms.width / bend));
   } else {
     part = 1.0 - smooth_step(2.0, 2.0 + terms.fade, index);

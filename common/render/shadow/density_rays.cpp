@@ -14,12 +14,12 @@
 namespace strandcast {
 namespace {
 
-constexpr uint32_t kCells = 64;  // along each side
-constexpr uint64_t kCellCount = uint64_t{kCells} * kCells * kCells;
+constexpr uint32_t kRayCells = 64;  // along each side
+constexpr uint64_t kCellCount = uint64_t{kRayCells} * kRayCells * kRayCells;
 // Steps in which optical depth is counted: up to 4,096 per cell.
 constexpr float kDensitySteps = 1048576.0f;
 // OpenGL gives a 32-bit integer to a texture of floats as its share of the greatest.
-constexpr double kGreatestInteger = 4294967295.0;
+constexpr double kGreatestDensity = 4294967295.0;
 
 class DensityBeginPass final : public RenderPass {
  public:
@@ -82,7 +82,7 @@ class DensityReadyPass final : public RenderPass {
 void DensityVolume::begin(const RenderScene& scene, const RenderTurn& turn) {
   if (cell_.size_bytes() == 0) {
     cell_ = gl::Buffer("density", kCellCount * sizeof(uint32_t));
-    texture_ = gl::Texture::volume("density", GL_R32F, kCells, kCells, kCells);
+    texture_ = gl::Texture::volume("density", GL_R32F, kRayCells, kRayCells, kRayCells);
   }
   cube_ = fit_hair_cube(turn.strands.position_m, shadow_margin_m(scene));
   to_light_ = to_light_in_head(scene, turn);
@@ -97,9 +97,9 @@ void DensityVolume::add(const gl::Program& program, const RenderScene& scene,
   expanded.vertex().bind_storage(shader::kBindingExpanded);
   cell_.bind_storage(shader::kBindingDensity);
   program.set("u_segments", expanded.segment_count);
-  program.set("u_cells", static_cast<int>(kCells));
+  program.set("u_cells", static_cast<int>(kRayCells));
   program.set("u_cube_origin_m", cube_.origin_m);
-  program.set("u_cell_m", cube_.side_m / static_cast<float>(kCells));
+  program.set("u_cell_m", cube_.side_m / static_cast<float>(kRayCells));
   program.set("u_to_light", to_light_);
   program.set("u_strand_width_m", expanded.width_m);
   program.set("u_tip_scale", scene.look.tip_scale);
@@ -113,7 +113,8 @@ void DensityVolume::finish() const {
   glMemoryBarrier(GL_PIXEL_BUFFER_BARRIER_BIT);
   glBindBuffer(GL_PIXEL_UNPACK_BUFFER, cell_.name());
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-  glTextureSubImage3D(texture_.name(), 0, 0, 0, 0, kCells, kCells, kCells, GL_RED, GL_UNSIGNED_INT, nullptr);
+  glTextureSubImage3D(texture_.name(), 0, 0, 0, 0, kRayCells, kRayCells, kRayCells, GL_RED, GL_UNSIGNED_INT,
+                      nullptr);
   glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
 }
 
@@ -123,12 +124,12 @@ void DensityVolume::set_uniforms(const gl::Program& program, uint32_t first_unit
 }
 
 void DensityVolume::set_density_uniforms(const gl::Program& program, uint32_t unit) const {
-  const double cell_m = cube_.side_m / kCells;
+  const double cell_m = cube_.side_m / kRayCells;
   texture_.bind(unit);
   program.set("u_density", static_cast<int>(unit));
   program.set("u_cube_origin_m", cube_.origin_m);
   program.set("u_cube_from_m", 1.0f / cube_.side_m);
-  program.set("u_density_per_m", static_cast<float>(kGreatestInteger / kDensitySteps / cell_m));
+  program.set("u_density_per_m", static_cast<float>(kGreatestDensity / kDensitySteps / cell_m));
 }
 
 void add_density_passes(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes,

@@ -6,7 +6,7 @@
 namespace strandcast {
 namespace {
 
-constexpr float kFarM = 100.0f;
+constexpr float kFarLightM = 100.0f;
 // Sides grow and shrink in steps of this.
 constexpr float kSideStepM = 0.02f;
 
@@ -22,7 +22,7 @@ Box bounds(std::span<const glm::vec3> position_m, const glm::mat3& axes, float m
   bool is_empty = true;
   for (const glm::vec3& point : position_m) {
     const glm::vec3 size = glm::abs(point);
-    if (!(size.x < kFarM && size.y < kFarM && size.z < kFarM)) continue;
+    if (!(size.x < kFarLightM && size.y < kFarLightM && size.z < kFarLightM)) continue;
     const glm::vec3 seen = from_head * point;
     box.low = is_empty ? seen : glm::min(box.low, seen);
     box.high = is_empty ? seen : glm::max(box.high, seen);

@@ -20,8 +20,8 @@ void add_volume(RenderScene& scene, ExpandWalks&, RenderPassList& passes) {
   passes.add(make_light_pass(scene));
 }
 
-constexpr AddShadowPasses kMethods[] = {add_volume,       add_none,        add_deep_opacity, add_opacity_maps,
-                                        add_density_rays, add_deep_shadow, add_hybrid};
+constexpr AddShadowPasses kShadowMethods[] = {
+    add_volume, add_none, add_deep_opacity, add_opacity_maps, add_density_rays, add_deep_shadow, add_hybrid};
 
 /// The light itself, which nothing takes away.
 class BareLightPass final : public RenderPass {
@@ -46,7 +46,7 @@ void add_none(RenderScene& scene, ExpandWalks&, RenderPassList& passes) {
 }
 
 void add_shadow_passes(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes) {
-  kMethods[static_cast<size_t>(scene.methods.shadow)](scene, walks, passes);
+  kShadowMethods[static_cast<size_t>(scene.methods.shadow)](scene, walks, passes);
 }
 
 float shadow_margin_m(const RenderScene& scene) {

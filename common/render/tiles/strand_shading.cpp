@@ -7,7 +7,7 @@
 namespace strandcast {
 namespace {
 
-constexpr size_t kStrandsPerRange = 16;
+constexpr size_t kShadedStrandsPerRange = 16;
 constexpr uint32_t kMaxPoints = (kMaxVertexCount - 1) * kMaxSegmentsPerGap + 2;
 
 struct ShadeArguments {
@@ -165,7 +165,7 @@ STRANDCAST_KERNEL(shade_strand_points, ShadeArguments);
 void shade_points(const ShadeInput& input, WorkerPool& workers, simd::InstructionSet set,
                   StrandPoints& points) {
   workers.at(Priority::Drawing)
-      .for_ranges(points.strand_count(), kStrandsPerRange, [&](size_t begin, size_t end) {
+      .for_ranges(points.strand_count(), kShadedStrandsPerRange, [&](size_t begin, size_t end) {
         shade_strand_points(
             set, {&input, static_cast<uint32_t>(begin), static_cast<uint32_t>(end), points.first_point.data(),
                   points.index.data(), points.lock.data(), points.point.data()});

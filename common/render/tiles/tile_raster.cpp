@@ -22,7 +22,7 @@ constexpr uint32_t kPairsBetweenChecks = 32;
 constexpr float kGradient = 0.35f;
 // Samples of the head per pixel side.
 constexpr int kHeadSamples = 2;
-constexpr float kFar = 1e30f;
+constexpr float kFarDepth = 1e30f;
 constexpr uint32_t kNoTriangle = 0xffffffffu;
 
 // ---- the head
@@ -39,7 +39,7 @@ STRANDCAST_LANES bool draw_head(const TileInput& in, uint32_t tile, TileHead& ou
   Float depth[kSampleBlocks];
   simd::UintBits which[kSampleBlocks];
   for (int i = 0; i < kSampleBlocks; ++i) {
-    depth[i] = kFar;
+    depth[i] = kFarDepth;
     which[i] = simd::UintBits{} + kNoTriangle;
   }
   const auto tile_x = static_cast<float>(tile % in.grid.columns() * kTilePx);
@@ -102,7 +102,7 @@ STRANDCAST_LANES bool draw_head(const TileInput& in, uint32_t tile, TileHead& ou
             sample_y % kBlockRows * kBlockColumns + sample_x % kBlockColumns;
         uint32_t triangle = kNoTriangle;
         int covered = 0;
-        nearest[lane] = kFar;
+        nearest[lane] = kFarDepth;
         seen_x[lane] = seen_y[lane] = 0.0f;
         for (int sample = 0; sample < kHeadSamples * kHeadSamples; ++sample) {
           const int at = first + sample / kHeadSamples * kBlockColumns + sample % kHeadSamples;
@@ -173,8 +173,8 @@ STRANDCAST_LANES const uint64_t* sort_segments(const TileInput& in, uint32_t beg
   const TileSegment* const items = in.bins->segments().item.data() + begin;
   scratch.order.resize(count);
   scratch.sorted.resize(count);
-  float low = kFar;
-  float high = -kFar;
+  float low = kFarDepth;
+  float high = -kFarDepth;
   for (uint32_t i = 0; i < count; ++i) {
     low = std::min(low, items[i].depth);
     high = std::max(high, items[i].depth);

@@ -15,9 +15,9 @@ namespace {
 
 // Behind this depth a twentieth of what lies there is seen.
 constexpr float kDeepDepth = 3.0f;
-constexpr uint32_t kDensityUnit = 0;
+constexpr uint32_t kSampleDensityUnit = 0;
 constexpr uint32_t kColorUnit = 0;
-constexpr uint32_t kDepthUnit = 1;
+constexpr uint32_t kSampleDepthUnit = 1;
 
 /// Strands with one sample per pixel, and their depth.
 class OneSampleTarget final : public gl::Resource {
@@ -77,7 +77,7 @@ class SampleChoicePass final : public RenderPass {
     if (expanded_.segment_count == 0) return {};
     program_.use();
     expanded_.vertex().bind_storage(shader::kBindingExpanded);
-    volume_.set_density_uniforms(program_, kDensityUnit);
+    volume_.set_density_uniforms(program_, kSampleDensityUnit);
     program_.set("u_segments", expanded_.segment_count);
     program_.set("u_eye_m", turn.view.eye_m);
     program_.set("u_deep_depth", kDeepDepth);
@@ -136,9 +136,9 @@ class StrandsMergePass final : public RenderPass {
   Status run(RenderTurn&) override {
     scene_.scene.begin();
     deep_.color().bind(kColorUnit);
-    deep_.depth().bind(kDepthUnit);
+    deep_.depth().bind(kSampleDepthUnit);
     screen_.program().set("u_color", static_cast<int>(kColorUnit));
-    screen_.program().set("u_depth", static_cast<int>(kDepthUnit));
+    screen_.program().set("u_depth", static_cast<int>(kSampleDepthUnit));
     screen_.program().set("u_samples", static_cast<int>(scene_.scene.layout().per_side));
     screen_.draw();
     return {};

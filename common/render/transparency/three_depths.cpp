@@ -16,7 +16,7 @@ namespace strandcast {
 namespace {
 
 constexpr size_t kNear = 0;
-constexpr size_t kFar = 1;
+constexpr size_t kFarLayer = 1;
 
 /// (height x width) three keys and the opacity of all, as shaders/render/three_depths.glsl has them.
 class DepthKeys final : public gl::Resource {
@@ -91,7 +91,7 @@ class KeysReadyPass final : public RenderPass {
   Status run(RenderTurn& turn) override {
     RETURN_IF_ERROR(colors_.resize(turn.size_px));
     colors_.clear(kNear, 0.0f);
-    colors_.clear(kFar, 0.0f);
+    colors_.clear(kFarLayer, 0.0f);
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     return {};
   }
@@ -137,9 +137,9 @@ class KeysBlendPass final : public LayerBlendPass {
   void bind(const gl::Program& program) const override {
     keys_.bind(program);
     colors_.texture(kNear).bind(kNear);
-    colors_.texture(kFar).bind(kFar);
+    colors_.texture(kFarLayer).bind(kFarLayer);
     program.set("u_near", static_cast<int>(kNear));
-    program.set("u_far", static_cast<int>(kFar));
+    program.set("u_far", static_cast<int>(kFarLayer));
   }
   DepthKeys& keys_;
   PixelTarget& colors_;

@@ -12,7 +12,8 @@ namespace {
 // Beside the textures that the light takes in the vertex stage.
 constexpr uint32_t kSceneDepthUnit = 8;
 
-constexpr AddStrandPasses kMethods[] = {add_hashed, add_lists, add_three_depths, add_weighted, add_moments};
+constexpr AddStrandPasses kTransparencyMethods[] = {add_hashed, add_lists, add_three_depths, add_weighted,
+                                                    add_moments};
 
 static_assert(kSamplesPerSide == 2, "blended.glsl gathers four samples of the scene");
 
@@ -35,7 +36,7 @@ void add_hashed(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes) 
 }
 
 void add_transparency_passes(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes) {
-  kMethods[static_cast<size_t>(scene.methods.transparency)](scene, walks, passes);
+  kTransparencyMethods[static_cast<size_t>(scene.methods.transparency)](scene, walks, passes);
 }
 
 void begin_blended(StrandDraw& strands, const RenderScene& scene, const ExpandedStrands& expanded,

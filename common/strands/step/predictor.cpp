@@ -16,7 +16,7 @@ using tangent::kNoStrand;
 /// hundredths, on walks as on wild clips; all of it takes a tenth to a fifth more.
 constexpr double kGain = 0.45;
 
-Turn turn_of(const glm::dquat& rotation) {
+Turn step_turn_of(const glm::dquat& rotation) {
   const glm::dmat3 matrix = glm::mat3_cast(rotation);
   Turn turn;
   for (int row = 0; row < 3; ++row)
@@ -245,7 +245,7 @@ void Predictor::set_scene(const StepScene& scene) {
 }
 
 void Predictor::put_positions(const tangent::Planes<int32_t>& decoded, float quantum_m) {
-  const Turn turn = turn_of(limited_rotation(state_.pose.rotation));
+  const Turn turn = step_turn_of(limited_rotation(state_.pose.rotation));
   for_blocks([&](uint32_t begin, uint32_t end) {
     place_blocks(ground_.set,
                  {ground_.layout, decoded, turn, quantum_m, *moving(PlaneRole::Position), begin, end});
@@ -262,7 +262,7 @@ void Predictor::start(const Decoded& now, const Decoded& before, double seconds,
   StrandBlocks& velocity = *moving(PlaneRole::Velocity);
   std::fill_n(velocity.data(), velocity.size(), 0.0f);
   if (seconds > 0.0) {
-    const Turn turn = turn_of(limited_rotation(before.world_from_head.rotation));
+    const Turn turn = step_turn_of(limited_rotation(before.world_from_head.rotation));
     const glm::vec3 shift(before.world_from_head.position_m - now.world_from_head.position_m);
     for_blocks([&](uint32_t begin, uint32_t end) {
       start_blocks(ground_.set, {ground_.layout,
@@ -282,7 +282,7 @@ void Predictor::start(const Decoded& now, const Decoded& before, double seconds,
 
 /// Frames without twist along the strands as they are.
 void Predictor::find_axes(StrandBlocks& axes) const {
-  const Turn turn = turn_of(limited_rotation(state_.pose.rotation));
+  const Turn turn = step_turn_of(limited_rotation(state_.pose.rotation));
   for_blocks([&](uint32_t begin, uint32_t end) {
     axes_blocks(ground_.set, {*fixed_[static_cast<size_t>(PlaneRole::RodEdge)],
                               *fixed_[static_cast<size_t>(PlaneRole::RodStrand)], turn,
@@ -292,7 +292,7 @@ void Predictor::find_axes(StrandBlocks& axes) const {
 
 /// All vectors of the state, as rebase() of a solver.
 void Predictor::turn(const glm::dquat& by) {
-  const Turn matrix = turn_of(by);
+  const Turn matrix = step_turn_of(by);
   for (const auto& blocks : state_.planes)
     if (blocks != nullptr)
       for_blocks([&](uint32_t begin, uint32_t end) {
@@ -378,7 +378,7 @@ void Predictor::run_field(const StepBlock& block, LanePlanes planes) {
 void Predictor::advance(const Origin& origin, std::span<const StepTick> ticks, double end_time_s) {
   for (StrandBlocks* before : {field_before_.get(), state_.body_before.get()}) {
     if (before == nullptr) continue;
-    const Turn upright = turn_of(glm::dquat(1.0, 0.0, 0.0, 0.0));
+    const Turn upright = step_turn_of(glm::dquat(1.0, 0.0, 0.0, 0.0));
     for_blocks([&](uint32_t begin, uint32_t end) {
       place_blocks(ground_.set,
                    {ground_.layout, origin.lattice, upright, origin.quantum_m, *before, begin, end});
@@ -399,7 +399,7 @@ void Predictor::advance(const Origin& origin, std::span<const StepTick> ticks, d
 }
 
 void Predictor::expect(float quantum_m, tangent::Planes<int32_t>& lattice) const {
-  const Turn head_from_world = turn_of(glm::conjugate(limited_rotation(state_.pose.rotation)));
+  const Turn head_from_world = step_turn_of(glm::conjugate(limited_rotation(state_.pose.rotation)));
   for_blocks([&](uint32_t begin, uint32_t end) {
     expect_blocks(ground_.set, {ground_.layout, *moving(PlaneRole::Position), head_from_world, quantum_m,
                                 lattice, begin, end});
@@ -408,7 +408,7 @@ void Predictor::expect(float quantum_m, tangent::Planes<int32_t>& lattice) const
 
 void Predictor::correct(const Correction& of) {
   const auto per_second = static_cast<float>(of.seconds > 0.0 ? kGain / of.seconds : 0.0);
-  const Turn world_from_head = turn_of(limited_rotation(state_.pose.rotation));
+  const Turn world_from_head = step_turn_of(limited_rotation(state_.pose.rotation));
   for_blocks([&](uint32_t begin, uint32_t end) {
     correct_blocks(ground_.set,
                    {ground_.layout, of.expected, of.decoded, world_from_head, of.quantum_m, per_second,

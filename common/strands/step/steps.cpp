@@ -7,11 +7,11 @@
 
 #include "common/base/check.h"
 #include "common/base/hash.h"
+#include "common/base/units.h"
 
 namespace strandcast::step {
 namespace {
 
-constexpr double kNsPerS = 1e9;
 /// Frames with more are better off with fitted weights: of bits_apart().
 constexpr double kMostSparseBits = 0.5;
 /// Of the same, what steps may tell less than that nothing moved: strands at rest are told well by both.
@@ -33,15 +33,15 @@ uint16_t check_of(uint8_t flags, std::span<const std::byte> bytes) {
 }
 
 /// About how many bits tell where vertices of a sample are, when they are expected there.
-struct Sample {
+struct VolumeSample {
   double bits = 0.0;
   double vertices = 0.0;
 
   double mean() const { return vertices > 0.0 ? bits / vertices : 0.0; }
 };
-Sample bits_apart(const tangent::Layout& layout, const tangent::Planes<int32_t>& expected,
-                  const tangent::Planes<int32_t>& target) {
-  Sample sample;
+VolumeSample bits_apart(const tangent::Layout& layout, const tangent::Planes<int32_t>& expected,
+                        const tangent::Planes<int32_t>& target) {
+  VolumeSample sample;
   for (uint32_t v = 1; v < layout.vertex_count; ++v)
     for (size_t run = 0; run < layout.no_neighbour(); run += kSampleStep)
       for (size_t place = run; place < std::min<size_t>(run + kSampleRun, layout.no_neighbour()); ++place) {

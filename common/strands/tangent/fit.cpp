@@ -12,7 +12,7 @@
 namespace strandcast::tangent {
 namespace {
 
-constexpr size_t kSampleStrands = 768;
+constexpr size_t kFitStrands = 768;
 constexpr size_t kRun = 4;      // side by side in memory: one of them alone would fetch as much
 constexpr double kNoise = 8.0;  // steps; a thirtieth of the bound is not worth predicting
 // Samples are made of true positions. What is decoded in their place lies 0.63 bounds beside them along two
@@ -21,7 +21,7 @@ constexpr double kNoiseNow = 80.0;
 
 /// Strands to fit to: runs at even distances.
 std::vector<uint32_t> sample_places(const Layout& layout) {
-  const size_t step = kRun * std::max<size_t>(1, layout.stride / kSampleStrands);
+  const size_t step = kRun * std::max<size_t>(1, layout.stride / kFitStrands);
   std::vector<uint32_t> places;
   for (size_t run = step / 2 / kRun * kRun; run < layout.no_neighbour(); run += step)
     for (size_t place = run; place < run + kRun; ++place)

@@ -7,12 +7,12 @@
 #include <glm/gtc/quaternion.hpp>
 #include <numbers>
 
+#include "common/base/units.h"
 #include "common/math/pose.h"
 
 namespace strandcast {
 
 inline constexpr double kMPerCm = 0.01;
-inline constexpr double kMPerMm = 0.001;
 inline constexpr double kRadPerDegree = std::numbers::pi / 180.0;
 inline constexpr double kRadPerHalfTurn = std::numbers::pi;
 
@@ -68,10 +68,10 @@ inline Pose pose_from_freed(const FreedPose& pose) {
 }
 
 /// Which way is up where a system lets its user choose (Motive, VRPN's servers). Right-handed, m.
-enum class UpAxis { Y, Z };
+enum class SystemUp { Y, Z };
 /// +Z up: a quarter turn about X lays +Z onto +Y. Bodies turned by nothing stay so.
-inline Pose pose_from_system(UpAxis up, const glm::dvec3& position_m, const glm::dquat& rotation) {
-  if (up == UpAxis::Y) return {position_m, rotation};
+inline Pose pose_from_system(SystemUp up, const glm::dvec3& position_m, const glm::dquat& rotation) {
+  if (up == SystemUp::Y) return {position_m, rotation};
   return {{position_m.x, position_m.z, -position_m.y},
           glm::dquat(rotation.w, rotation.x, rotation.z, -rotation.y)};
 }

@@ -8,8 +8,8 @@
 namespace strandcast {
 namespace {
 
-constexpr size_t kPacketBytes = 29;
-constexpr uint8_t kPoseType = 0xD1;
+constexpr size_t kFreedPacketBytes = 29;
+constexpr uint8_t kFreedPoseType = 0xD1;
 constexpr uint8_t kFamilyMask = 0xF0;  // all types of FreeD begin with D
 constexpr uint8_t kFamily = 0xD0;
 constexpr uint8_t kChecksumBegin = 0x40;
@@ -58,17 +58,17 @@ class FreedParser : public LiveParser {
 
   Result<LivePacket> parse(std::span<const std::byte> bytes, int64_t) override {
     const uint8_t type = bytes.empty() ? uint8_t{0} : std::to_integer<uint8_t>(bytes.front());
-    if ((type & kFamilyMask) == kFamily && type != kPoseType) {
+    if ((type & kFamilyMask) == kFamily && type != kFreedPoseType) {
       ++ignored_;
       return LivePacket{};
     }
-    if (bytes.size() != kPacketBytes || type != kPoseType)
+    if (bytes.size() != kFreedPacketBytes || type != kFreedPoseType)
       return make_error(
           ErrorCode::BadInput,
           "a packet of FreeD D1 has {} bytes and begins with 0xD1, this one has {} and begins with {:#04x}",
-          kPacketBytes, bytes.size(), type);
+          kFreedPacketBytes, bytes.size(), type);
     const uint8_t sent = std::to_integer<uint8_t>(bytes.back());
-    const uint8_t computed = checksum_of(bytes.first(kPacketBytes - 1));
+    const uint8_t computed = checksum_of(bytes.first(kFreedPacketBytes - 1));
     if (sent != computed)
       return make_error(ErrorCode::BadInput,
                         "a packet of FreeD with the wrong checksum: {:#04x} where {:#04x} is right", sent,

@@ -4,13 +4,13 @@
 #include <cmath>
 #include <utility>
 
+#include "common/base/units.h"
 #include "common/scene/body_desc.h"
 #include "server/input/input_hub.h"
 
 namespace strandcast {
 namespace {
 
-constexpr double kSecondsPerNs = 1e-9;
 constexpr int64_t kBetweenJumpsNs = 1'000'000;  // the hub sees a jump where two samples are this near
 constexpr int64_t kShortestStepNs = 1'000;      // between two poses
 constexpr double kVelocityMemoryS = 0.03;       // a velocity is that of about so long
@@ -329,8 +329,8 @@ void LivePolicy::add_joints(const LivePose& pose, LiveHead& head) const {
 /// As far towards the target as a head gets by then.
 Pose LivePolicy::clamped(const Pose& target, int64_t time_ns) {
   const Pose& from = last_->world_from_head;
-  const double window_s = static_cast<double>(kClampWindowNs) * kSecondsPerNs;
-  const double passed_s = static_cast<double>(time_ns - last_->time_ns) * kSecondsPerNs;
+  const double window_s = static_cast<double>(kClampWindowNs) * kSPerNs;
+  const double passed_s = static_cast<double>(time_ns - last_->time_ns) * kSPerNs;
   move_allowance_m_ = std::min(move_allowance_m_ + kMaxLiveSpeedMps * passed_s, kMaxLiveSpeedMps * window_s);
   turn_allowance_rad_ =
       std::min(turn_allowance_rad_ + kMaxLiveTurnRadPerS * passed_s, kMaxLiveTurnRadPerS * window_s);
@@ -350,7 +350,7 @@ Pose LivePolicy::clamped(const Pose& target, int64_t time_ns) {
 
 void LivePolicy::put(LiveHead head) {
   if (last_) {
-    const double passed_s = static_cast<double>(head.time_ns - last_->time_ns) * kSecondsPerNs;
+    const double passed_s = static_cast<double>(head.time_ns - last_->time_ns) * kSPerNs;
     if (glm::dot(head.world_from_head.rotation, last_->world_from_head.rotation) < 0.0)
       head.world_from_head.rotation = -head.world_from_head.rotation;
     const Pose& before = last_->world_from_head;
@@ -373,7 +373,7 @@ void LivePolicy::rest(int64_t now_ns) {
   if (age_ns < kHoldNs || now_ns - last_->time_ns < kRestingPoseNs) return;
   last_->time_ns = now_ns;
   last_->world_from_head = resting_pose(age_ns);
-  const double passed_s = static_cast<double>(kRestingPoseNs) * kSecondsPerNs;
+  const double passed_s = static_cast<double>(kRestingPoseNs) * kSPerNs;
   move_allowance_m_ = kMaxLiveSpeedMps * passed_s;
   turn_allowance_rad_ = kMaxLiveTurnRadPerS * passed_s;
   due_.push_back(*last_);
@@ -382,7 +382,7 @@ void LivePolicy::rest(int64_t now_ns) {
 /// Where a head is that was seen last `age_ns` ago.
 Pose LivePolicy::resting_pose(int64_t age_ns) const {
   const double share = static_cast<double>(age_ns - kHoldNs) / static_cast<double>(kEaseNs);
-  const double on_s = static_cast<double>(kExtrapolateNs) * kSecondsPerNs * eased(share);
+  const double on_s = static_cast<double>(kExtrapolateNs) * kSPerNs * eased(share);
   Pose pose = *held_;
   pose.position_m += velocity_mps_ * on_s;
   pose.rotation = glm::normalize(rotation_by(turn_rad_per_s_ * on_s) * pose.rotation);

@@ -6,13 +6,12 @@
 
 #include "common/base/check.h"
 #include "common/base/text.h"
+#include "common/base/units.h"
 #include "server/input/input_hub.h"
 
 namespace strandcast {
 namespace {
 
-constexpr double kMsPerNs = 1e-6;
-constexpr double kSecondsPerNs = 1e-9;
 constexpr double kJitterShare = 1.0 / 16.0;  // of the newest packet, as in RFC 3550
 constexpr size_t kMaxNotes = 32;             // until they are taken
 constexpr size_t kMaxNoteChars = 200;
@@ -107,8 +106,7 @@ bool LiveSource::is_heard(int64_t now_ns) const {
 }
 
 bool LiveSource::take_allowance(size_t bytes, int64_t arrival_ns) {
-  const double passed_s =
-      static_cast<double>(std::max<int64_t>(arrival_ns - allowance_ns_, 0)) * kSecondsPerNs;
+  const double passed_s = static_cast<double>(std::max<int64_t>(arrival_ns - allowance_ns_, 0)) * kSPerNs;
   if (allowance_ns_ != 0) {
     packet_allowance_ = std::min(packet_allowance_ + passed_s * kMaxSampleRateHz, kMaxSampleBurst);
     byte_allowance_ = std::min(byte_allowance_ + passed_s * kMaxLiveBytesPerS, kMaxLiveBytesPerS);
@@ -184,7 +182,7 @@ void LiveSource::measure(int64_t arrival_ns) {
   }
   const int64_t passed_ns = arrival_ns - window_begin_ns_;
   if (passed_ns < kRateWindowNs) return;
-  rate_hz_ = static_cast<double>(window_packets_ - 1) / (static_cast<double>(passed_ns) * kSecondsPerNs);
+  rate_hz_ = static_cast<double>(window_packets_ - 1) / (static_cast<double>(passed_ns) * kSPerNs);
   window_begin_ns_ = arrival_ns;
   window_packets_ = 1;
 }
@@ -266,9 +264,8 @@ LiveSource::Due LiveSource::advance(int64_t now_ns) {
   if (is_stale_now && !was_stale_) {
     due.has_ended = true;
     if (subject_ && is_heard(now_ns))
-      notes_.push_back(
-          {true, fmt::format("{}: nothing of {} for {:g} s: the head rests", describe(), shown(*subject_),
-                             static_cast<double>(kMotionStaleNs) * kSecondsPerNs)});
+      notes_.push_back({true, fmt::format("{}: nothing of {} for {:g} s: the head rests", describe(),
+                                          shown(*subject_), static_cast<double>(kMotionStaleNs) * kSPerNs)});
     if (live_.subject.empty()) follow_subject(now_ns);
   }
   was_stale_ = is_stale_now;

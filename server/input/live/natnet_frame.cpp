@@ -9,7 +9,7 @@
 namespace strandcast {
 namespace {
 
-constexpr size_t kMaxNameBytes = 256;  // with its NUL
+constexpr size_t kMaxNatnetNameBytes = 256;  // with its NUL
 constexpr size_t kPositionBytes = 3 * sizeof(float);
 constexpr size_t kRotationBytes = 4 * sizeof(float);
 constexpr size_t kLabelledMarkerBytes = 26;
@@ -30,7 +30,7 @@ class NatnetReader : public ByteReader {
     const auto bytes = rest();
     const auto end = std::find(bytes.begin(), bytes.end(), std::byte{0});
     const auto length = static_cast<size_t>(end - bytes.begin());
-    if (end == bytes.end() || length >= kMaxNameBytes) {
+    if (end == bytes.end() || length >= kMaxNatnetNameBytes) {
       (void)take_bytes(bytes.size() + 1);  // remembers that there is none
       return {};
     }
@@ -227,7 +227,7 @@ std::optional<NatnetNames> read_natnet_names(std::span<const std::byte> payload,
 std::optional<NatnetServer> read_natnet_server(std::span<const std::byte> payload) {
   constexpr size_t kVersionBytes = 4;
   NatnetReader reader(payload);
-  NatnetReader name(reader.take_bytes(kMaxNameBytes));
+  NatnetReader name(reader.take_bytes(kMaxNatnetNameBytes));
   NatnetServer server;
   server.name = name.take_name();
   (void)reader.take_bytes(kVersionBytes);  // of the program

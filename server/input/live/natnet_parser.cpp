@@ -50,7 +50,7 @@ using BodyKey = std::pair<std::optional<uint32_t>, std::optional<uint32_t>>;
 
 class NatnetParser : public LiveParser {
  public:
-  NatnetParser(UpAxis up, std::optional<Version> version) : up_(up), version_(version) {}
+  NatnetParser(SystemUp up, std::optional<Version> version) : up_(up), version_(version) {}
 
   Result<LivePacket> parse(std::span<const std::byte> bytes, int64_t) override {
     ByteReader reader(bytes);
@@ -178,7 +178,7 @@ class NatnetParser : public LiveParser {
            name_of({body.skeleton, bone}, bone);
   }
 
-  UpAxis up_;
+  SystemUp up_;
   std::optional<Version> version_;  // as it was set
   std::optional<NatnetServer> server_;
   std::map<BodyKey, std::string> names_;
@@ -190,7 +190,7 @@ class NatnetParser : public LiveParser {
 }  // namespace
 
 Result<std::unique_ptr<LiveParser>> make_natnet_parser(size_t axis_order, const std::string& version) {
-  const UpAxis up = axis_order == 0 ? UpAxis::Y : UpAxis::Z;
+  const SystemUp up = axis_order == 0 ? SystemUp::Y : SystemUp::Z;
   if (version.empty()) return std::unique_ptr<LiveParser>(std::make_unique<NatnetParser>(up, std::nullopt));
   std::vector<const char*> names;
   for (const Version& known : kVersions) names.push_back(known.name);

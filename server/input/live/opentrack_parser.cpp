@@ -10,7 +10,7 @@ namespace strandcast {
 namespace {
 
 constexpr size_t kNumbers = 6;
-constexpr size_t kPacketBytes = kNumbers * sizeof(double);
+constexpr size_t kOpentrackPacketBytes = kNumbers * sizeof(double);
 
 class OpentrackParser : public LiveParser {
  public:
@@ -18,11 +18,11 @@ class OpentrackParser : public LiveParser {
   OpentrackParser(size_t x_at, size_t yaw_at) : x_at_(x_at), yaw_at_(yaw_at) {}
 
   Result<LivePacket> parse(std::span<const std::byte> bytes, int64_t) override {
-    if (bytes.size() != kPacketBytes)
+    if (bytes.size() != kOpentrackPacketBytes)
       return make_error(
           ErrorCode::BadInput,
           "a packet of opentrack has {} bytes and this one {}: is this its output \"UDP over network\"?",
-          kPacketBytes, bytes.size());
+          kOpentrackPacketBytes, bytes.size());
     ByteReader reader(bytes);
     for (double& number : last_.emplace()) number = reader.take<double>();
     LivePacket packet;

@@ -8,24 +8,24 @@
 namespace strandcast {
 namespace {
 
-constexpr size_t kAlignBytes = 4;
+constexpr size_t kOscAlignBytes = 4;
 constexpr char kBundleMark[] = "#bundle";  // with its NUL eight bytes
 constexpr size_t kTimeTagBytes = 8;
 constexpr size_t kMaxShownTextBytes = 40;
 
 size_t padded(size_t bytes) {
-  return (bytes + kAlignBytes - 1) / kAlignBytes * kAlignBytes;
+  return (bytes + kOscAlignBytes - 1) / kOscAlignBytes * kOscAlignBytes;
 }
 
-std::string_view text_of(std::span<const std::byte> bytes) {
+std::string_view osc_text_of(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 /// A string with its NUL, filled up to four bytes; no NUL within `bytes`: nothing.
 std::optional<std::string_view> take_text(std::span<const std::byte>& bytes) {
-  const size_t length = text_of(bytes).find('\0');
+  const size_t length = osc_text_of(bytes).find('\0');
   if (length == std::string_view::npos || padded(length + 1) > bytes.size()) return std::nullopt;
-  const std::string_view text = text_of(bytes).substr(0, length);
+  const std::string_view text = osc_text_of(bytes).substr(0, length);
   bytes = bytes.subspan(padded(length + 1));
   return text;
 }
@@ -78,9 +78,9 @@ class OscUnfolder {
       : datagram_(datagram), packet_(packet) {}
 
   Status read_element(std::span<const std::byte> element, size_t depth) {
-    if (element.size() % kAlignBytes != 0)
+    if (element.size() % kOscAlignBytes != 0)
       return make_error(ErrorCode::BadInput, "OSC at byte {}: {} bytes are no multiple of {}",
-                        at_byte(element), element.size(), kAlignBytes);
+                        at_byte(element), element.size(), kOscAlignBytes);
     if (element.empty())
       return make_error(ErrorCode::BadInput, "OSC at byte {}: an empty element", at_byte(element));
     if (element.front() == std::byte{'#'}) return read_bundle(element, depth);

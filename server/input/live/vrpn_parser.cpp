@@ -16,12 +16,12 @@ constexpr size_t kCookieBytes = 24;
 constexpr std::string_view kCookie = "vrpn: ver. 07.35  0";  // the digit: no logging at the other end
 constexpr std::string_view kCookieOfMajor = "vrpn: ver. 07.";
 constexpr size_t kHeaderBytes = 24;  // five numbers and a sequence number that lengths do not count apart
-constexpr size_t kAlignBytes = 8;
+constexpr size_t kVrpnAlignBytes = 8;
 constexpr size_t kMaxMessageBytes = 64'000;  // what VRPN's own buffers hold
 constexpr size_t kMaxNames = 1024;           // of senders, and of types
-constexpr uint32_t kMaxNameBytes = 512;
+constexpr uint32_t kMaxVrpnNameBytes = 512;
 constexpr int32_t kSenderDescription = -1, kTypeDescription = -2;
-constexpr std::string_view kPoseType = "vrpn_Tracker Pos_Quat";
+constexpr std::string_view kVrpnPoseType = "vrpn_Tracker Pos_Quat";
 constexpr size_t kPoseBytes = 2 * sizeof(int32_t) + 7 * sizeof(double);
 
 struct VrpnMessage {
@@ -31,7 +31,7 @@ struct VrpnMessage {
   std::span<const std::byte> body;
 };
 
-std::string_view text_of(std::span<const std::byte> bytes) {
+std::string_view vrpn_text_of(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
@@ -39,9 +39,9 @@ std::string_view text_of(std::span<const std::byte> bytes) {
 std::optional<std::string_view> name_in(std::span<const std::byte> body) {
   BigEndianReader reader(body);
   const auto length = reader.take<uint32_t>();
-  if (!reader.ok() || length == 0 || length > kMaxNameBytes || length > reader.rest().size())
+  if (!reader.ok() || length == 0 || length > kMaxVrpnNameBytes || length > reader.rest().size())
     return std::nullopt;
-  const std::string_view text = text_of(reader.take_bytes(length));
+  const std::string_view text = vrpn_text_of(reader.take_bytes(length));
   return text.substr(0, text.find('\0'));
 }
 
@@ -53,7 +53,7 @@ struct TrackerPose {
 
 class VrpnParser : public LiveParser {
  public:
-  explicit VrpnParser(UpAxis up) : up_(up) {}
+  explicit VrpnParser(SystemUp up) : up_(up) {}
 
   Result<LivePacket> parse(std::span<const std::byte> bytes, int64_t) override {
     // Everything is checked before anything is taken, so that an error changes nothing.
@@ -99,7 +99,7 @@ class VrpnParser : public LiveParser {
   Result<size_t> walk(LivePacket* packet) {
     BigEndianReader reader(buffer_);
     if (!has_cookie_) {
-      const std::string_view begin = text_of(buffer_).substr(0, kCookieOfMajor.size());
+      const std::string_view begin = vrpn_text_of(buffer_).substr(0, kCookieOfMajor.size());
       if (begin != kCookieOfMajor.substr(0, begin.size()))
         return make_error(ErrorCode::BadInput, "a peer that begins with \"{}\" is no server of VRPN 7",
                           excerpt(begin, kCookieOfMajor.size()));
@@ -114,7 +114,7 @@ class VrpnParser : public LiveParser {
         return make_error(length < kHeaderBytes ? ErrorCode::BadInput : ErrorCode::LimitExceeded,
                           "a message of VRPN of {} bytes; {} to {} are allowed", length, kHeaderBytes,
                           kMaxMessageBytes);
-      const size_t padded = (length + kAlignBytes - 1) / kAlignBytes * kAlignBytes;
+      const size_t padded = (length + kVrpnAlignBytes - 1) / kVrpnAlignBytes * kVrpnAlignBytes;
       if (padded > left) break;
       VrpnMessage message;
       const int64_t seconds = ahead.take<int32_t>(), microseconds = ahead.take<int32_t>();
@@ -150,7 +150,7 @@ class VrpnParser : public LiveParser {
       // What a description describes stands where others have their sender.
       const std::string_view name = *name_in(message.body);
       if (message.type == kTypeDescription)
-        is_pose_type_[message.sender] = name == kPoseType;
+        is_pose_type_[message.sender] = name == kVrpnPoseType;
       else
         senders_[message.sender] = one_line(name, kMaxSubjectBytes);
       return;
@@ -180,7 +180,7 @@ class VrpnParser : public LiveParser {
     return sensor == 0 ? name : fmt::format("{}/{}", name, sensor);
   }
 
-  UpAxis up_;
+  SystemUp up_;
   std::vector<std::byte> buffer_;  // what is not whole yet
   bool has_cookie_ = false;
   std::map<int32_t, std::string> senders_;
@@ -192,7 +192,7 @@ class VrpnParser : public LiveParser {
 }  // namespace
 
 std::unique_ptr<LiveParser> make_vrpn_parser(size_t axis_order) {
-  return std::make_unique<VrpnParser>(axis_order == 0 ? UpAxis::Y : UpAxis::Z);
+  return std::make_unique<VrpnParser>(axis_order == 0 ? SystemUp::Y : SystemUp::Z);
 }
 
 }  // namespace strandcast

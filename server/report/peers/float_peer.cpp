@@ -7,7 +7,7 @@
 namespace strandcast {
 namespace {
 
-constexpr int kLevel = 3;
+constexpr int kFloatLevel = 3;
 
 /// 32-bit floats through zstd: nothing is lost.
 class FloatPeer final : public StreamCodec {
@@ -20,7 +20,7 @@ class FloatPeer final : public StreamCodec {
   }
   Result<std::vector<std::byte>> encode() override {
     std::vector<std::byte> message;
-    compressor_.append(std::as_bytes(std::span(sorted_m_)), kLevel, message);
+    compressor_.append(std::as_bytes(std::span(sorted_m_)), kFloatLevel, message);
     return message;
   }
   Status decode(std::span<const std::byte> message) override {

@@ -8,7 +8,7 @@
 namespace strandcast {
 namespace {
 
-constexpr int kLevel = 3;
+constexpr int kMeshoptLevel = 3;
 constexpr size_t kMaxEncodedBytes = size_t{1} << 28;
 
 /// A vertex as the codec takes it: a multiple of four bytes. Half of 16 bits is added, so that small numbers
@@ -61,7 +61,7 @@ class MeshoptCoder final : public IntegerCoder {
                                                    vertices.size(), sizeof(Vertex));
     if (size == 0) return make_error(ErrorCode::Internal, "meshoptimizer did not encode");
     std::vector<std::byte> bytes{std::byte{sizeof(Vertex)}};
-    compressor_.append(std::as_bytes(std::span(buffer_).first(size)), kLevel, bytes);
+    compressor_.append(std::as_bytes(std::span(buffer_).first(size)), kMeshoptLevel, bytes);
     return bytes;
   }
 

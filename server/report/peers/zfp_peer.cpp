@@ -15,9 +15,9 @@ namespace {
 // The search for the tolerance begins here, in powers of two above the bound; zfp keeps well within it.
 constexpr int kTolerancePowersAbove = 4;
 constexpr int kMostPowers = 20;
-constexpr size_t kSampledStrands = 8;  // one in so many is looked at for the weights
+constexpr size_t kZfpSampledStrands = 8;  // one in so many is looked at for the weights
 // Keep the system solvable when nothing moves, and when nothing has moved before: relative, and in m2.
-constexpr double kRidge = 1e-6;
+constexpr double kZfpRidge = 1e-6;
 constexpr double kLeastRidgeM2 = 1e-18;
 
 /// Axis-major, then vertex, strand fastest, as integer planes.
@@ -93,12 +93,12 @@ class FloatPredictor {
     if (last_.empty()) return {};
     glm::dmat2 system(kLeastRidgeM2);
     glm::dvec2 side(0.0);
-    for (size_t i = 0; i < now.size(); i += kSampledStrands) {
+    for (size_t i = 0; i < now.size(); i += kZfpSampledStrands) {
       const glm::dvec2 feature(movement_[i], movement_[i] - movement_before_[i]);
       system += glm::outerProduct(feature, feature);
       side += feature * static_cast<double>(now[i] - last_[i]);
     }
-    system += glm::dmat2(kRidge * (system[0][0] + system[1][1]));
+    system += glm::dmat2(kZfpRidge * (system[0][0] + system[1][1]));
     const glm::dvec2 solution = glm::inverse(system) * side;
     return {static_cast<float>(solution.x), static_cast<float>(solution.y)};
   }

@@ -3,6 +3,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "common/base/profile.h"
+#include "common/base/units.h"
 #include "common/gl/timer.h"
 #include "server/sim/executor/gl_executor.h"
 #include "server/sim/executor/lanes_executor.h"
@@ -23,7 +24,6 @@ void turn_plane(StrandPlane& plane, const glm::dquat& turn) {
 }
 
 double timed_ms(Executor& executor, const std::function<void()>& work) {
-  constexpr double kMsPerNs = 1e-6;
   gl::GpuTimer* timer = executor.timer();
   const int64_t begin_ns = now_ns();
   if (timer != nullptr) timer->begin();

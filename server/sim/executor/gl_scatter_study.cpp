@@ -20,7 +20,7 @@ constexpr uint32_t kHashBins = 4096;  // a power of two
 constexpr uint32_t kBinSize = 2048;
 constexpr uint32_t kPlaneSeed = 13;
 
-uint32_t groups_of(size_t invocations) {
+uint32_t study_groups_of(size_t invocations) {
   return static_cast<uint32_t>((invocations + shader::kStrandLocalSize - 1) / shader::kStrandLocalSize);
 }
 
@@ -90,7 +90,7 @@ class RasterStudy final : public GlScatterStudy {
     glDisable(GL_BLEND);
     sums_.bind(shader::kUnitStudySum);
     nodes_.bind_storage(shader::kBindingStudyNodes);
-    run_program(divide_, groups_of(grid_.size()));
+    run_program(divide_, study_groups_of(grid_.size()));
   }
 
  private:
@@ -140,13 +140,13 @@ class BinStudy final : public GlScatterStudy {
     bins_.bind_storage(shader::kBindingStudyBins);
     members_.bind_storage(shader::kBindingStudyMembers);
     if (by_planes_) planes_.bind_storage(shader::kBindingStudyPlanes);
-    run_program(count_, groups_of(samples_.count));
+    run_program(count_, study_groups_of(samples_.count));
     if (!by_planes_) {
       run_program(begin_, 1);
       sorted_.bind_storage(shader::kBindingStudySorted);
-      run_program(place_, groups_of(samples_.count));
+      run_program(place_, study_groups_of(samples_.count));
     }
-    run_program(gather_, groups_of(grid_.size()));
+    run_program(gather_, study_groups_of(grid_.size()));
   }
 
   uint64_t lost_count() const override {
@@ -198,7 +198,7 @@ Result<std::unique_ptr<GlScatterStudy>> make_gl_scatter_study(const gl::ShaderLi
   RETURN_IF_ERROR(gl::check_device_limit(limits, gl::DeviceLimit::BufferTexels, 2 * samples.size(),
                                          "samples of a study"));
   RETURN_IF_ERROR(gl::check_device_limit(limits, gl::DeviceLimit::GroupCount,
-                                         groups_of(std::max(samples.size(), grid.size())),
+                                         study_groups_of(std::max(samples.size(), grid.size())),
                                          "samples of a study"));
   if (name == "raster") return prepared(std::make_unique<RasterStudy>(grid, samples), shaders);
   if (name == "counting" || name == "hashing")

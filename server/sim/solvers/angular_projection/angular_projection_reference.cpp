@@ -9,7 +9,7 @@ namespace strandcast {
 namespace {
 
 const glm::dvec3 kAcross[2] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}};  // of a frame
-const glm::dvec3 kAlong(0.0, 0.0, 1.0);
+const glm::dvec3 kAlongBone(0.0, 0.0, 1.0);
 
 class AngularProjectionReference final : public ReferenceChain {
  public:
@@ -24,7 +24,7 @@ class AngularProjectionReference final : public ReferenceChain {
   /// Moment of the joint before segment i on that segment.
   glm::dvec3 joint_moment(const ReferenceChainState& chain, size_t i, double stiffness) const {
     const ChainSegment& segment = chain.segment[i];
-    const glm::dvec3 rest = frame_before(chain, i) * (segment.rest_turn * kAlong);
+    const glm::dvec3 rest = frame_before(chain, i) * (segment.rest_turn * kAlongBone);
     const glm::dvec3 turn_before = i > 0 ? chain.segment[i - 1].turn : chain.clamp_turn;
     const glm::dvec3 rate = (segment.turn - turn_before) / h_s();
     return stiffness * (bend_between(segment.along(), rest) - parameters().damping_s * rate);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/sim/directions.h"
 #include "server/sim/reference_chain.h"
 #include "server/sim/solvers/articulated/articulated.h"
 
@@ -12,11 +13,7 @@ namespace {
 constexpr double kSpinShare = 1e-4;
 constexpr double kMinOpening = 0.1;
 
-const glm::dvec3 kAlong(0.0, 0.0, 1.0);  // of a frame: along the segment
-
-glm::dmat3 cross_matrix(const glm::dvec3& v) {
-  return {glm::dvec3(0.0, v.z, -v.y), glm::dvec3(-v.z, 0.0, v.x), glm::dvec3(v.y, -v.x, 0.0)};
-}
+const glm::dvec3 kAlongLink(0.0, 0.0, 1.0);  // of a frame: along the segment
 
 /// Symmetric positive matrix of 3 x 3 blocks, dense, solved by Cholesky's method.
 class DenseSystem {
@@ -78,7 +75,7 @@ class ArticulatedReference final : public ReferenceChain {
     const ChainSegment& segment = chain.segment[i];
     const glm::dquat before = i > 0 ? chain.segment[i - 1].frame : chain.clamp;
     const glm::dquat rest = before * segment.rest_turn;
-    const glm::dvec3 u = rest * kAlong;
+    const glm::dvec3 u = rest * kAlongLink;
     const glm::dvec3 t = segment.along();
     const double span = segment.lever_m + (i > 0 ? chain.segment[i - 1].lever_m : 0.0);
     const double bend = bend_stiffness(chain, i, tension_m2ps2);

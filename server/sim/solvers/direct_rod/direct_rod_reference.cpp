@@ -11,7 +11,7 @@
 namespace strandcast {
 namespace {
 
-constexpr double kTinyLength = 1e-10;
+constexpr double kTinyRodLength = 1e-10;
 constexpr double kFoldedBack = 1e-6;  // 1 + cosine of tangents that face each other
 
 /// Part of a vector at right angles to a unit vector, as a matrix.
@@ -84,7 +84,7 @@ void set_untwisted(RodStrand& strand, uint32_t first, const glm::dquat& rotation
   for (size_t i = first; i < strand.vertex.size(); ++i) {
     const glm::dvec3 edge = strand.vertex[i].position_m - strand.vertex[i - 1].position_m;
     const double length = glm::length(edge);
-    const bool has_direction = strand.rest.segment_m[i] > strand.rest.shortest_m && length > kTinyLength;
+    const bool has_direction = strand.rest.segment_m[i] > strand.rest.shortest_m && length > kTinyRodLength;
     const glm::dvec3 direction = has_direction && is_sane(edge) ? edge / length : before;
     const glm::dvec3 straight(0.0, 0.0, 1.0);
     axis = untwisted_axis(axis, before, direction, i == first ? straight : strand.rest.joint_tangent[i]);
@@ -189,7 +189,7 @@ class RodMotion {
       if (strand_.rest.segment_m[i] <= strand_.rest.shortest_m) continue;
       const glm::dvec3 edge = points[i] - points[i - 1];
       const double length = glm::length(edge);
-      return length > kTinyLength ? edge / length : glm::normalize(target_[i] - target_[i - 1]);
+      return length > kTinyRodLength ? edge / length : glm::normalize(target_[i] - target_[i - 1]);
     }
     return clamp_direction_;
   }
@@ -421,7 +421,7 @@ class RodMotion {
                              const std::vector<glm::dvec3>& solved) const {
     const glm::dvec3 way = solved[i] - start;
     const double distance = glm::length(way);
-    return distance > kTinyLength ? way / distance : direction_in(solved, i);
+    return distance > kTinyRodLength ? way / distance : direction_in(solved, i);
   }
 
   void reset() {
@@ -503,7 +503,7 @@ class DirectRodReference final : public ReferenceSolver {
       vertex.displacement_m += now_m[i] - before_m[i];
       const glm::dvec3 from = before_m[i] - before_m[i - 1];
       const glm::dvec3 to = now_m[i] - now_m[i - 1];
-      if (std::min(glm::length(from), glm::length(to)) > kTinyLength)
+      if (std::min(glm::length(from), glm::length(to)) > kTinyRodLength)
         vertex.axis = carried_axis(vertex.axis, glm::normalize(from), glm::normalize(to));
     }
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "server/sim/directions.h"
 #include "server/sim/solvers/direct_rod/direct_rod_style.h"
 
 namespace strandcast {
@@ -21,9 +22,9 @@ constexpr double kSoftShare = 0.1;
 constexpr double kMinSoftLengthM = 1e-5;
 // Float positions say nothing about the direction of edges below.
 constexpr double kShortestShare = 1e-3;
-constexpr double kShortestM = 1e-6;
+constexpr double kShortestRestM = 1e-6;
 // 1 + cos below this: the edge folds back, any rotation will do.
-constexpr double kFoldedBack = 1e-6;
+constexpr double kFoldedRest = 1e-6;
 
 /// Directions of all edges; an edge too short for one continues the one before it.
 std::vector<glm::dvec3> edge_directions(const StrandLayout& layout, uint32_t strand_index,
@@ -92,14 +93,14 @@ RodJoint joint_under(const glm::dvec3& moment, const JointEdges& edges, double b
   joint.bend_stiffness = bend_stiffness;
   joint.twist_stiffness = twist_stiffness;
   const glm::dvec3 sum = is_clamp ? after : before + after;
-  joint.tangent = glm::dot(sum, sum) > 2.0 * kFoldedBack ? glm::normalize(sum) : side;
+  joint.tangent = glm::dot(sum, sum) > 2.0 * kFoldedRest ? glm::normalize(sum) : side;
   glm::dvec3 last_but_one(0.0);
   for (int round = 0; round < kRounds; ++round) {
     joint.strain = strain_under(moment, joint.tangent, bend_stiffness, twist_stiffness);
     const glm::dvec3 end = half_strained(joint.strain, joint.tangent, after, -1.0);
     const glm::dvec3 start = half_strained(joint.strain, joint.tangent, before, 1.0);
     const glm::dvec3 middle = is_clamp ? end : start + end;
-    if (glm::dot(middle, middle) <= 2.0 * kFoldedBack) break;
+    if (glm::dot(middle, middle) <= 2.0 * kFoldedRest) break;
     const glm::dvec3 tangent = glm::normalize(middle);
     // What repeats itself has settled, into one value or two that differ by a rounding: nothing new comes.
     const bool is_settled = tangent == joint.tangent;
@@ -179,12 +180,6 @@ RodParameters read_rod_parameters(const SolverParameters& parameters) {
   return result;
 }
 
-glm::dvec3 any_perpendicular(const glm::dvec3& direction) {
-  const glm::dvec3 other =
-      std::abs(direction.x) < 0.6 ? glm::dvec3(1.0, 0.0, 0.0) : glm::dvec3(0.0, 1.0, 0.0);
-  return glm::normalize(glm::cross(direction, other));
-}
-
 double RodShape::soft_m(uint32_t i) const {
   return soft_length_m(segment_m[i], mean_segment_m);
 }
@@ -200,7 +195,7 @@ double clamp_stiffness(double stiffness_m4ps2, double tension_m2ps2, double segm
 }
 
 glm::dvec3 carried_axis(const glm::dvec3& axis, const glm::dvec3& from, const glm::dvec3& to) {
-  const double sum = std::max(1.0 + glm::dot(from, to), kFoldedBack);
+  const double sum = std::max(1.0 + glm::dot(from, to), kFoldedRest);
   glm::dvec3 result = axis - (glm::dot(axis, to) / sum) * (from + to);
   result -= to * glm::dot(result, to);
   return glm::normalize(result);
@@ -234,7 +229,7 @@ RodShape make_rod_shape(const StrandLayout& layout, uint32_t strand_index, const
   }
   shape.mean_segment_m =
       first < n ? std::max(shape.free_length_m / (n - first), kMinSoftLengthM) : kMinSoftLengthM;
-  shape.shortest_m = std::max(kShortestShare * shape.mean_segment_m, kShortestM);
+  shape.shortest_m = std::max(kShortestShare * shape.mean_segment_m, kShortestRestM);
   shape.direction = edge_directions(layout, strand_index, shape.shortest_m);
 
   const double share = layout.pinned_tail_count == 0 ? parameters.sag_free : 0.0;

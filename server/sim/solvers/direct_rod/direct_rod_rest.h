@@ -87,9 +87,6 @@ glm::dvec3 carried_axis(const glm::dvec3& axis, const glm::dvec3& from, const gl
 glm::dvec3 untwisted_axis(const glm::dvec3& axis, const glm::dvec3& from, const glm::dvec3& to,
                           const glm::dvec3& joint_tangent);
 
-/// A unit vector at right angles to one.
-glm::dvec3 any_perpendicular(const glm::dvec3& direction);
-
 /// Length that stiffness and mass of an edge are computed from: no shorter than a share of the mean, so that
 /// zero-length edges divide nothing by zero.
 double soft_length_m(double segment_m, double mean_segment_m);

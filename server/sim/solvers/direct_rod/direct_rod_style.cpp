@@ -10,6 +10,7 @@
 
 #include "common/base/hash.h"
 #include "common/base/worker_pool.h"
+#include "server/sim/directions.h"
 
 namespace strandcast {
 namespace {
@@ -31,11 +32,6 @@ constexpr double kLeastPivotShare = 1e-12;
 
 glm::dmat3 symmetric_part(const glm::dmat3& m) {
   return 0.5 * (m + glm::transpose(m));
-}
-
-/// cross_matrix(v) * x = v x x
-glm::dmat3 cross_matrix(const glm::dvec3& v) {
-  return {0.0, v.z, -v.y, -v.z, 0.0, v.x, v.y, -v.x, 0.0};
 }
 
 /// A joint turns back by its angle up to a right angle (kMaxHalfSineSquared), with less beyond: what it would

@@ -10,7 +10,8 @@ namespace {
 
 constexpr const char* kIntegratorNames[] = {"symplectic Euler", "Verlet", "backward Euler"};
 
-Result<std::unique_ptr<Solver>> make_kernel(const SolverParameters& given, const SolverContext& context) {
+Result<std::unique_ptr<Solver>> make_spring_kernel(const SolverParameters& given,
+                                                   const SolverContext& context) {
   const MassSpringParameters parameters = read_mass_spring(given);
   StrandKernelDesc desc;
   desc.name = "mass_spring";
@@ -123,7 +124,7 @@ SolverRow mass_spring_row() {
   row.as_hair = parameters_of_hair;
   // What the springs give: the weight and the pull of the head's motion over 1 N/m.
   row.stretch_bound = 0.006;
-  row.make = make_kernel;
+  row.make = make_spring_kernel;
   row.make_reference = make_mass_spring_reference;
   return row;
 }

@@ -12,7 +12,7 @@
 namespace strandcast {
 namespace {
 
-constexpr double kShortestM = 1e-6;
+constexpr double kShortestSpringM = 1e-6;
 constexpr double kNearlyReversed = 0.02;  // 1 + cos of 164 degrees
 
 /// A linear form in the positions of consecutive vertices: value = constant part, jacobian[k] on vertex first
@@ -243,7 +243,7 @@ class SpringMotion {
     const glm::dvec3& t = direction_[i];
     const double length = glm::dot(x_[i] - x_[i - 1], t);
     const glm::dvec3 pull = (spring * (length - segment_[i]) + damper * (length - length_before(i))) * t;
-    const double across = spring * std::max(length - segment_[i], 0.0) / std::max(length, kShortestM);
+    const double across = spring * std::max(length - segment_[i], 0.0) / std::max(length, kShortestSpringM);
     const glm::dmat3 stiffness =
         (spring + damper) * glm::outerProduct(t, t) + across * (glm::dmat3(1.0) - glm::outerProduct(t, t));
     for (const uint32_t a : {i - 1, i}) {

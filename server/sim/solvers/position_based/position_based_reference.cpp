@@ -9,7 +9,7 @@
 namespace strandcast {
 namespace {
 
-constexpr double kTinyLengthM = 1e-10;
+constexpr double kTinyConstraintM = 1e-10;
 constexpr double kTinyMassKg = 1e-15;
 
 /// A distance that two vertices should have.
@@ -76,7 +76,7 @@ class PositionBasedReference final : public ReferenceStrands {
                              uint32_t head, uint32_t tail) {
     const double segment_m = strand.segment_m[std::max(head, tail)];
     const glm::dvec3 edge = before[tail] - before[head];
-    if (glm::length(edge) < kTinyLengthM) return strand.placed_m[head];
+    if (glm::length(edge) < kTinyConstraintM) return strand.placed_m[head];
     const glm::dvec3 fitting = before[head] + segment_m * glm::normalize(edge);
     return tractrix_followed(before[head], strand.placed_m[head], fitting, segment_m);
   }
@@ -115,10 +115,10 @@ class PositionBasedReference final : public ReferenceStrands {
     if (w_a + w_b == 0.0) return;
     const glm::dvec3 along = strand.placed_m[constraint.b] - strand.placed_m[constraint.a];
     const double length_m = glm::length(along);
-    glm::dvec3 gradient = length_m > kTinyLengthM ? along / length_m : glm::dvec3(0.0);
-    if (length_m <= kTinyLengthM && constraint.is_stretch) {
+    glm::dvec3 gradient = length_m > kTinyConstraintM ? along / length_m : glm::dvec3(0.0);
+    if (length_m <= kTinyConstraintM && constraint.is_stretch) {
       const glm::dvec3 groomed = strand.target_m[constraint.b] - strand.target_m[constraint.a];
-      if (glm::length(groomed) > kTinyLengthM) gradient = glm::normalize(groomed);
+      if (glm::length(groomed) > kTinyConstraintM) gradient = glm::normalize(groomed);
     }
     const double error_m = length_m - constraint.rest_m;
     double push = -constraint.share * error_m / (w_a + w_b);
@@ -142,9 +142,9 @@ class PositionBasedReference final : public ReferenceStrands {
     for (int round = 0; round < push_rounds(input()); ++round) {
       const ReferenceSphere sphere = deepest_sphere(input(), point);
       // No way out of the very centre is shorter than another.
-      if (sphere.radius_m <= 0.0 || glm::distance(point, sphere.center_m) < kTinyLengthM) return point;
+      if (sphere.radius_m <= 0.0 || glm::distance(point, sphere.center_m) < kTinyConstraintM) return point;
       const glm::dvec3 held = held_by_friction(old, point, carry(), friction_, sphere) - sphere.center_m;
-      point = sphere.center_m + held * (sphere.radius_m / std::max(glm::length(held), kTinyLengthM));
+      point = sphere.center_m + held * (sphere.radius_m / std::max(glm::length(held), kTinyConstraintM));
     }
     return point;
   }

@@ -18,14 +18,15 @@ constexpr uint32_t kConvergingShapeIterations = 4;
 constexpr double kShapeRelaxation = 0.7;
 constexpr double kConvergedShapeIterations = 8.0;
 constexpr double kDefaultStretchLimit = 0.1;
-constexpr double kMaxIterations = 64.0;
+constexpr double kMaxShapeIterations = 64.0;
 // The local shape holds the style as well, so the pull to it may be weaker; at the tip it still carries all
 // of the weight.
 constexpr double kDefaultStylePerS2 = 100.0;
 // 1.4 of TressFX's units, centimetres, per step and step at 60 Hz.
 constexpr double kDefaultFastMps2 = 50.0;
 
-Result<std::unique_ptr<Solver>> make_kernel(const SolverParameters& given, const SolverContext& context) {
+Result<std::unique_ptr<Solver>> make_shape_kernel(const SolverParameters& given,
+                                                  const SolverContext& context) {
   const ShapeConstraintsParameters model = read_shape_constraints(given);
   StrandKernelDesc desc;
   desc.name = "shape_constraints";
@@ -51,9 +52,9 @@ std::vector<SolverParameterInfo> parameter_infos() {
   const HairConstants hair;
   infos.insert(
       infos.end(),
-      {{"iterations", kDefaultLengthIterations, 0.0, kMaxIterations, "",
+      {{"iterations", kDefaultLengthIterations, 0.0, kMaxShapeIterations, "",
         "times the segments are given their lengths per substep (rounded); 0 = they are not"},
-       {"shape_iterations", kDefaultShapeIterations, 0.0, kMaxIterations, "",
+       {"shape_iterations", kDefaultShapeIterations, 0.0, kMaxShapeIterations, "",
         "times the segments are turned to their groomed angles per substep (rounded); 0 = limp, 2 as "
         "TressFX, "
         "softer than bend_stiffness, from 4 on as stiff as that at any rate, but folded strands may flutter"},
@@ -114,7 +115,7 @@ SolverRow shape_constraints_row() {
         {"shock_share", 0.0}};
   };
   row.stretch_bound = (1.0 + 1e-3) * kDefaultStretchLimit;  // lengths are rounded
-  row.make = make_kernel;
+  row.make = make_shape_kernel;
   row.make_reference = make_shape_constraints_reference;
   return row;
 }

@@ -16,7 +16,7 @@ constexpr double kSmallAngle = 1e-4;
 constexpr double kGaussPoint = 0.28867513459481287;
 
 // Newton's method: largest turn of an element per step, end of the search, halvings of a step.
-constexpr double kMaxTurnRad = 1.0;
+constexpr double kMaxPieceTurnRad = 1.0;
 constexpr double kEndTurnRad = 1e-9;
 constexpr int kMostHalvings = 10;
 // Of the stiffest curvature's inertia, what every one has at least in the matrix.
@@ -25,11 +25,7 @@ constexpr double kLeastShare = 1e-7;
 constexpr double kFitShare = 1e-7;
 constexpr uint32_t kFitSteps = 30;
 
-const glm::dvec3 kAlong(0.0, 0.0, 1.0);
-
-glm::dmat3 cross_matrix(const glm::dvec3& v) {
-  return {glm::dvec3(0.0, v.z, -v.y), glm::dvec3(-v.z, 0.0, v.x), glm::dvec3(v.y, -v.x, 0.0)};
-}
+const glm::dvec3 kAlongPiece(0.0, 0.0, 1.0);
 
 /// A helical piece seen from the frame at its start.
 struct Piece {
@@ -53,7 +49,7 @@ Piece piece_of(const glm::dvec3& q, double s) {
   const glm::dmat3 spin = s * cross_matrix(q);
   Piece piece;
   piece.turn = glm::dmat3(1.0) + first * spin + second * (spin * spin);
-  piece.way_m = s * (kAlong + second * (spin * kAlong) + third * (spin * (spin * kAlong)));
+  piece.way_m = s * (kAlongPiece + second * (spin * kAlongPiece) + third * (spin * (spin * kAlongPiece)));
   return piece;
 }
 
@@ -90,7 +86,7 @@ Bends bends_of(std::span<const glm::dvec3> points_m) {
   for (size_t k = 0; k + 1 < points_m.size(); ++k) {
     const glm::dvec3 next = direction_or(points_m[k + 1] - points_m[k], along);
     if (k == 0) {
-      frame = smallest_rotation(kAlong, next);
+      frame = smallest_rotation(kAlongPiece, next);
       bends.first_frame = frame;
       bends.bend.emplace_back(0.0, 0.0);
     } else {
@@ -277,7 +273,7 @@ void settle_helix(const HelixProblem& problem, std::span<glm::dvec3> q) {
     for (size_t i = 0; i < step.size(); ++i)
       most = std::fmax(most, std::abs(step[i]) * line.element_m[i / 3]);
     if (step.empty() || !std::isfinite(most)) return;
-    double share = std::min(1.0, kMaxTurnRad / std::max(most, kTinyTurnRad));
+    double share = std::min(1.0, kMaxPieceTurnRad / std::max(most, kTinyTurnRad));
     bool is_lower = false;
     for (int halving = 0; halving < kMostHalvings && !is_lower; ++halving, share *= 0.5) {
       for (size_t e = 0; e < q.size(); ++e)

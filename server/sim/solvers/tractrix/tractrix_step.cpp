@@ -9,7 +9,7 @@
 namespace strandcast {
 namespace {
 
-constexpr double kTinyLength = 1e-14;
+constexpr double kTinyPull = 1e-14;
 constexpr uint32_t kRounds = 3;
 
 }  // namespace
@@ -25,7 +25,7 @@ glm::dvec3 tractrix_followed(const glm::dvec3& head_before, const glm::dvec3& he
   const double way_m = glm::length(shift);
   const double length_m = glm::length(edge);
   if (way_m == 0.0) return tail;
-  if (length_m < kTinyLength || segment_m < kTinyLength) return tail + shift;
+  if (length_m < kTinyPull || segment_m < kTinyPull) return tail + shift;
   const glm::dvec3 x_axis = shift / way_m;
   const double behind = -glm::dot(edge, x_axis) / length_m;
   const glm::dvec3 across = edge / length_m + behind * x_axis;
