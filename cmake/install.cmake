@@ -57,7 +57,9 @@ add_custom_target(strandcast_help_files ALL DEPENDS ${help_files})
 # ---- the strand core, for other programs: find_package(Strandcast) gives Strandcast::core
 
 # One archive of the folders' own.
-set(core_parts base simd math lane_kernels kernels strands replay)
+get_property(lane_sets GLOBAL PROPERTY strandcast_lane_sets)
+list(TRANSFORM lane_sets PREPEND lanes_)
+set(core_parts base simd math ${lane_sets} lane_kernels kernels strands replay)
 list(TRANSFORM core_parts REPLACE "(.+)" "$<TARGET_OBJECTS:strandcast_\\1>" OUTPUT_VARIABLE core_objects)
 add_library(strandcast_core STATIC ${core_objects})
 set_target_properties(strandcast_core PROPERTIES EXPORT_NAME core LINKER_LANGUAGE CXX)

@@ -18,3 +18,7 @@ function(strandcast_precompile name)
 endfunction()
 
 strandcast_precompile(strandcast_usual HEADERS ${strandcast_usual_headers} LIBS fmt::fmt)
+# Command lines: CLI11 is templates in headers, and takes longer to compile than what it reads takes to run.
+if(NOT EMSCRIPTEN)
+  strandcast_precompile(strandcast_command_line HEADERS ${strandcast_usual_headers} <CLI/CLI.hpp> LIBS fmt::fmt OPTIONS -O1)
+endif()

@@ -26,42 +26,83 @@ if(STRANDCAST_SANITIZE)
   target_link_options(strandcast_flags INTERFACE -fsanitize=${STRANDCAST_SANITIZE})
 endif()
 
-# strandcast_library(NAME SOURCES a.cpp ... LIBS x y ... [PCH z]): a static library with the project's flags. PCH: whose
-# precompiled headers its files begin with (strandcast_usual where nothing is said; `none`).
+# lld links in a quarter of the time of ld; it does not read what GCC leaves for optimisation at link time.
+find_program(STRANDCAST_LLD ld.lld)
+if(STRANDCAST_LLD AND NOT CMAKE_INTERPROCEDURAL_OPTIMIZATION AND NOT EMSCRIPTEN)
+  target_link_options(strandcast_flags INTERFACE -fuse-ld=lld)
+endif()
+
+# Presets with unity builds (`ci`, `release`) compile eight files of a target as one: names in unnamed namespaces are
+# distinct within a target, and a test's file has a namespace of its own. What stays single: kernels marked `flatten`
+# (common/simd/variants.h), which would take in what else stands in the unit, and files that define macros of others.
+if(CMAKE_UNITY_BUILD)
+  target_compile_options(strandcast_flags INTERFACE -Wno-subobject-linkage)  # the "header" is a file of the unit
+endif()
+function(strandcast_leave_single)
+  set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endfunction()
+function(strandcast_leave_kernels_single)
+  foreach(source IN LISTS ARGN)
+    cmake_path(ABSOLUTE_PATH source OUTPUT_VARIABLE path)
+    if(EXISTS ${path})
+      file(STRINGS ${path} kernels REGEX "STRANDCAST_KERNEL\\(" LIMIT_COUNT 1)
+      if(kernels)
+        strandcast_leave_single(${source})
+      endif()
+    endif()
+  endforeach()
+endfunction()
+
+# strandcast_library(NAME SOURCES a.cpp ... [LIGHT b.cpp ...] LIBS x y ... [PCH z] [LIGHT_PCH w]): a static library with
+# the project's flags. LIGHT: files that read options or wait for sockets, where -O3 costs more to compile than it ever
+# saves. PCH: whose precompiled headers its files begin with (strandcast_usual where nothing is said; `none`);
+# LIGHT_PCH: those of LIGHT, likewise.
 function(strandcast_library name)
-  cmake_parse_arguments(ARG "" "PCH" "SOURCES;LIBS" ${ARGN})
-  add_library(${name} STATIC ${ARG_SOURCES})
-  target_link_libraries(${name} PUBLIC strandcast_flags ${ARG_LIBS})
+  cmake_parse_arguments(ARG "" "PCH;LIGHT_PCH" "SOURCES;LIGHT;LIBS" ${ARGN})
   if(NOT ARG_PCH)
     set(ARG_PCH strandcast_usual)
   endif()
+  strandcast_leave_kernels_single(${ARG_SOURCES})
+  if(ARG_LIGHT)  # a target of its own: a file with options of its own takes no part in a unity build
+    if(NOT ARG_LIGHT_PCH)
+      set(ARG_LIGHT_PCH ${ARG_PCH})
+    endif()
+    add_library(${name}_light OBJECT ${ARG_LIGHT})
+    target_link_libraries(${name}_light PRIVATE strandcast_flags ${ARG_LIBS})
+    target_compile_options(${name}_light PRIVATE -O1)
+    target_precompile_headers(${name}_light REUSE_FROM ${ARG_LIGHT_PCH})
+    list(APPEND ARG_SOURCES $<TARGET_OBJECTS:${name}_light>)
+  endif()
+  add_library(${name} STATIC ${ARG_SOURCES})
+  target_link_libraries(${name} PUBLIC strandcast_flags ${ARG_LIBS})
   if(NOT ARG_PCH STREQUAL "none")
     target_precompile_headers(${name} REUSE_FROM ${ARG_PCH})
   endif()
 endfunction()
 
-# strandcast_program(NAME SOURCES ... LIBS ...): an executable in build/<preset>/bin.
+# strandcast_program(NAME SOURCES ... LIBS ... [PCH z] [LIGHT]): an executable in build/<preset>/bin. LIGHT: its own files
+# are lightly optimised.
 function(strandcast_program name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "LIGHT" "PCH" "SOURCES;LIBS" ${ARGN})
+  if(NOT ARG_PCH)
+    set(ARG_PCH strandcast_usual)
+  endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE strandcast_flags ${ARG_LIBS})
-  target_precompile_headers(${name} REUSE_FROM strandcast_usual)
+  if(ARG_LIGHT)
+    target_compile_options(${name} PRIVATE -O1)
+  endif()
+  target_precompile_headers(${name} REUSE_FROM ${ARG_PCH})
 endfunction()
 
-# strandcast_lightly_optimised(a.cpp ...): files of this folder that read options or drive tests, where -O3 costs more
-# to compile than it ever saves.
-function(strandcast_lightly_optimised)
-  set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS -O1)
-endfunction()
-
-# strandcast_test(NAME LABEL unit SOURCES ... LIBS ... [ALONE] [OFFLINE] [SERIAL] [TIMEOUT s]): a GoogleTest program. Every
+# strandcast_test(NAME LABEL unit SOURCES ... LIBS ... [ALONE] [OFFLINE] [SERIAL suite ...] [TIMEOUT s]): a GoogleTest program. Every
 # suite in it is one CTest test, NAME.Suite; with ALONE every TEST is, NAME.Suite.Test, in a process of its own. Tests of
 # the label `integration` run alone and get the label `network` too, which allows a second try (tests/run.sh), unless
-# they are OFFLINE. SERIAL: never beside another test (it loads both cores). TIMEOUT: of one CTest test.
+# they are OFFLINE. SERIAL: suites that never run beside another test (they load both cores). TIMEOUT: of one CTest test.
 function(strandcast_test name)
-  cmake_parse_arguments(ARG "ALONE;OFFLINE;SERIAL" "LABEL;TIMEOUT" "SOURCES;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "ALONE;OFFLINE" "LABEL;TIMEOUT" "SOURCES;LIBS;SERIAL" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
-  target_link_libraries(${name} PRIVATE strandcast_flags ${ARG_LIBS} GTest::gmock GTest::gtest_main)
+  target_link_libraries(${name} PRIVATE strandcast_flags ${ARG_LIBS} strandcast_test_main GTest::gmock)
   target_compile_definitions(${name} PRIVATE
     STRANDCAST_SHARED_DATA="${CMAKE_SOURCE_DIR}/../shared/data" STRANDCAST_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
   target_compile_options(${name} PRIVATE ${strandcast_test_options})
@@ -90,7 +131,7 @@ function(strandcast_test name)
   add_custom_command(TARGET ${name} POST_BUILD BYPRODUCTS ${list_file}
     COMMAND ${CMAKE_COMMAND} -DNAME=${name} -DPROGRAM=$<TARGET_FILE:${name}> -DOUTPUT=${list_file} -DMODE=${mode}
       -DRESULTS=${CMAKE_BINARY_DIR}/test_results -DLISTS=${CMAKE_BINARY_DIR}/test_lists
-      "-DLABELS=${labels}" -DTIMEOUT_S=${timeout_s} -DSERIAL=${ARG_SERIAL}
+      "-DLABELS=${labels}" -DTIMEOUT_S=${timeout_s} "-DSERIAL=${ARG_SERIAL}"
       -DENVIRONMENT=${environment} -P ${CMAKE_SOURCE_DIR}/cmake/list_tests.cmake
     VERBATIM)
   # What is not built must not look as if it had passed.

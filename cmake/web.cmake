@@ -51,7 +51,7 @@ foreach(folder base simd math kernels strands)
   add_subdirectory(common/${folder})
 endforeach()
 # Of what draws, the parts without OpenGL.
-add_library(strandcast_picture STATIC common/groom/mesh.cpp common/replay/strand_fill.cpp common/scene/hair_color.cpp)
+add_library(strandcast_picture STATIC common/groom/mesh.cpp common/replay/strand_fill.cpp common/scene/hair_color.cpp common/scene/scene_desc.cpp)
 foreach(part head_occupancy light_lattice look_lights rest_facts scalp_cover strand_detail strand_style view
              gl_tiles/tile_block tiles/strand_expansion tiles/strand_shading tiles/tile_bins tiles/tile_raster)
   target_sources(strandcast_picture PRIVATE common/render/${part}.cpp)
@@ -72,7 +72,7 @@ strandcast_small(common/strands delta_codec.cpp frame_header.cpp raw_codec.cpp s
   strand_payload.cpp strand_prefix.cpp zstd_block.cpp tangent/codec.cpp tangent/fit.cpp tangent/fit_shape.cpp tangent/head.cpp
   tangent/layout.cpp tangent/order.cpp
   step/predictor_state.cpp step/rod_planes.cpp step/steps.cpp step/wire.cpp)
-strandcast_small(. common/groom/mesh.cpp common/scene/hair_color.cpp common/render/head_occupancy.cpp common/render/look_lights.cpp
+strandcast_small(. common/groom/mesh.cpp common/scene/hair_color.cpp common/scene/scene_desc.cpp common/render/head_occupancy.cpp common/render/look_lights.cpp
   common/render/rest_facts.cpp common/render/scalp_cover.cpp common/render/strand_detail.cpp common/render/strand_style.cpp
   common/render/view.cpp common/render/gl_tiles/tile_block.cpp client/web/fmt/format.cpp)
 add_subdirectory(client/web)

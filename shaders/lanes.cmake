@@ -1,6 +1,6 @@
-# Makes C++ over lanes (common/simd/lanes.h) of the kernels' GLSL: reads ROOT/FILE and writes OUTPUT. README.md says which
-# GLSL such a file may use. What is left is included into a class (common/kernels/lane_kernel_private.h), in which
-# `float` is a lane each, and line numbers stay those of the GLSL.
+# Makes C++ over lanes (common/simd/lanes.h) of the kernels' GLSL: reads ROOT/FILE, writes OUTPUT and, in
+# OUTPUT.d, which files it was made of. README.md says which GLSL such a file may use. What is left is included into a
+# class (common/kernels/lane_kernel_private.h), in which `float` is a lane each, and line numbers stay those of the GLSL.
 cmake_minimum_required(VERSION 3.25)
 file(READ ${ROOT}/${FILE} text)
 set(text "\n${text}")
@@ -39,15 +39,31 @@ string(REGEX REPLACE "layout\\(std430, binding = kBinding([A-Za-z]+)\\)[^{]*{([ 
 string(REGEX REPLACE "\nuniform float ([a-z0-9_]+);" "\nconst number \\1 = constant(\"\\1\");" text "${text}")
 string(REGEX REPLACE "\nuniform uint ([a-z0-9_]+);" "\nconst uint \\1 = count(\"\\1\");" text "${text}")
 
-# Constructors of structs: not every compiler knows C++20's aggregates in parentheses.
-file(GLOB all_files ${ROOT}/sim/*.glsl ${ROOT}/sim/*.comp)
-foreach(other IN LISTS all_files)
-  file(STRINGS ${other} heads REGEX "^struct [A-Za-z]+ {")
+# Constructors of structs, here and in what is included: not every compiler knows C++20's aggregates in parentheses.
+set(names "")
+set(files "")
+set(pending ${FILE})
+while(pending)
+  list(POP_FRONT pending next)
+  set(path ${ROOT}/${next})
+  if(NOT EXISTS ${path})  # a test's kernel includes those of this folder
+    set(path ${CMAKE_CURRENT_LIST_DIR}/${next})
+  endif()
+  if(path IN_LIST files)
+    continue()
+  endif()
+  list(APPEND files ${path})
+  file(STRINGS ${path} heads REGEX "^struct [A-Za-z]+ {")
   foreach(head IN LISTS heads)
     string(REGEX REPLACE "^struct ([A-Za-z]+) {.*" "\\1" name "${head}")
     list(APPEND names ${name})
   endforeach()
-endforeach()
+  file(STRINGS ${path} includes REGEX "^#include \"sim/")
+  foreach(include IN LISTS includes)
+    string(REGEX REPLACE "^#include \"([^\"]*)\".*" "\\1" included "${include}")
+    list(APPEND pending ${included})
+  endforeach()
+endwhile()
 list(REMOVE_DUPLICATES names)
 foreach(name IN LISTS names)
   string(REGEX REPLACE "([^A-Za-z0-9_])${name}\\(" "\\1CONSTRUCTED(${name})(" text "${text}")
@@ -67,4 +83,14 @@ set(guard "")
 if(FILE MATCHES "glsl$")
   set(guard "#pragma once\n")
 endif()
-file(WRITE ${OUTPUT} "${guard}#line 1 \"shaders/${FILE}\"\n${text}")
+set(text "${guard}#line 1 \"shaders/${FILE}\"\n${text}")
+# What stays the same is not written: nothing has to be compiled again for it.
+set(before "")
+if(EXISTS ${OUTPUT})
+  file(READ ${OUTPUT} before)
+endif()
+if(NOT before STREQUAL text)
+  file(WRITE ${OUTPUT} "${text}")
+endif()
+list(JOIN files " " files)
+file(WRITE ${OUTPUT}.d "${OUTPUT}: ${files}\n")

@@ -28,4 +28,10 @@ if [ ${#again[@]} -gt 0 ]; then
   done
   ctest --preset "$preset" -j1 --output-junit "$results/second.junit" -R "^($pattern)\$" || true
 fi
+# Processor time of what this shell has waited for; the build's is handed over by who built.
+times >"$results/times.txt"
+{
+  if [ -n "${STRANDCAST_BUILD_PROCESSOR_S:-}" ]; then echo "build $STRANDCAST_BUILD_PROCESSOR_S"; fi
+  echo "tests $(awk -f tests/processor_s.awk "$results/times.txt")"
+} >"$results/processor_s.txt"
 exec bash tests/summary.sh "$folder"

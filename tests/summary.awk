@@ -40,7 +40,9 @@ function read_results(path, entry,    line, name, count, in_text) {
       if (index(line, "]]>")) in_text = 0
       continue
     }
-    if (line ~ /^ *<testcase /) {
+    if (line ~ /^ *<testsuites / && attribute(line, "processor_s") != "") {
+      processor_s[entry] = attribute(line, "processor_s") + 0
+    } else if (line ~ /^ *<testcase /) {
       name = plain(binary_of(entry) "." attribute(line, "classname") "." attribute(line, "name"))
       seen[name] = attribute(line, "result") == "skipped" ? "skipped" : "passed"
       took[name] = attribute(line, "time") + 0
@@ -102,6 +104,12 @@ END {
       label_seconds[names[k]] += seconds[entry]
       label_tests[names[k]] += entry in expected ? expected[entry] : 1
     }
+    if (entry in expected) known = read_results(results "/" file_of(entry), entry)
+    for (k = 1; k <= label_count; ++k) {
+      if (!(entry in processor_s)) continue
+      label_processor_s[names[k]] += processor_s[entry]
+      if (seconds[entry] > processor_s[entry]) label_waits_s[names[k]] += seconds[entry] - processor_s[entry]
+    }
     before = failed
     if (!(entry in expected)) {
       took[entry] = seconds[entry]
@@ -119,7 +127,6 @@ END {
         failures = add(failures, entry)
       }
     } else {
-      known = read_results(results "/" file_of(entry), entry)
       for (name in seen) {
         all[++all_count] = name
         if (seen[name] == "passed") ++passed
@@ -163,13 +170,20 @@ END {
     all[best] = swap
     printf "  %8.2f s  %s\n", took[all[n]], all[n]
   }
-  print "Seconds by label (of all processes together)"
+  print "Seconds by label: from begin to end, of the processor, and waiting (what GoogleTest's programs say of themselves)"
   fflush()
   for (label in label_seconds) {
-    sorter = "sort -k3,3"
-    printf "  %8.1f s  %-12s %5d tests\n", label_seconds[label], label, label_tests[label] | sorter
+    sorter = "sort -k7,7"
+    printf "  %8.1f s %8.1f s %8.1f s  %-12s %5d tests\n", label_seconds[label], label_processor_s[label], \
+      label_waits_s[label], label, label_tests[label] | sorter
   }
   if (sorter != "") close(sorter)
+  costs = ""
+  while ((getline line < (results "/processor_s.txt")) > 0) {
+    split(line, words, " ")
+    costs = costs (costs == "" ? "" : ", ") sprintf("%s %.1f", words[1], words[2])
+  }
+  if (costs != "") print "Processor seconds (user + system): " costs
   if (retries != "") printf "Tried twice\n%s", retries
   if (skips != "") printf "Skipped\n%s", skips
   if (without_data > 0) printf "%d of them for want of ../shared/data\n", without_data

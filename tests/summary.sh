@@ -3,7 +3,7 @@
 #   bash tests/summary.sh BUILD_FOLDER
 # test_lists/*.txt says which tests there are ("entry count label,label"), test_results/*.xml what each did,
 # test_results/first.junit and second.junit what CTest says of the programs, test_results/tried_first/*.xml what failed
-# before a second try. Ends with "N passed, N failed, N skipped"; the exit status is 1 when anything failed or nothing ran.
+# before a second try, test_results/processor_s.txt what build and tests cost together. Ends with "N passed, N failed, N skipped"; the exit status is 1 when anything failed or nothing ran.
 set -euo pipefail
 folder="${1:?usage: summary.sh BUILD_FOLDER}"
 results="$folder/test_results"

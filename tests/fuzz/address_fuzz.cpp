@@ -4,8 +4,9 @@
 #include "common/base/check.h"
 #include "tests/fuzz/fuzz_input.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::address_fuzz {
+
+extern "C" int FUZZ_ENTRY(address)(const uint8_t* data, size_t size) {
   const auto address = parse_address(FuzzInput(data, size).take_rest_as_text());
   if (!address) return 0;
   CHECK(!address->host.empty() && address->port != 0);
@@ -13,3 +14,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   CHECK(again.ok() && *again == *address);
   return 0;
 }
+
+}  // namespace strandcast::address_fuzz

@@ -3,8 +3,9 @@
 #include "common/motion/bvh.h"
 #include "tests/fuzz/fuzz_input.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::bvh_fuzz {
+
+extern "C" int FUZZ_ENTRY(bvh)(const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   const auto settings = input.take<uint8_t>();
   BvhOptions options;
@@ -23,3 +24,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   CHECK(is_finite(clip->sample(0.4 * clip->duration_s())));
   return 0;
 }
+
+}  // namespace strandcast::bvh_fuzz

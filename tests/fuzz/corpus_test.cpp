@@ -5,7 +5,7 @@
 #include "common/base/file.h"
 #include "tests/fuzz/fuzz_targets.h"
 
-namespace strandcast {
+namespace strandcast::corpus_test {
 namespace {
 
 struct Target {
@@ -61,4 +61,4 @@ TEST(FuzzCorpusFolder, HoldsOneSmallFolderForEachTarget) {
 }
 
 }  // namespace
-}  // namespace strandcast
+}  // namespace strandcast::corpus_test

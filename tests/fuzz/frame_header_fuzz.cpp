@@ -5,8 +5,9 @@
 #include "common/strands/frame_header.h"
 #include "tests/fuzz/fuzz_input.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::frame_header_fuzz {
+
+extern "C" int FUZZ_ENTRY(frame_header)(const uint8_t* data, size_t size) {
   const auto message = FuzzInput(data, size).take_rest();
   const auto header = unpack_frame_header(message);
   if (!header) return 0;
@@ -20,3 +21,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   CHECK(restamped.ok() && restamped->stream_id == 7 && restamped->send_time_ns == 9);
   return 0;
 }
+
+}  // namespace strandcast::frame_header_fuzz

@@ -10,6 +10,13 @@
 #include <string>
 #include <type_traits>
 
+// The entry of the fuzzer `name`, which is libFuzzer's in a fuzzer and one of many in the tests.
+#ifdef STRANDCAST_FUZZER
+#define FUZZ_ENTRY(name) LLVMFuzzerTestOneInput
+#else
+#define FUZZ_ENTRY(name) fuzz_##name
+#endif
+
 namespace strandcast {
 
 class FuzzInput {

@@ -4,8 +4,11 @@
 #include "tests/fuzz/fuzz_input.h"
 #include "tests/fuzz/groom_checks.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::hair_fuzz {
+
+extern "C" int FUZZ_ENTRY(hair)(const uint8_t* data, size_t size) {
   if (const auto groom = read_hair(ByteView(FuzzInput(data, size).take_rest()))) check_loaded_groom(*groom);
   return 0;
 }
+
+}  // namespace strandcast::hair_fuzz

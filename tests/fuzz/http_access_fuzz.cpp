@@ -7,8 +7,9 @@
 #include "server/net/page.h"
 #include "tests/fuzz/fuzz_input.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::http_access_fuzz {
+
+extern "C" int FUZZ_ENTRY(http_access)(const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   const std::string host = input.take_line();
   const std::string origin = input.take_line();
@@ -55,3 +56,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   CHECK((find_page_file({&page, 1}, path) != nullptr) == (path == "/"));
   return 0;
 }
+
+}  // namespace strandcast::http_access_fuzz

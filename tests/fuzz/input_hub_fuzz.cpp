@@ -6,9 +6,8 @@
 #include "server/input/input_hub.h"
 #include "tests/fuzz/fuzz_input.h"
 
+namespace strandcast::input_hub_fuzz {
 namespace {
-
-using namespace strandcast;
 
 enum class Step : uint8_t { Motion, Wind, Leave, Sample, SampleAnywhere };
 constexpr int kStepKinds = 5;
@@ -82,7 +81,7 @@ struct HubGame {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+extern "C" int FUZZ_ENTRY(input_hub)(const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   HubGame game;
   for (int i = 0; i < kMostSteps && !input.is_empty(); ++i) {
@@ -107,3 +106,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   return 0;
 }
+
+}  // namespace strandcast::input_hub_fuzz

@@ -3,8 +3,9 @@
 #include "common/pictures/image_codec.h"
 #include "tests/fuzz/fuzz_input.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::jpeg_fuzz {
+
+extern "C" int FUZZ_ENTRY(jpeg)(const uint8_t* data, size_t size) {
   const auto image = decode_jpeg(FuzzInput(data, size).take_rest());
   if (!image) return 0;
   CHECK(image->width >= 1 && image->width <= kMaxImageSide);
@@ -18,3 +19,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   CHECK(again.ok() && again->width == image->width && again->height == image->height);
   return 0;
 }
+
+}  // namespace strandcast::jpeg_fuzz

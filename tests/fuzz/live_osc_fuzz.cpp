@@ -3,9 +3,8 @@
 #include "tests/fuzz/fuzz_input.h"
 #include "tests/fuzz/live_checks.h"
 
+namespace strandcast::live_osc_fuzz {
 namespace {
-
-using namespace strandcast;
 
 /// Messages lie within the datagram, and their arguments as their tags say.
 void check_osc(std::span<const std::byte> datagram) {
@@ -37,7 +36,7 @@ void check_osc(std::span<const std::byte> datagram) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+extern "C" int FUZZ_ENTRY(live_osc)(const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   LiveParserConfig config;
   config.protocol = "vmc";
@@ -51,3 +50,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   return 0;
 }
+
+}  // namespace strandcast::live_osc_fuzz

@@ -3,9 +3,8 @@
 #include "tests/fuzz/fuzz_input.h"
 #include "tests/fuzz/live_checks.h"
 
+namespace strandcast::live_packet_fuzz {
 namespace {
-
-using namespace strandcast;
 
 constexpr const char* kProtocols[] = {"opentrack", "freed", "natnet", "vrpn", "livelinkface"};
 constexpr const char* kVersions[] = {"", "3.0", "4.0", "4.1"};
@@ -30,7 +29,7 @@ void check_cuts(const LiveParserConfig& config, std::span<const std::byte> strea
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+extern "C" int FUZZ_ENTRY(live_packet)(const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   LiveParserConfig config;
   config.protocol = kProtocols[input.take<uint8_t>() % std::size(kProtocols)];
@@ -46,3 +45,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   return 0;
 }
+
+}  // namespace strandcast::live_packet_fuzz

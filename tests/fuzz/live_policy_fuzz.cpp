@@ -10,9 +10,8 @@
 #include "server/input/input_hub.h"
 #include "tests/fuzz/fuzz_input.h"
 
+namespace strandcast::live_policy_fuzz {
 namespace {
-
-using namespace strandcast;
 
 constexpr int kMostSteps = 400;
 
@@ -73,7 +72,7 @@ struct PolicyGame {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+extern "C" int FUZZ_ENTRY(live_policy)(const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   PolicyGame game;
   for (int i = 0; i < kMostSteps && !input.is_empty(); ++i) {
@@ -96,3 +95,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   return 0;
 }
+
+}  // namespace strandcast::live_policy_fuzz

@@ -3,8 +3,9 @@
 #include "common/groom/mesh.h"
 #include "tests/fuzz/fuzz_input.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::obj_fuzz {
+
+extern "C" int FUZZ_ENTRY(obj)(const uint8_t* data, size_t size) {
   const auto mesh = parse_obj(FuzzInput(data, size).take_rest_as_text(), "fuzz", 0.01f);
   if (!mesh) return 0;
   CHECK(!mesh->triangle.empty() && mesh->triangle.size() <= kMaxMeshTriangles);
@@ -17,3 +18,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   for (const glm::vec3& normal : mesh->normal) CHECK(std::abs(glm::length(normal) - 1.0f) <= kTolerance);
   return 0;
 }
+
+}  // namespace strandcast::obj_fuzz

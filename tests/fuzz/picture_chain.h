@@ -8,7 +8,7 @@ namespace strandcast {
 
 // Steps of a byte for the kind, a byte of flags and, but for Honest, Lost and Other, a piece (u16 length and
 // bytes).
-enum class PictureStep : uint8_t {
+enum class PictureChainStep : uint8_t {
   Honest,   // the chain's next picture, or a whole one when the decoder has left the chain
   Lost,     // the chain's next picture never arrives, the one after it does
   Other,    // the flags are the number of the chain that goes on from here

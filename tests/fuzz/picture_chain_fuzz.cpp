@@ -14,9 +14,8 @@
 #include "tests/fuzz/fuzz_input.h"
 #include "tests/support/test_pictures.h"
 
+namespace strandcast::picture_chain_fuzz {
 namespace {
-
-using namespace strandcast;
 
 constexpr size_t kPictures = 6;
 constexpr size_t kSecondWhole = 3;
@@ -126,7 +125,7 @@ class Game {
     is_following_ = false;
   }
 
-  void hostile(PictureStep step, uint8_t flags, std::span<const std::byte> piece) {
+  void hostile(PictureChainStep step, uint8_t flags, std::span<const std::byte> piece) {
     std::vector<std::byte> message = make_message(step, flags, piece);
     if ((flags & kFixPayload) != 0 && message.size() >= kFrameHeaderBytes) {
       const auto length = static_cast<uint32_t>(message.size() - kFrameHeaderBytes);
@@ -184,12 +183,12 @@ class Game {
     CHECK(image->rgba.size() == size_t{image->width} * image->height * 4);
   }
 
-  std::vector<std::byte> make_message(PictureStep step, uint8_t flags,
+  std::vector<std::byte> make_message(PictureChainStep step, uint8_t flags,
                                       std::span<const std::byte> piece) const {
     const std::vector<std::byte>& good = chain_->frame[next_]->message;
-    if (step == PictureStep::Whole) return {piece.begin(), piece.end()};
+    if (step == PictureChainStep::Whole) return {piece.begin(), piece.end()};
     FuzzInput input(piece);
-    if (step == PictureStep::Patched) {
+    if (step == PictureChainStep::Patched) {
       std::vector<std::byte> message = good;
       while (!input.is_empty()) {
         const size_t offset = input.take<uint16_t>() % message.size();
@@ -197,7 +196,7 @@ class Game {
       }
       return message;
     }
-    if (step == PictureStep::Spliced) {
+    if (step == PictureChainStep::Spliced) {
       const size_t offset = input.take<uint16_t>() % (good.size() + 1);
       std::vector<std::byte> message(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(offset));
       const auto rest = input.take_rest();
@@ -222,17 +221,17 @@ class Game {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+extern "C" int FUZZ_ENTRY(picture_chain)(const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   Game game;
   for (int i = 0; i < kMostSteps && !input.is_empty(); ++i) {
-    const auto step = static_cast<PictureStep>(input.take<uint8_t>() % kPictureStepKinds);
+    const auto step = static_cast<PictureChainStep>(input.take<uint8_t>() % kPictureStepKinds);
     const auto flags = input.take<uint8_t>();
-    if (step == PictureStep::Honest)
+    if (step == PictureChainStep::Honest)
       game.honest();
-    else if (step == PictureStep::Lost)
+    else if (step == PictureChainStep::Lost)
       game.lose_one();
-    else if (step == PictureStep::Other)
+    else if (step == PictureChainStep::Other)
       game.choose(flags);
     else
       game.hostile(step, flags, input.take_piece());
@@ -240,3 +239,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   game.honest();
   return 0;
 }
+
+}  // namespace strandcast::picture_chain_fuzz

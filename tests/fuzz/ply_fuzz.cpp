@@ -4,8 +4,9 @@
 #include "tests/fuzz/fuzz_input.h"
 #include "tests/fuzz/groom_checks.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::ply_fuzz {
+
+extern "C" int FUZZ_ENTRY(ply)(const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   const uint32_t strand_vertex_count = input.take<uint8_t>();
   const auto stated = read_ply(input.take_rest(), strand_vertex_count);
@@ -14,3 +15,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   check_loaded_groom(stated->groom);
   return 0;
 }
+
+}  // namespace strandcast::ply_fuzz

@@ -4,9 +4,8 @@
 #include "server/net/proxy.h"
 #include "tests/fuzz/fuzz_input.h"
 
+namespace strandcast::proxy_fuzz {
 namespace {
-
-using namespace strandcast;
 
 void check_address(const IpAddress& address) {
   const auto again = IpAddress::parse(address.to_string());
@@ -36,7 +35,7 @@ void check_header(std::span<const std::byte> bytes) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+extern "C" int FUZZ_ENTRY(proxy)(const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   std::vector<AddressRange> proxies;
   if (const auto range = parse_address_range(input.take_line())) {
@@ -48,3 +47,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   check_header(input.take_rest());
   return 0;
 }
+
+}  // namespace strandcast::proxy_fuzz

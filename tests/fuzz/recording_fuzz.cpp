@@ -5,7 +5,7 @@
 #include "common/record/recording_reader.h"
 #include "tests/fuzz/fuzz_input.h"
 
-namespace strandcast {
+namespace strandcast::recording_fuzz {
 namespace {
 
 /// Items and errors up to the end, which comes: every call goes on.
@@ -22,10 +22,8 @@ size_t count_items(RecordingReader& reader, size_t size) {
 }
 
 }  // namespace
-}  // namespace strandcast
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+extern "C" int FUZZ_ENTRY(recording)(const uint8_t* data, size_t size) {
   const auto bytes = FuzzInput(data, size).take_rest();
   const std::vector<std::byte> file(bytes.begin(), bytes.end());
   const auto reader = RecordingReader::open(memory_byte_source(file));
@@ -41,3 +39,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (check) CHECK(check->decoded_frames <= check->frames);
   return 0;
 }
+
+}  // namespace strandcast::recording_fuzz

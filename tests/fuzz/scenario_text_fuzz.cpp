@@ -5,8 +5,9 @@
 #include "common/scene/scenario_file.h"
 #include "tests/fuzz/fuzz_input.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::scenario_text_fuzz {
+
+extern "C" int FUZZ_ENTRY(scenario_text)(const uint8_t* data, size_t size) {
   const auto scenario = parse_scenario(FuzzInput(data, size).take_rest_as_text(), "fuzz", "/folder");
   if (!scenario) {
     CHECK(!scenario.error().message.empty());
@@ -26,3 +27,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   return 0;
 }
+
+}  // namespace strandcast::scenario_text_fuzz

@@ -4,8 +4,9 @@
 #include "common/strands/strand_codec.h"
 #include "tests/fuzz/fuzz_input.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::scene_asset_fuzz {
+
+extern "C" int FUZZ_ENTRY(scene_asset)(const uint8_t* data, size_t size) {
   const auto asset = decode_scene_asset(FuzzInput(data, size).take_rest());
   if (!asset) return 0;
   CHECK(asset->rest_position_m.size() == static_cast<size_t>(asset->strand_count) * asset->vertex_count);
@@ -24,3 +25,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   (*decoder)->set_rest_shape(asset->rest_position_m);
   return 0;
 }
+
+}  // namespace strandcast::scene_asset_fuzz

@@ -3,8 +3,9 @@
 #include "common/scene/scene_file.h"
 #include "tests/fuzz/fuzz_input.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::scene_override_fuzz {
+
+extern "C" int FUZZ_ENTRY(scene_override)(const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   constexpr size_t kMostOverrides = 8;
   std::vector<std::string> overrides;
@@ -17,3 +18,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   CHECK(unchanged.ok() && *unchanged == *scene);
   return 0;
 }
+
+}  // namespace strandcast::scene_override_fuzz

@@ -109,10 +109,10 @@ void add_chains(const SeedFolder& seeds) {
   }
 }
 
-Bytes picture_step(PictureStep step, uint8_t flags) {
+Bytes picture_step(PictureChainStep step, uint8_t flags) {
   return packed(static_cast<uint8_t>(step), flags);
 }
-Bytes picture_step(PictureStep step, uint8_t flags, const Bytes& piece) {
+Bytes picture_step(PictureChainStep step, uint8_t flags, const Bytes& piece) {
   return joined({picture_step(step, flags), packed(static_cast<uint16_t>(piece.size())), piece});
 }
 
@@ -144,29 +144,29 @@ PicturePair make_pictures(PictureCodec codec) {
 /// For each codec: honest pictures with lost and damaged ones between them, and real payloads in other
 /// places.
 void add_pictures(const SeedFolder& seeds) {
-  const Bytes honest = picture_step(PictureStep::Honest, 0);
-  const Bytes lost = picture_step(PictureStep::Lost, 0);
+  const Bytes honest = picture_step(PictureChainStep::Honest, 0);
+  const Bytes lost = picture_step(PictureChainStep::Lost, 0);
   for (const PictureCodec codec : kPictureCodecs) {
     if ((encodable_picture_codecs() & codec_bit(codec)) == 0) continue;
     const auto index = static_cast<uint8_t>(codec);
     const std::string name = to_string(codec);
     const PicturePair pair = make_pictures(codec);
     const auto payload = [&](uint8_t flags, const Bytes& bytes) {
-      return picture_step(PictureStep::Payload, static_cast<uint8_t>(flags | index << kOpcodeShift), bytes);
+      return picture_step(PictureChainStep::Payload, static_cast<uint8_t>(flags | index << kOpcodeShift), bytes);
     };
     const Bytes cut(pair.whole.begin(), pair.whole.begin() + static_cast<ptrdiff_t>(pair.whole.size() / 2));
     Bytes wrong = pair.whole;
     for (size_t i = 12; i < wrong.size(); i += 40) wrong[i] ^= std::byte{0x41};
     for (uint8_t size = 0; size < kPictureSizes; ++size) {
       const Bytes chain =
-          picture_step(PictureStep::Other, static_cast<uint8_t>(index * kPictureSizes + size));
+          picture_step(PictureChainStep::Other, static_cast<uint8_t>(index * kPictureSizes + size));
       const Bytes patch = packed(uint16_t{kFrameHeaderBytes + 1}, uint8_t{3},
                                  uint16_t{kFrameHeaderBytes + 30}, uint8_t{0x55});
       const Bytes splice = joined({packed(uint16_t{kFrameHeaderBytes + 20}), cut});
       seeds.add(
           "picture_chain", fmt::format("damaged_{}_{}", name, size),
-          joined({chain, honest, honest, picture_step(PictureStep::Patched, kThenDelta, patch), honest, lost,
-                  honest, honest, picture_step(PictureStep::Spliced, kFixPayload | kThenDelta, splice),
+          joined({chain, honest, honest, picture_step(PictureChainStep::Patched, kThenDelta, patch), honest, lost,
+                  honest, honest, picture_step(PictureChainStep::Spliced, kFixPayload | kThenDelta, splice),
                   honest, lost, lost, honest}));
     }
     seeds.add(
@@ -176,14 +176,14 @@ void add_pictures(const SeedFolder& seeds) {
                 payload(kAsWhole, wrong), payload(kAsWhole, pair.whole), honest}));
     // Under the header of another codec.
     seeds.add("picture_chain", "mistaken_" + name,
-              picture_step(PictureStep::Payload,
+              picture_step(PictureChainStep::Payload,
                            static_cast<uint8_t>(kAsWhole | (index + 1) % 3 << kOpcodeShift), pair.whole));
     FrameHeader header;
     header.opcode = Opcode::Vp8Frame;
     header.sequence = 7;
     seeds.add(
         "picture_chain", "message_" + name,
-        joined({picture_step(PictureStep::Whole, kThenDelta, make_encoded_frame(header, pair.whole)->message),
+        joined({picture_step(PictureChainStep::Whole, kThenDelta, make_encoded_frame(header, pair.whole)->message),
                 honest}));
   }
 }

@@ -3,8 +3,9 @@
 #include "common/wire/messages.h"
 #include "tests/fuzz/fuzz_input.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::server_message_fuzz {
+
+extern "C" int FUZZ_ENTRY(server_message)(const uint8_t* data, size_t size) {
   const auto message = decode_server_message(FuzzInput(data, size).take_rest());
   if (!message) return 0;
   const std::vector<std::byte> bytes = encode(*message);
@@ -14,3 +15,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   CHECK(encode(*again) == bytes);
   return 0;
 }
+
+}  // namespace strandcast::server_message_fuzz

@@ -10,9 +10,8 @@
 #include "server/net/send_queue.h"
 #include "tests/fuzz/fuzz_input.h"
 
+namespace strandcast::session_flow_fuzz {
 namespace {
-
-using namespace strandcast;
 
 constexpr std::array<double, 3> kClassCosts = {1e6, 3e5, 1e5};  // bytes/s
 constexpr int kMostSteps = 2'000;
@@ -149,7 +148,7 @@ class SessionGame {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+extern "C" int FUZZ_ENTRY(session_flow)(const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   SessionGame game;
   for (int i = 0; i < kMostSteps && !input.is_empty(); ++i) {
@@ -158,3 +157,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   return 0;
 }
+
+}  // namespace strandcast::session_flow_fuzz

@@ -9,9 +9,8 @@
 #include "common/strands/strand_limits.h"
 #include "tests/fuzz/fuzz_input.h"
 
+namespace strandcast::strand_replay_fuzz {
 namespace {
-
-using namespace strandcast;
 
 enum class Step : uint8_t { Frame, Pong, Picture, Playout, Damaged };
 constexpr int kStepKinds = 5;
@@ -111,7 +110,7 @@ class ReplayGame {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+extern "C" int FUZZ_ENTRY(strand_replay)(const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   ReplayGame game;
   for (int i = 0; i < kMostSteps && !input.is_empty(); ++i) {
@@ -121,3 +120,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   game.check_strands();
   return 0;
 }
+
+}  // namespace strandcast::strand_replay_fuzz

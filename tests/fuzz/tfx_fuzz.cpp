@@ -4,9 +4,12 @@
 #include "tests/fuzz/fuzz_input.h"
 #include "tests/fuzz/groom_checks.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::tfx_fuzz {
+
+extern "C" int FUZZ_ENTRY(tfx)(const uint8_t* data, size_t size) {
   if (const auto groom = read_tfx_binary(ByteView(FuzzInput(data, size).take_rest())))
     check_loaded_groom(*groom);
   return 0;
 }
+
+}  // namespace strandcast::tfx_fuzz

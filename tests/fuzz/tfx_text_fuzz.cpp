@@ -4,8 +4,11 @@
 #include "tests/fuzz/fuzz_input.h"
 #include "tests/fuzz/groom_checks.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::tfx_text_fuzz {
+
+extern "C" int FUZZ_ENTRY(tfx_text)(const uint8_t* data, size_t size) {
   if (const auto groom = read_tfx_text(FuzzInput(data, size).take_rest_as_text())) check_loaded_groom(*groom);
   return 0;
 }
+
+}  // namespace strandcast::tfx_text_fuzz

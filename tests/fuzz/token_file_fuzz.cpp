@@ -6,8 +6,9 @@
 #include "server/net/token_file.h"
 #include "tests/fuzz/fuzz_input.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::token_file_fuzz {
+
+extern "C" int FUZZ_ENTRY(token_file)(const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   constexpr int kRoles = 4;
   Hello hello;
@@ -39,3 +40,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   CHECK(!is_let_in || may_enter);
   return 0;
 }
+
+}  // namespace strandcast::token_file_fuzz

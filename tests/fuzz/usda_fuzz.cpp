@@ -4,11 +4,14 @@
 #include "tests/fuzz/fuzz_input.h"
 #include "tests/fuzz/groom_checks.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::usda_fuzz {
+
+extern "C" int FUZZ_ENTRY(usda)(const uint8_t* data, size_t size) {
   const auto stated = read_usda(FuzzInput(data, size).take_rest_as_text());
   if (!stated) return 0;
   CHECK(!stated->unit_m || *stated->unit_m > 0.0f);
   check_loaded_groom(stated->groom);
   return 0;
 }
+
+}  // namespace strandcast::usda_fuzz

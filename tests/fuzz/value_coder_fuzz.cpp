@@ -4,9 +4,8 @@
 #include "common/strands/value_coder.h"
 #include "tests/fuzz/fuzz_input.h"
 
+namespace strandcast::value_coder_fuzz {
 namespace {
-
-using namespace strandcast;
 
 constexpr uint32_t kTables = 3;
 constexpr uint32_t kMostShift = 20;
@@ -63,8 +62,10 @@ void write_and_read(FuzzInput input) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+extern "C" int FUZZ_ENTRY(value_coder)(const uint8_t* data, size_t size) {
   read_hostile(FuzzInput(data, size));
   write_and_read(FuzzInput(data, size));
   return 0;
 }
+
+}  // namespace strandcast::value_coder_fuzz

@@ -5,8 +5,9 @@
 #include "common/motion/wind_csv.h"
 #include "tests/fuzz/fuzz_input.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::wind_csv_fuzz {
+
+extern "C" int FUZZ_ENTRY(wind_csv)(const uint8_t* data, size_t size) {
   const auto series = parse_wind_csv(FuzzInput(data, size).take_rest_as_text(), "fuzz");
   if (!series) return 0;
   CHECK(!series->time_s.empty() && series->time_s.size() == series->velocity_mps.size());
@@ -18,3 +19,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   CHECK(std::isfinite(between.x) && std::isfinite(between.y) && std::isfinite(between.z));
   return 0;
 }
+
+}  // namespace strandcast::wind_csv_fuzz

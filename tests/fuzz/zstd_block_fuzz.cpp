@@ -7,8 +7,9 @@
 #include "common/strands/zstd_block.h"
 #include "tests/fuzz/fuzz_input.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace strandcast;
+namespace strandcast::zstd_block_fuzz {
+
+extern "C" int FUZZ_ENTRY(zstd_block)(const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   const size_t expected_bytes = input.take<uint16_t>();
   const auto source = input.take_rest();
@@ -39,3 +40,5 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   return 0;
 }
+
+}  // namespace strandcast::zstd_block_fuzz

@@ -11,13 +11,18 @@ trap 'rm -rf "$folder"' EXIT
 mkdir -p "$folder/shaders/sim" "$folder/lanes/sim"
 cp "$source_folder"/shaders/sim/* "$folder/shaders/sim/"
 
+# translate NAME: makes C++ of a file of shaders/sim.
+translate() {
+  cmake -DROOT="$folder/shaders" -DFILE="sim/$1" -DOUTPUT="$folder/lanes/sim/$1" -P "$source_folder/shaders/lanes.cmake"
+}
+for file in "$folder"/shaders/sim/*.glsl; do
+  translate "$(basename "$file")"
+done
+
 # try STATEMENTS: the compiler's message for a kernel with them, on its third line.
 try() {
   printf '#include "sim/follow.glsl"\nvoid main() {\n  %s\n}\n' "$1" >"$folder/shaders/sim/bad.comp"
-  for file in "$folder"/shaders/sim/*.glsl "$folder/shaders/sim/bad.comp"; do
-    cmake -DROOT="$folder/shaders" -DFILE="sim/$(basename "$file")" -DOUTPUT="$folder/lanes/sim/$(basename "$file")" \
-      -P "$source_folder/shaders/lanes.cmake"
-  done
+  translate bad.comp
   printf '%s\n' '#define STRANDCAST_LANE_COUNT 4' '#define HAS_PINNED_TAIL 0' '#define KERNEL_FILE "sim/bad.comp"' \
     '#define KERNEL_NAME bad' '#define KERNEL_VARIANT ""' '#define KERNEL_SET 0' '#define KERNEL_PARTS 1' \
     '#include "common/kernels/lane_kernel_private.h"' >"$folder/bad.cpp"

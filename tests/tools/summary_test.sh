@@ -26,7 +26,7 @@ results() {
   local file="$1" name
   shift
   {
-    echo '<testsuites tests="1" name="AllTests">'
+    echo '<testsuites tests="1" name="AllTests" processor_s="0.5">'
     for name in "$@"; do
       echo "    <testcase name=\"${name%:*}\" status=\"run\" result=\"$([[ "${name#*:}" =~ ^(skip|data)$ ]] && echo skipped ||
         echo completed)\" time=\"0.25\" classname=\"Laws\">"
@@ -66,7 +66,12 @@ results a.Kinds_Laws.xml One/0:ok One/1:ok
 results net.Laws.Holds.xml Holds:ok
 ctest_log first.junit a.Laws:run a.Kinds/Laws:run net.Laws.Holds:run hardening:run
 expect 0 '6 passed, 0 failed, 1 skipped' '  a.Laws.Three: a.cpp:9: no display' '      0.25 s  a.Laws.One' \
-  '       2.5 s  property         2 tests' '       2.5 s  network          1 tests'
+  '       2.5 s      0.5 s      2.0 s  property         2 tests' '       2.5 s      0.5 s      2.0 s  network          1 tests'
+if grep -q 'Processor seconds' "$folder/out"; then die 'nobody measured the run'; fi
+
+# What build and tests cost is said where it was measured.
+printf '%s\n' 'build 812.5' 'tests 300' >"$folder/test_results/processor_s.txt"
+expect 0 'Processor seconds (user + system): build 812.5, tests 300.0'
 
 # What is skipped because the shared data is not there is counted by itself as well.
 if grep -q 'shared/data' "$folder/out"; then die 'nothing was skipped for want of data'; fi
