@@ -148,6 +148,43 @@ bool is_stage_file(std::string_view path) {
                      [&](std::string_view extension) { return path.ends_with(extension); });
 }
 
+bool is_word_character(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+}
+
+bool is_word(std::string_view token) {
+  return !token.empty() && is_word_character(token.front());
+}
+
+/// Words and single other characters of GLSL, without blanks and `//` comments; empty at the end. A regular
+/// expression takes longer for a shader than all else that is done to its text.
+class TokenScan {
+ public:
+  explicit TokenScan(std::string_view text) : rest_(text) {}
+
+  std::string_view next() {
+    while (!rest_.empty()) {
+      if (rest_.starts_with("//")) {
+        rest_.remove_prefix(std::min(rest_.find('\n'), rest_.size()));
+      } else if (rest_.front() == ' ' || rest_.front() == '\n' || rest_.front() == '\t' ||
+                 rest_.front() == '\r') {
+        rest_.remove_prefix(1);
+      } else {
+        break;
+      }
+    }
+    size_t length = rest_.empty() ? 0 : 1;
+    if (is_word(rest_))
+      while (length < rest_.size() && is_word_character(rest_[length])) ++length;
+    const std::string_view token = rest_.substr(0, length);
+    rest_.remove_prefix(length);
+    return token;
+  }
+
+ private:
+  std::string_view rest_;
+};
+
 }  // namespace
 
 Result<std::string> ShaderLibrary::load(const std::string& path) const {
@@ -196,12 +233,20 @@ std::vector<std::string> ShaderLibrary::stage_files() const {
 std::map<std::string, std::string> declared_uniforms(const FlatSource& source) {
   // Blocks have a brace where this wants a name. What is declared in an unused #if counts: another variant
   // has it.
-  static const std::regex kComment(R"(//[^\n]*)");
-  static const std::regex kDeclaration(R"(\buniform\s+(?:(?:lowp|mediump|highp)\s+)?(\w+)\s+(\w+)\s*[;=\[])");
-  const std::string text = std::regex_replace(source.text, kComment, "");
   std::map<std::string, std::string> uniforms;
-  for (std::sregex_iterator it(text.begin(), text.end(), kDeclaration), end; it != end; ++it)
-    uniforms[(*it)[2].str()] = (*it)[1].str();
+  TokenScan scan(source.text);
+  for (std::string_view token = scan.next(); !token.empty();) {
+    if (token != "uniform") {
+      token = scan.next();
+      continue;
+    }
+    std::string_view type = scan.next();
+    if (type == "lowp" || type == "mediump" || type == "highp") type = scan.next();
+    const std::string_view name = scan.next();
+    token = scan.next();
+    const bool is_declaration = token == ";" || token == "=" || token == "[";
+    if (is_declaration && is_word(type) && is_word(name)) uniforms[std::string(name)] = type;
+  }
   return uniforms;
 }
 

@@ -2,6 +2,8 @@
 // thread.
 #pragma once
 
+#include <glm/glm.hpp>
+
 #include <string>
 #include <utility>
 #include <vector>
