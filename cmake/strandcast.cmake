@@ -95,12 +95,13 @@ function(strandcast_program name)
   target_precompile_headers(${name} REUSE_FROM ${ARG_PCH})
 endfunction()
 
-# strandcast_test(NAME LABEL unit SOURCES ... LIBS ... [ALONE] [OFFLINE] [SERIAL suite ...] [TIMEOUT s]): a GoogleTest program. Every
+# strandcast_test(NAME LABEL unit SOURCES ... LIBS ... [ALONE] [OFFLINE] [SERIAL suite ...] [TIMEOUT s]
+# [ENVIRONMENT VARIABLE=value ...]): a GoogleTest program. Every
 # suite in it is one CTest test, NAME.Suite; with ALONE every TEST is, NAME.Suite.Test, in a process of its own. Tests of
 # the label `integration` run alone and get the label `network` too, which allows a second try (tests/run.sh), unless
 # they are OFFLINE. SERIAL: suites that never run beside another test (they load both cores). TIMEOUT: of one CTest test.
 function(strandcast_test name)
-  cmake_parse_arguments(ARG "ALONE;OFFLINE" "LABEL;TIMEOUT" "SOURCES;LIBS;SERIAL" ${ARGN})
+  cmake_parse_arguments(ARG "ALONE;OFFLINE" "LABEL;TIMEOUT" "SOURCES;LIBS;SERIAL;ENVIRONMENT" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE strandcast_flags ${ARG_LIBS} strandcast_test_main GTest::gmock)
   target_compile_definitions(${name} PRIVATE
@@ -120,19 +121,19 @@ function(strandcast_test name)
   if(ARG_TIMEOUT)
     set(timeout_s ${ARG_TIMEOUT})
   endif()
-  set(environment "")
+  set(environment ${ARG_ENVIRONMENT})
   if(STRANDCAST_SANITIZE)
     math(EXPR timeout_s "${timeout_s} * 5")
   endif()
   if(STRANDCAST_SANITIZE MATCHES "thread")
-    set(environment TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/support/tsan.supp)
+    list(APPEND environment TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/support/tsan.supp)
   endif()
   set(list_file ${CMAKE_CURRENT_BINARY_DIR}/${name}_tests.cmake)
   add_custom_command(TARGET ${name} POST_BUILD BYPRODUCTS ${list_file}
     COMMAND ${CMAKE_COMMAND} -DNAME=${name} -DPROGRAM=$<TARGET_FILE:${name}> -DOUTPUT=${list_file} -DMODE=${mode}
       -DRESULTS=${CMAKE_BINARY_DIR}/test_results -DLISTS=${CMAKE_BINARY_DIR}/test_lists
       "-DLABELS=${labels}" -DTIMEOUT_S=${timeout_s} "-DSERIAL=${ARG_SERIAL}"
-      -DENVIRONMENT=${environment} -P ${CMAKE_SOURCE_DIR}/cmake/list_tests.cmake
+      "-DENVIRONMENT=${environment}" -P ${CMAKE_SOURCE_DIR}/cmake/list_tests.cmake
     VERBATIM)
   # What is not built must not look as if it had passed.
   file(WRITE ${list_file}.include "if(EXISTS \"${list_file}\")\n  include(\"${list_file}\")\nelse()\n"

@@ -85,7 +85,7 @@ TEST_F(GroomAtRest, EveryModelKeepsItsStyleForTwentySeconds) {
   ASSERT_TRUE(content) << content.error().to_string();
   const Groom groom = test::some_strands(content->groom, kStrands);
   int models = 0;
-  for (const SolverKind& kind : all_kinds()) {
+  for (const SolverKind& kind : kinds_of_long_tests()) {
     const auto& known = kind.row->parameters;
     const bool has_style =
         std::ranges::any_of(known, [](const auto& info) { return info.name == "sag_free"; });

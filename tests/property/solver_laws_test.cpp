@@ -16,7 +16,7 @@ class SolverLaws : public SolverTest {
 };
 
 TEST_F(SolverLaws, RestStaysAtRestWithoutForces) {
-  const Groom groom = make_test_groom({});
+  const Groom groom = make_law_groom();
   const glm::dquat tilted = glm::angleAxis(0.7, glm::normalize(glm::dvec3(1.0, 2.0, -1.0)));
   for (const SolverKind& kind : all_kinds()) {
     for (const double stiffness : {0.0, 400.0}) {
@@ -57,7 +57,7 @@ StepInput standing_input() {
 // At rest in the groomed shape nothing pulls and the weight is carried: the prediction is where the vertex
 // is. What is left is rounding, as without gravity.
 TEST_F(SolverLaws, TheGroomIsTheShapeAtRestUnderGravity) {
-  const Groom groom = make_test_groom({});
+  const Groom groom = make_law_groom();
   for (const SolverKind& kind : sag_free_kinds()) {
     SCOPED_TRACE(kind.name());
     auto solver = make(kind, groom);
@@ -71,7 +71,7 @@ TEST_F(SolverLaws, TheGroomIsTheShapeAtRestUnderGravity) {
 }
 
 TEST_F(SolverLaws, ATurnedHeadWithItsOwnGravityIsAnUprightHead) {
-  const Groom groom = make_test_groom({});
+  const Groom groom = make_law_groom();
   const glm::dquat tilted = glm::angleAxis(2.0, glm::normalize(glm::dvec3(1.0, 2.0, -1.0)));
   StepInput input = standing_input();
   input.world_from_head_rotation = tilted;
@@ -88,7 +88,7 @@ TEST_F(SolverLaws, ATurnedHeadWithItsOwnGravityIsAnUprightHead) {
 // A head on its side: what carried the weight now pushes up along the head's axis, and hair falls to the
 // side.
 TEST_F(SolverLaws, HairFallsToTheSideOfATiltedHead) {
-  const Groom groom = make_test_groom({});
+  const Groom groom = make_law_groom();
   const glm::dquat on_its_side = glm::angleAxis(1.57, glm::dvec3(0.0, 0.0, 1.0));
   StepInput input = standing_input();
   input.world_from_head_rotation = on_its_side;
@@ -107,7 +107,7 @@ TEST_F(SolverLaws, HairFallsToTheSideOfATiltedHead) {
 }
 
 TEST_F(SolverLaws, NothingCarriesALimpStrand) {
-  const Groom groom = make_test_groom({});
+  const Groom groom = make_law_groom();
   for (const SolverKind& kind : sag_free_kinds()) {
     SCOPED_TRACE(kind.name());
     auto solver = make(kind, groom, {{"style_stiffness_per_s2", 0.0}, {"sag_free", 1.0}});
@@ -128,7 +128,7 @@ TEST_F(SolverLaws, LengthsAreExactAfterEveryStep) {
     const double allowed_m = pinning == Pinning::BothEnds ? kReachRoundingM : 0.0;
     TestGroomDesc desc;
     desc.pinning = pinning;
-    const Groom groom = make_test_groom(desc);
+    const Groom groom = make_law_groom(desc);
     for (const SolverKind& kind : all_kinds()) {
       // Iterated odd and even placement of a strand held at both ends leaves a rest, which the next test
       // bounds.
@@ -166,7 +166,7 @@ TEST_F(SolverLaws, WhatASceneLacksIsNotInItsKernel) {
 }
 
 TEST_F(SolverLaws, StretchStaysWithinTheRowsBound) {
-  const Groom groom = make_test_groom({});
+  const Groom groom = make_law_groom();
   for (const SolverKind& kind : all_kinds()) {
     if (kind.row->stretch_bound == 0.0) continue;  // exact: the law above
     SCOPED_TRACE(kind.name());
@@ -184,7 +184,7 @@ TEST_F(SolverLaws, StretchStaysWithinTheRowsBound) {
 }
 
 TEST_F(SolverLaws, TurnedInputsGiveTheTurnedMotion) {
-  const Groom groom = make_test_groom({});
+  const Groom groom = make_law_groom();
   const glm::dquat turn = glm::angleAxis(2.1, glm::normalize(glm::dvec3(0.3, -1.0, 0.5)));
   for (const SolverKind& kind : all_kinds()) {
     SCOPED_TRACE(kind.name());
@@ -203,7 +203,7 @@ TEST_F(SolverLaws, TurnedInputsGiveTheTurnedMotion) {
 }
 
 TEST_F(SolverLaws, AHeadInUniformMotionIsAHeadAtRest) {
-  const Groom groom = make_test_groom({});
+  const Groom groom = make_law_groom();
   const glm::dvec3 cruise_mps(13.0, -4.0, 22.0);
   for (const SolverKind& kind : all_kinds()) {
     SCOPED_TRACE(kind.name());
@@ -287,7 +287,7 @@ TEST_F(SolverLaws, WriteThenReadGivesTheStateBack) {
 }
 
 TEST_F(SolverLaws, StrandsStayOutsideACollider) {
-  const Groom groom = make_test_groom({});
+  const Groom groom = make_law_groom();
   const uint32_t strand_count = groom.strand_count();
   for (const SolverKind& kind : all_kinds()) {
     SCOPED_TRACE(kind.name());
@@ -363,7 +363,7 @@ TEST_F(SolverLaws, VariantsWithoutAFeatureMatchTheFeatureAtZero) {
 }
 
 TEST_F(SolverLaws, TheSettledShapeDoesNotDependOnTheSubstep) {
-  const Groom groom = make_test_groom({});
+  const Groom groom = make_law_groom();
   for (const SolverKind& kind : all_kinds()) {
     if (kind.host.is_kernel() || !kind.row->comes_to_rest) continue;  // parity covers the kernels
     SCOPED_TRACE(kind.name());
@@ -383,7 +383,7 @@ TEST_F(SolverLaws, TheSettledShapeDoesNotDependOnTheSubstep) {
 }
 
 TEST_F(SolverLaws, SettledStrandsDoNotJitter) {
-  const Groom groom = make_test_groom({});
+  const Groom groom = make_law_groom();
   for (const SolverKind& kind : all_kinds()) {
     if (!kind.row->comes_to_rest) continue;
     SCOPED_TRACE(kind.name());

@@ -12,8 +12,8 @@ lanes="$folder/build/common/kernels/lanes"
 count=0
 for source in "$lanes"/lane_kernel_*_sse4.cpp; do
   sed 's/^#define KERNEL_SET .*/#define KERNEL_SET 0/' "$source" >"$folder/kernel.cpp"
-  aarch64-linux-gnu-g++ -std=c++20 -O1 -Wall -Wextra -Werror -Wno-psabi -ffp-contract=off -I"$lanes" -Ishaders -I. -c \
-    "$folder/kernel.cpp" -o "$folder/kernel.o"
+  aarch64-linux-gnu-g++ -std=c++20 -O1 -Wall -Wextra -Werror -Wno-psabi -ffp-contract=off -DSTRANDCAST_LANE_COUNT=4 -I"$lanes" \
+    -Ishaders -I. -c "$folder/kernel.cpp" -o "$folder/kernel.o"
   count=$((count + 1))
 done
 [ "$count" -gt 0 ] || { echo "no kernel was found"; exit 1; }
