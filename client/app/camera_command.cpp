@@ -23,10 +23,10 @@ struct NamedView {
   double pitch_deg;
 };
 constexpr std::array<NamedView, 5> kViews{{{"front", 0.0, 0.0},
-                                      {"left", 90.0, 0.0},
-                                      {"right", -90.0, 0.0},
-                                      {"back", 180.0, 0.0},
-                                      {"top", 0.0, kTopDeg}}};
+                                           {"left", 90.0, 0.0},
+                                           {"right", -90.0, 0.0},
+                                           {"back", 180.0, 0.0},
+                                           {"top", 0.0, kTopDeg}}};
 
 float to_rad(double degrees) {
   return static_cast<float>(degrees * kRadPerDeg);

@@ -1,6 +1,7 @@
 #pragma once
-// How many of one unit make another, for code that converts between units. The names read as the quotient that they are:
-// metres times kMmPerM are millimetres. Times kept as whole nanoseconds or microseconds take the integers below.
+// How many of one unit make another, for code that converts between units. The names read as the quotient
+// that they are: metres times kMmPerM are millimetres. Times kept as whole nanoseconds or microseconds take
+// the integers below.
 #include <cstdint>
 
 namespace strandcast {

@@ -1,5 +1,5 @@
-// What every kernel over lanes includes, precompiled once for each instruction set (strandcast_lane_objects). Nothing here
-// may come from the standard library's inline functions (lane_kernel.h).
+// What every kernel over lanes includes, precompiled once for each instruction set (strandcast_lane_objects).
+// Nothing here may come from the standard library's inline functions (lane_kernel.h).
 #pragma once
 
 #include <cstddef>

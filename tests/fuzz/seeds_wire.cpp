@@ -152,7 +152,8 @@ void add_pictures(const SeedFolder& seeds) {
     const std::string name = to_string(codec);
     const PicturePair pair = make_pictures(codec);
     const auto payload = [&](uint8_t flags, const Bytes& bytes) {
-      return picture_step(PictureChainStep::Payload, static_cast<uint8_t>(flags | index << kOpcodeShift), bytes);
+      return picture_step(PictureChainStep::Payload, static_cast<uint8_t>(flags | index << kOpcodeShift),
+                          bytes);
     };
     const Bytes cut(pair.whole.begin(), pair.whole.begin() + static_cast<ptrdiff_t>(pair.whole.size() / 2));
     Bytes wrong = pair.whole;
@@ -163,11 +164,11 @@ void add_pictures(const SeedFolder& seeds) {
       const Bytes patch = packed(uint16_t{kFrameHeaderBytes + 1}, uint8_t{3},
                                  uint16_t{kFrameHeaderBytes + 30}, uint8_t{0x55});
       const Bytes splice = joined({packed(uint16_t{kFrameHeaderBytes + 20}), cut});
-      seeds.add(
-          "picture_chain", fmt::format("damaged_{}_{}", name, size),
-          joined({chain, honest, honest, picture_step(PictureChainStep::Patched, kThenDelta, patch), honest, lost,
-                  honest, honest, picture_step(PictureChainStep::Spliced, kFixPayload | kThenDelta, splice),
-                  honest, lost, lost, honest}));
+      seeds.add("picture_chain", fmt::format("damaged_{}_{}", name, size),
+                joined({chain, honest, honest, picture_step(PictureChainStep::Patched, kThenDelta, patch),
+                        honest, lost, honest, honest,
+                        picture_step(PictureChainStep::Spliced, kFixPayload | kThenDelta, splice), honest,
+                        lost, lost, honest}));
     }
     seeds.add(
         "picture_chain", "payloads_" + name,
@@ -181,10 +182,10 @@ void add_pictures(const SeedFolder& seeds) {
     FrameHeader header;
     header.opcode = Opcode::Vp8Frame;
     header.sequence = 7;
-    seeds.add(
-        "picture_chain", "message_" + name,
-        joined({picture_step(PictureChainStep::Whole, kThenDelta, make_encoded_frame(header, pair.whole)->message),
-                honest}));
+    seeds.add("picture_chain", "message_" + name,
+              joined({picture_step(PictureChainStep::Whole, kThenDelta,
+                                   make_encoded_frame(header, pair.whole)->message),
+                      honest}));
   }
 }
 

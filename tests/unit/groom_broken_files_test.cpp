@@ -16,10 +16,10 @@
 namespace strandcast::groom_broken_files_test {
 namespace {
 
-using ::testing::AllOf;
 using test::ByteFile;
-using ::testing::HasSubstr;
 using test::shared_data;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 constexpr size_t kSmallAllocations = 64 << 10;  // messages, streams, paths
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();

@@ -11,8 +11,8 @@
 namespace strandcast::groom_hair_test {
 namespace {
 
-using ::testing::AllOf;
 using test::ByteFile;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 constexpr uint32_t kSegments = 1, kPoints = 2, kThickness = 4, kTransparency = 8, kColour = 16;

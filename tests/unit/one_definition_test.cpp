@@ -18,7 +18,8 @@ using testing::UnorderedElementsAre;
 /// Types and constants that a header defines in namespaces with a name, each behind its namespace.
 std::set<std::string> names_of(const std::string& text) {
   static const std::regex kNamespace("^(?:inline )?namespace ([A-Za-z0-9_:]*) ?\\{.*");
-  static const std::regex kType("^(?:enum class|enum|struct|class) (?:\\[\\[[a-z]+\\]\\] )?(\\w+)\\b(?!::)[^;]*\\{.*");
+  static const std::regex kType(
+      "^(?:enum class|enum|struct|class) (?:\\[\\[[a-z]+\\]\\] )?(\\w+)\\b(?!::)[^;]*\\{.*");
   static const std::regex kConstant("\\b(k[A-Z]\\w*)(?: = |\\{|\\[)");
   std::set<std::string> names;
   std::vector<std::string> spaces;
