@@ -20,7 +20,7 @@ Result<std::unique_ptr<SceneRun>> SceneRun::make(const SceneDesc& scene, const S
   context.executor = &executor;
   context.features = run->features_;
   context.groom_gravity_in_head_mps2 = scene.gravity_mps2;
-  context.volume = wet_volume(scene.volume, scene.look.shading.wetness);
+  context.volume = moving_volume(scene, parameters);
   context.head_field = content.head_field;
   context.bend_limit = scene.bend_limit;
   ASSIGN_OR_RETURN(run->solver_, row->make(parameters, context));

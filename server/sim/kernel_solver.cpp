@@ -21,7 +21,12 @@ KernelSolver::KernelSolver(const SolverContext& context, const StrandParameters&
       volume_target_(context.volume.target_per_s2 > 0.0 ? context.volume_target : nullptr),
       drag_along_share_(context.drag_along_share),
       bend_limits_(context.bend_limit),
-      head_field_(context.head_field) {}
+      head_field_(context.head_field) {
+  // Air drags a hair once, and where nothing blows there is nothing to keep off.
+  if (!features_.has_volume) volume_.air.acts = false;
+  if (volume_.air.acts) parameters_.air_drag_per_s = 0.0;
+  volume_.air.has_wind = features_.has_wind;
+}
 
 Status KernelSolver::prepare_all() {
   prepare();

@@ -36,10 +36,22 @@ SolverParameters wet_parameters(const SolverRow& row, SolverParameters complete,
 VolumeDesc wet_volume(VolumeDesc volume, double wetness) {
   if (!(wetness > 0.0) || !volume.acts()) return volume;
   const double share = std::min(wetness, 1.0);
+  volume.air.hair_density_kgpm3 *= 1.0 + share * (kWetMass - 1.0);
+  if (!volume.has_contact()) return volume;
   volume.friction_per_s += share * kWetFrictionPerS;
   volume.rest_density_scale *= 1.0 + share * (kWetDensity - 1.0);
   // A style of dry hair is not one of wet hair.
   volume.target_per_s2 *= 1.0 - share;
+  return volume;
+}
+
+VolumeDesc moving_volume(const SceneDesc& scene, const SolverParameters& moving) {
+  VolumeDesc volume = wet_volume(scene.volume, static_cast<double>(scene.look.shading.wetness));
+  const auto take = [&](const char* name, double& value) {
+    if (const auto found = moving.find(name); found != moving.end()) value = found->second;
+  };
+  take("radius_m", volume.air.hair_radius_m);
+  take("density_kgpm3", volume.air.hair_density_kgpm3);
   return volume;
 }
 

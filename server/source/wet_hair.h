@@ -25,5 +25,8 @@ bool moves_otherwise(const SceneDesc& a, const SceneDesc& b);
 SolverParameters wet_parameters(const SolverRow& row, SolverParameters complete, double wetness);
 /// Likewise of a volume that acts; one that does not stays so.
 VolumeDesc wet_volume(VolumeDesc volume, double wetness);
+/// What strands of these moving_parameters() do to each other: their air goes by the hair of a model that
+/// knows its radius and density.
+VolumeDesc moving_volume(const SceneDesc& scene, const SolverParameters& moving);
 
 }  // namespace strandcast

@@ -2,10 +2,13 @@
 // of the hair around it, and where hair is denser than it may be, it is pushed down the slope of the density
 // (Petrovic, Henne, Anderson 2005; document 003, equations 2.2 to 2.4 and section 4.2.4, with the push's own
 // stiffness taken implicitly, as drag against the mean velocity). With extras hair is also pushed towards a
-// target's density (document 003, section 6.2), and feels less of the wind behind other hair. One invocation
-// per strand.
+// target's density (document 003, section 6.2), and feels less of the wind behind other hair. With air each
+// hair is dragged, as a thin cylinder, by the air at its place. Hair around it carries that air along, the
+// more the denser it is (common/kernels/volume/hair_in_air.h); models have no drag of their own then. One
+// invocation per strand.
 #pragma variant HAS_WAY 0 1
 #pragma variant HAS_EXTRAS 0 1
+#pragma variant HAS_AIR 0 1
 #include "sim/gust.glsl"
 #include "sim/volume.glsl"
 
@@ -26,6 +29,54 @@ uniform float u_target;        // m^2/s^2, of the push to the target's density
 uniform float u_mean_density;  // of the groom, m/m^3
 uniform float u_shadow;        // share of its shadow that hair casts on the wind
 
+#if HAS_AIR
+uniform float u_reynolds;  // per m/s
+uniform float u_air_rate;  // 1/s per drag number
+uniform float u_lock;      // m^2: real hairs of a strand x width of a lock x radius of a hair
+
+// Of the drag across a hair, what there is along it (slender bodies at low Reynolds numbers).
+const float kAlongShare = 0.5;
+// Air that stands still against hair is carried along, as far as there is hair.
+const float kLeastReynolds = 1e-6;
+
+// Drag coefficient times Reynolds number of a hair across the flow.
+float drag_number(float reynolds) {
+  const float root = sqrt(reynolds);
+  return 7.0 * sqrt(sqrt(root)) + 1.96 * root + 1.18 * reynolds;
+}
+
+// How long a pull as at the beginning of a substep would have to last for what it does fading at this rate.
+float time_at_rate(float h, float rate) {
+  const float faded = h * rate;
+  return select(faded > 1e-3, (1.0 - exp(-faded)) / max(rate, 1e-6), h * (1.0 - 0.5 * faded));
+}
+
+struct AirHere {
+  vec3 outside;   // velocity of the air that comes in, relative to the head joint, m/s
+  vec3 hair;      // mean velocity of the hair here, likewise
+  float density;  // of strands, m/m^3
+  vec3 along;     // the hair's own direction, of any length
+};
+
+// Velocity that a vertex takes on in a substep from air and the hair around it, which brakes it by
+// `friction`, 1/s. Exact, were both as they are for the whole substep: so it goes by seconds, and not by
+// steps.
+vec3 taken_on(AirHere air, vec3 moving, float h, float friction) {
+  const vec3 against = air.outside - air.hair;
+  const float lock_reynolds = max(u_reynolds * sqrt(dot(against, against)), kLeastReynolds);
+  const float pulled = u_lock * air.density * drag_number(lock_reynolds);
+  const float carried = pulled / (pulled + lock_reynolds);
+  const vec3 flow = air.outside - carried * against - moving;
+  const float rate = u_air_rate * drag_number(u_reynolds * sqrt(dot(flow, flow)));
+  const vec3 rubbing = friction * (air.hair - moving);
+  const vec3 across = time_at_rate(h, friction + rate) * (rubbing + rate * flow);
+  const float along_rate = kAlongShare * rate;
+  const vec3 all_along = time_at_rate(h, friction + along_rate) * (rubbing + along_rate * flow);
+  const float length_squared = max(dot(air.along, air.along), kTinySquared);
+  return across + air.along * (dot(all_along - across, air.along) / length_squared);
+}
+#endif
+
 // No push moves a vertex by more cells than this in a substep, against the volume.
 const float kMostCells = 0.25;
 
@@ -37,6 +88,9 @@ void main() {
   const VolumeGrid grid = volume_grid();
   const float fastest = kMostCells / (grid.per_cell * h);
   vec4 thresholds = vec4(0.0);
+#if HAS_AIR
+  vec3 before = texelFetch(u_position, int((u_step.shape.z - 1u) * stride + strand)).xyz;
+#endif
   for (uint i = u_step.shape.z; i < u_step.shape.w; ++i) {
     const uint part = i % 4u;
     if (part == 0u || i == u_step.shape.z)
@@ -64,15 +118,37 @@ void main() {
     push -= (u_target / u_mean_density) * turned_with_head(extra.excess_slope);
     const vec3 groom_slope = here.slope / u_mean_density;
     stiffness += u_target * dot(groom_slope, groom_slope);
-    // What the model's own drag will take of a wind that is not there: the air moves with the hair.
+    const float let_in = 1.0 - u_shadow * (1.0 - extra.wind);
+#endif
+#if HAS_AIR || HAS_EXTRAS
     const vec3 wind = u_step.wind.xyz + gust_velocity(position);
-    push -= (u_shadow * (1.0 - extra.wind) * u_step.contact.y) * (wind - here.velocity);
+#endif
+#if HAS_EXTRAS && !HAS_AIR
+    // What the model's own drag will take of a wind that is not there: the air moves with the hair.
+    push -= ((1.0 - let_in) * u_step.contact.y) * (wind - here.velocity);
 #endif
     const float drag = u_friction + u_give * h * stiffness;
-    const vec3 gained = (h / (1.0 + h * drag)) * (push + drag * (here.velocity - moving));
+    const float share = h / (1.0 + h * drag);
+#if HAS_AIR
+    // Only the push is held back: a pull towards a velocity leads no farther than there.
+    const vec3 pushed = share * push;
+    const float squared = dot(pushed, pushed);
+    const vec3 held = select(squared > fastest * fastest, pushed * (fastest * inversesqrt(squared)), pushed);
+#if HAS_EXTRAS
+    const vec3 outside = let_in * wind;
+#else
+    const vec3 outside = wind;
+#endif
+    const vec3 after = i + 1u < u_step.shape.y ? texelFetch(u_position, int(at + stride)).xyz : position;
+    const AirHere air = AirHere(outside, here.velocity, here.density, after - before);
+    const vec3 limited = held + taken_on(air, moving, h, drag);
+    before = position;
+#else
+    const vec3 gained = share * (push + drag * (here.velocity - moving));
     const float squared = dot(gained, gained);
     const vec3 limited =
         select(squared > fastest * fastest, gained * (fastest * inversesqrt(squared)), gained);
+#endif
     const lane_bool is_lost = is_broken(stored.xyz) || is_broken(position) || is_broken(limited);
     b_velocity.velocity[at] = vec4(select(is_lost, stored.xyz, stored.xyz + limited), stored.w);
   }

@@ -101,7 +101,17 @@ std::shared_ptr<const StepModel> model_of(const StreamCase& stream) {
     model->volume.wind_width_m = 0x1p-9;
     model->volume.smoothing = 2;
   }
-  if (stream.name != "rod" && stream.name != "volume_extras") {
+  if (stream.name == "volume_air") {
+    model->parameters.air_drag_per_s = 0.0;
+    model->volume.friction_per_s = 16.0;
+    model->volume.resolution = 8;
+    model->volume.air.acts = true;
+    model->volume.air.hairs = 65'536.0;
+    model->volume.air.lock_width_m = 0x1p-6;
+    model->volume.air.hair_radius_m = 0x1p-14;
+    model->volume.air.hair_density_kgpm3 = 1280.0;
+  }
+  if (stream.name != "rod" && stream.name != "volume_extras" && stream.name != "volume_air") {
     model->kernel.shader_path = "sim/dftl.comp";
     model->parameters.s_damping = 0.875;
     model->parameters.style_stiffness_per_s2 = 64.0;
@@ -202,7 +212,7 @@ std::vector<StreamCase> stream_cases() {
   cases.push_back({"no_rest", "tangent", 7, 5, 7, false});
   cases.push_back({"slices", "tangent", kSlicedStrands, kSlicedVertices, kSlicedStrands});
   for (const char* name : {"whole", "rod", "still"}) cases.push_back({name, "step", 7, 5, 7});
-  for (const char* name : {"volume", "volume_extras"}) cases.push_back({name, "step", 7, 5, 7});
+  for (const char* name : {"volume", "volume_extras", "volume_air"}) cases.push_back({name, "step", 7, 5, 7});
   cases.push_back({"prefix", "step", 7, 5, 3});
   cases.push_back({"slices", "step", kSlicedStrands, kSlicedVertices, kSlicedStrands});
   return cases;

@@ -17,7 +17,7 @@ class Stream:
         for line in path.read_text().splitlines():
             word, *rest = line.split()
             if word == "codec":
-                self.codec = rest[0]
+                self.codec, self.number = rest[0], int(rest[1])
             elif word == "size":
                 self.strands, self.vertices = int(rest[0]), int(rest[1])
             elif word == "rest":

@@ -44,6 +44,7 @@ struct ShakenTuft {
     strands.read(state);
     input.world_from_head_rotation = rotation;
     input.head_shift_m = glm::dvec3(0.3, -0.1, 0.2) * input.h_s;
+    input.wind_mps = glm::dvec3(-0.7, 0.2, 0.4);
     step = make_step_block(input, {.max_speed_mps = 100.0}, strands.layout().counts(), strands.head());
   }
 
@@ -99,17 +100,43 @@ struct ShakenTuft {
       const double over = std::max(here.density_mpm3 / rest_density - 1.0, 0.0);
       const double k = desc.repulsion_per_s2 * cell_m * cell_m;
       const double drag = desc.friction_per_s + (over > 0.0 ? 2.0 * k * h_s * glm::dot(slope, slope) : 0.0);
-      const glm::dvec3 gained =
-          h_s / (1.0 + h_s * drag) * (-k * over * slope + drag * (here.velocity_mps - moving));
-      const double most = 0.25 * cell_m / h_s;
-      const double size = glm::length(gained);
-      const bool is_root = i < layout.strand_count;
-      result.push_back(glm::dvec3(state.velocity_mps[i]) + (is_root       ? 0.0
-                                                            : size > most ? most / size
-                                                                          : 1.0) *
-                                                               gained);
+      const glm::dvec3 pull = drag * (here.velocity_mps - moving);
+      const auto held = [&](const glm::dvec3& velocity_mps) {
+        return velocity_mps * std::min(1.0, 0.25 * cell_m / h_s / std::max(glm::length(velocity_mps), 1e-30));
+      };
+      const glm::dvec3 push = -k * over * slope;
+      glm::dvec3 gained = held(h_s / (1.0 + h_s * drag) * (push + pull));
+      if (desc.air.acts) gained = held(h_s / (1.0 + h_s * drag) * push) + in_air(desc, i, here, moving, drag);
+      if (i < layout.strand_count) gained = glm::dvec3(0.0);
+      result.push_back(glm::dvec3(state.velocity_mps[i]) + gained);
     }
     return result;
+  }
+
+  /// What a vertex takes on from air and hair around it.
+  glm::dvec3 in_air(const VolumeDesc& desc, size_t i, const VolumeSample& here, const glm::dvec3& moving,
+                    double friction_per_s) const {
+    const StrandLayout& layout = strands.layout();
+    const AirDesc& air = desc.air;
+    const glm::dvec3 outside_mps = input.wind_mps - input.head_shift_m / input.h_s;
+    const double hairs_per_m2 = here.density_mpm3 * air.hairs / layout.strand_count;
+    const double carried = carried_air_share(air, hairs_per_m2, glm::length(outside_mps - here.velocity_mps));
+    const glm::dvec3 flow_mps = glm::mix(outside_mps, here.velocity_mps, carried) - moving;
+    const double rate_per_s = air_rate_per_s(air, glm::length(flow_mps));
+    const size_t after = std::min(i / layout.strand_count + 1, size_t{layout.vertex_count} - 1);
+    const size_t strand = i % layout.strand_count;
+    const glm::dvec3 along = glm::normalize(
+        glm::dvec3(state.position_m[after * layout.strand_count + strand]) -
+        glm::dvec3(state.position_m[std::max(i, size_t{layout.strand_count}) - layout.strand_count]));
+    const glm::dvec3 flow_along = along * glm::dot(along, flow_mps);
+    const glm::dvec3 rubbing = friction_per_s * (here.velocity_mps - moving);
+    const auto taken = [&](double rate, const glm::dvec3& flow, const glm::dvec3& rub) {
+      return -std::expm1(-input.h_s * (friction_per_s + rate)) / (friction_per_s + rate) *
+             (rub + rate * flow);
+    };
+    const glm::dvec3 rubbing_along = along * glm::dot(along, rubbing);
+    return taken(rate_per_s, flow_mps - flow_along, rubbing - rubbing_along) +
+           taken(0.5 * rate_per_s, flow_along, rubbing_along);
   }
 
   Groom groom;
@@ -141,7 +168,14 @@ TEST_P(VolumeForcesOn, AreWhatDoublePrecisionSays) {
   friction.repulsion_per_s2 = 0.0;
   VolumeDesc repulsion = some_volume();
   repulsion.friction_per_s = 0.0;
-  std::vector<VolumeDesc> descs = {friction, repulsion, some_volume()};
+  VolumeDesc air;
+  air.resolution = 12;
+  air.air.acts = true;
+  air.air.hairs = 4000.0;
+  air.air.has_wind = false;
+  VolumeDesc all = some_volume();
+  all.air = air.air;
+  std::vector<VolumeDesc> descs = {friction, repulsion, some_volume(), air, all};
   if (GetParam() == SimDevice::Gl) {  // where it would be chosen on hardware only
     descs.push_back(some_volume());
     descs.back().scatter = "sort";

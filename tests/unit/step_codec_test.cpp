@@ -499,43 +499,46 @@ TEST(StepCodec, EverySolverWithAKernelTakesAFractionOfTangentsBytes) {
 }
 
 TEST(StepCodec, ForcesBetweenStrandsArePredicted) {
-  for (const std::string& solver : kSolvers) {
-    SCOPED_TRACE(solver);
-    SceneDesc scene = stepped_scene(600, kVertices, solver);
-    scene.volume.friction_per_s = 20.0;
-    scene.volume.repulsion_per_s2 = 18000.0;
-    scene.volume.target_per_s2 = 500.0;
-    scene.volume.wind_width_m = 0.002;
-    scene.volume.resolution = 16;
-    SteppedHair hair(scene);
-    hair.settle(40);
-    const std::vector<SteppedState> states = recorded(hair, 40);
-    Stream stream(hair);
-    size_t told = 0;
-    for (const SteppedState& state : states) {
-      stream.pass(state);
-      if (!is_keyframe(*stream.frame)) told += stream.bytes();
+  for (const std::string& solver : kSolvers)
+    for (const bool has_air : {false, true}) {
+      SCOPED_TRACE(solver + (has_air ? " in air" : ""));
+      SceneDesc scene = stepped_scene(600, kVertices, solver);
+      scene.volume.friction_per_s = 20.0;
+      scene.volume.repulsion_per_s2 = 18000.0;
+      scene.volume.target_per_s2 = 500.0;
+      scene.volume.wind_width_m = 0.002;
+      scene.volume.resolution = 16;
+      scene.volume.air.acts = has_air;
+      SteppedHair hair(scene);
+      hair.settle(40);
+      const std::vector<SteppedState> states = recorded(hair, 40);
+      Stream stream(hair);
+      size_t told = 0;
+      for (const SteppedState& state : states) {
+        stream.pass(state);
+        if (!is_keyframe(*stream.frame)) told += stream.bytes();
+      }
+      EXPECT_EQ(stream.keyframes, 1);
+      // The same strands with a model that says nothing of it.
+      const auto silent = std::make_shared<StepModel>(*states.front().snapshot.trail->model);
+      silent->volume = {};
+      Stream other(hair);
+      size_t untold = 0;
+      for (SteppedState state : states) {
+        auto trail = std::make_shared<StepTrail>(*state.snapshot.trail);
+        trail->model = silent;
+        state.snapshot.trail = trail;
+        other.pass(state);
+        if (!is_keyframe(*other.frame)) untold += other.bytes();
+      }
+      EXPECT_LT(told, untold / 2) << told << " and " << untold << " bytes";
+      std::set<std::vector<std::vector<std::byte>>> all;
+      const std::vector<SteppedState> some(states.begin(), states.begin() + 6);
+      for (const simd::InstructionSet set : simd::instruction_sets())
+        for (const uint32_t threads : {1u, 3u})
+          all.insert(messages_of(hair, some, *own_workers(threads), set));
+      EXPECT_EQ(all.size(), 1u) << "sets and threads";
     }
-    EXPECT_EQ(stream.keyframes, 1);
-    // The same strands with a model that says nothing of it.
-    const auto silent = std::make_shared<StepModel>(*states.front().snapshot.trail->model);
-    silent->volume = {};
-    Stream other(hair);
-    size_t untold = 0;
-    for (SteppedState state : states) {
-      auto trail = std::make_shared<StepTrail>(*state.snapshot.trail);
-      trail->model = silent;
-      state.snapshot.trail = trail;
-      other.pass(state);
-      if (!is_keyframe(*other.frame)) untold += other.bytes();
-    }
-    EXPECT_LT(told, untold / 2) << told << " and " << untold << " bytes";
-    std::set<std::vector<std::vector<std::byte>>> all;
-    const std::vector<SteppedState> some(states.begin(), states.begin() + 6);
-    for (const simd::InstructionSet set : simd::instruction_sets())
-      for (const uint32_t threads : {1u, 3u}) all.insert(messages_of(hair, some, *own_workers(threads), set));
-    EXPECT_EQ(all.size(), 1u) << "sets and threads";
-  }
 }
 
 size_t bytes_of_deltas(const SteppedHair& hair, const std::vector<SteppedState>& states) {

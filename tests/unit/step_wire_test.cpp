@@ -67,6 +67,20 @@ TEST(StepWire, RefusesWhatNoStepCanBe) {
   volume.resize(volume.size() - 1);
   EXPECT_EQ(code_of(volume, 0, volume[0], read_model), ErrorCode::BadInput);
 
+  StepModel with_air = with_volume;
+  with_air.volume.air.acts = true;
+  with_air.volume.air.has_wind = false;
+  with_air.volume.air.hairs = 77'000.0;
+  std::vector<std::byte> air;
+  step::write_model(with_air, hair.rest_in_head_m(), kStrands, air);
+  ByteReader good_air(air);
+  EXPECT_EQ(read_model(good_air)->volume, with_air.volume);
+  for (size_t i = 1; i <= 4; ++i)
+    for (const double value : {0.0, -1.0, 1e9, kNoNumber})
+      EXPECT_EQ(code_of(air, air.size() - i * sizeof(double), value, read_model), ErrorCode::BadInput) << i;
+  air.resize(air.size() - 1);
+  EXPECT_EQ(code_of(air, 0, air[0], read_model), ErrorCode::BadInput);
+
   std::vector<std::byte> scene;
   step::write_scene(*trail.scene, scene);
   const auto read_scene = [](ByteReader& reader) { return step::read_scene(reader); };

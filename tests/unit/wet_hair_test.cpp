@@ -14,6 +14,14 @@ TEST(WetHair, DryHairIsAsItWas) {
     EXPECT_EQ(wet_parameters(row, dry, 0.0), dry) << row.name;
   }
   EXPECT_EQ(wet_volume(volume, 0.0), volume);
+  SceneDesc scene;
+  scene.volume.air.acts = true;
+  const VolumeDesc of_rods = moving_volume(scene, {{"radius_m", 3e-5}, {"density_kgpm3", 1200.0}});
+  EXPECT_EQ(of_rods.air.hair_radius_m, 3e-5) << "one hair, one radius";
+  EXPECT_EQ(of_rods.air.hair_density_kgpm3, 1200.0);
+  EXPECT_EQ(moving_volume(scene, {{"radius", 1.0}}), scene.volume);
+  scene.look.shading.wetness = 1.0f;
+  EXPECT_EQ(moving_volume(scene, {}).air.hair_density_kgpm3, kWetMass * kHairDensityKgpm3);
   EXPECT_EQ(wet_volume({}, 1.0), VolumeDesc{}) << "hair that does not act on hair goes on so";
 }
 

@@ -5,6 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include "common/kernels/volume/hair_in_air.h"
+
 namespace strandcast {
 
 /// Cells along the longest side of the groom's box.
@@ -28,12 +30,16 @@ struct VolumeDesc {
   uint32_t interval = 1;                 // steps that a volume is good for
   std::string integration = "implicit";  // of the repulsion: "implicit", or "explicit" as in the sources
   std::string scatter = "auto";          // how strands get into it, one of kVolumeScatters
+  AirDesc air = {};                      // between the strands and around them; wind_width_m is its own then
 
-  /// Whether any of it does something.
-  bool acts() const {
+  /// Whether strands act on each other other than by the air between them.
+  bool has_contact() const {
     return friction_per_s > 0.0 || repulsion_per_s2 > 0.0 || target_per_s2 > 0.0 || wind_width_m > 0.0;
   }
-  bool has_extras() const { return target_per_s2 > 0.0 || wind_width_m > 0.0; }
+  /// Whether any of it does something.
+  bool acts() const { return has_contact() || air.acts; }
+  bool is_sheltered() const { return air.acts ? air.has_wind : wind_width_m > 0.0; }
+  bool has_extras() const { return target_per_s2 > 0.0 || is_sheltered(); }
   bool is_implicit() const { return integration == "implicit"; }
 
   bool operator==(const VolumeDesc&) const = default;

@@ -1,6 +1,7 @@
 #include "common/kernels/volume/volume_law.h"
 
 #include <algorithm>
+#include <numeric>
 
 namespace strandcast {
 namespace {
@@ -31,6 +32,9 @@ Result<std::unique_ptr<VolumeLaw>> VolumeLaw::make(const VolumeStrands& strands,
   of_volume.smoothing = desc.smoothing;
   ASSIGN_OR_RETURN(HairVolume volume, HairVolume::make(strands, of_volume));
   std::unique_ptr<VolumeLaw> law(new VolumeLaw(desc, std::move(volume)));
+  double strand_count = strands.strand_count;
+  if (!strands.hairs.empty()) strand_count = std::accumulate(strands.hairs.begin(), strands.hairs.end(), 0.0);
+  law->hairs_per_strand_ = desc.air.hairs / std::max(strand_count, 1.0);
   if (desc.has_extras()) law->extras_ = std::make_unique<VolumeExtras>(of_volume);
   law->find_rest_density(strands);
   if (target != nullptr && desc.target_per_s2 > 0.0) RETURN_IF_ERROR(law->take_target(*target, of_volume));
@@ -50,7 +54,9 @@ Status VolumeLaw::take_target(const VolumeStrands& hair, VolumeOptions options) 
 KernelDesc VolumeLaw::kernel(bool has_way) const {
   KernelDesc kernel;
   kernel.shader_path = "sim/volume_forces.comp";
-  kernel.variant = {{"HAS_EXTRAS", extras_ ? 1 : 0}, {"HAS_WAY", has_way ? 1 : 0}};
+  const AirDesc& air = desc_.air;
+  kernel.variant = {
+      {"HAS_EXTRAS", extras_ ? 1 : 0}, {"HAS_AIR", air.acts ? 1 : 0}, {"HAS_WAY", has_way ? 1 : 0}};
   const double cell_m = volume_.cell_m();
   kernel.constants = {{"u_friction", desc_.friction_per_s},
                       {"u_repulsion", desc_.repulsion_per_s2 * cell_m * cell_m},
@@ -58,7 +64,12 @@ KernelDesc VolumeLaw::kernel(bool has_way) const {
                       {"u_give", desc_.is_implicit() ? kGive : 0.0},
                       {"u_target", desc_.target_per_s2 * cell_m * cell_m},
                       {"u_mean_density", mean_density_mpm3_},
-                      {"u_shadow", desc_.wind_width_m > 0.0 ? 1.0 : 0.0}};
+                      {"u_shadow", desc_.is_sheltered() ? 1.0 : 0.0}};
+  if (air.acts) {
+    kernel.constants["u_reynolds"] = reynolds_per_mps(air);
+    kernel.constants["u_air_rate"] = air_rate_scale_per_s(air);
+    kernel.constants["u_lock"] = hairs_per_strand_ * air.lock_width_m * air.hair_radius_m;
+  }
   kernel.meets_colliders = false;
   return kernel;
 }
@@ -107,8 +118,9 @@ std::span<const glm::vec4> VolumeLaw::fill(const StepBlock& step, const VolumeSt
   const glm::vec3 wind_mps(step.wind);
   const float speed_mps = glm::length(wind_mps);
   WindShadow shadow;
-  shadow.width_m = static_cast<float>(desc_.wind_width_m);
-  const bool is_windy = speed_mps > 0.0f && shadow.width_m > 0.0f;
+  shadow.width_m = static_cast<float>(
+      desc_.air.acts ? hairs_per_strand_ * stopping_width_m(desc_.air, speed_mps) : desc_.wind_width_m);
+  const bool is_windy = desc_.is_sheltered() && speed_mps > 0.0f && shadow.width_m > 0.0f;
   if (is_windy) shadow.along_in_head = input.head_from_world * (wind_mps / speed_mps);
   extras_->update(grid, table.subspan(kHeader, grid.size()), desc_.target_per_s2 > 0.0 ? &target_ : nullptr,
                   is_windy ? &shadow : nullptr, table.subspan(kHeader + grid.size(), grid.size()));

@@ -60,6 +60,7 @@ class VolumeLaw {
   std::unique_ptr<VolumeExtras> extras_;  // where a target or a wind's shadow is wanted
   TargetDensity target_;                  // where one is wanted
   double mean_density_mpm3_ = 1.0;        // over the groom's vertices
+  double hairs_per_strand_ = 1.0;         // real ones
   std::vector<glm::vec4> rest_density_;
 };
 

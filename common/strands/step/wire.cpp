@@ -30,6 +30,13 @@ constexpr auto kMostBodySteps = static_cast<int32_t>(kMaxColliderM / kBodyStepM)
 constexpr double kMostNormal = 1.001;
 constexpr double kMostForcePerS2 = 1e6;
 constexpr double kMostVolumeRate = 1e6;
+constexpr double kMostHairs = 1e7;
+constexpr double kMostHairRadiusM = 1.0;
+constexpr double kMostHairDensityKgpm3 = 1e6;
+// Flags of a volume.
+constexpr uint8_t kImplicit = 1;
+constexpr uint8_t kAir = 2;
+constexpr uint8_t kAirWind = 4;  // some of it is kept off
 constexpr double kMostWindWidthM = 1.0;
 constexpr double kMostDensityScale = 100.0;
 constexpr uint8_t kWaves = 1;
@@ -227,7 +234,12 @@ void write_volume(const VolumeDesc& volume, ByteWriter& to) {
     to.put(value);
   to.put(static_cast<uint8_t>(volume.resolution));
   to.put(static_cast<uint8_t>(volume.smoothing));
-  to.put(static_cast<uint8_t>(volume.is_implicit()));
+  const AirDesc& air = volume.air;
+  to.put(static_cast<uint8_t>((volume.is_implicit() ? kImplicit : 0) | (air.acts ? kAir : 0) |
+                              (air.acts && air.has_wind ? kAirWind : 0)));
+  if (!air.acts) return;
+  for (const double value : {air.hairs, air.lock_width_m, air.hair_radius_m, air.hair_density_kgpm3})
+    to.put(value);
 }
 Result<VolumeDesc> read_volume(ByteReader& bytes) {
   Numbers from{bytes};
@@ -238,7 +250,17 @@ Result<VolumeDesc> read_volume(ByteReader& bytes) {
   from.are_usable &= (volume.rest_density_scale = from.take<double>(kMostDensityScale)) > 0.0;
   volume.resolution = bytes.take<uint8_t>();
   volume.smoothing = bytes.take<uint8_t>();
-  volume.integration = bytes.take<uint8_t>() != 0 ? "implicit" : "explicit";
+  const auto flags = bytes.take<uint8_t>();
+  volume.integration = (flags & kImplicit) != 0 ? "implicit" : "explicit";
+  AirDesc& air = volume.air;
+  air.acts = (flags & kAir) != 0;
+  if (air.acts) air.has_wind = (flags & kAirWind) != 0;
+  if (air.acts)
+    for (auto [value, most] :
+         {std::pair{&air.hairs, kMostHairs}, std::pair{&air.lock_width_m, kMostWindWidthM},
+          std::pair{&air.hair_radius_m, kMostHairRadiusM},
+          std::pair{&air.hair_density_kgpm3, kMostHairDensityKgpm3}})
+      from.are_usable &= (*value = from.take<double>(most)) > 0.0;
   RETURN_IF_ERROR(from.status("the volume"));
   if (volume.resolution < kMinVolumeResolution || volume.resolution > kMostToldResolution ||
       volume.smoothing > kMaxVolumeSmoothing || !volume.acts())

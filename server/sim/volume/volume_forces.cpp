@@ -48,10 +48,11 @@ Status VolumeForces::choose_scatter(Executor& executor, const StrandLayout& layo
   const bool is_for_host = desc.has_extras() || executor.info().is_software;
   if (desc.scatter == "host" || (is_free && is_for_host)) return {};
   if (desc.has_extras())
-    return make_error(ErrorCode::Unsupported,
-                      "volume.scatter: {} does not know volume.target_per_s2 and volume.wind_width_m (known "
-                      "with them: auto, host)",
-                      desc.scatter);
+    return make_error(
+        ErrorCode::Unsupported,
+        "volume.scatter: {} knows neither volume.target_per_s2 nor wind that hair keeps off (known "
+        "with them: auto, host)",
+        desc.scatter);
   DeviceVolumeDesc wanted;
   wanted.scatter = is_free ? "sort" : desc.scatter;
   wanted.volume = &law_->volume();
