@@ -49,7 +49,9 @@ Fact decide_bend_limit(const SceneDesc& scene, const RuntimeFacts&) {
   return {false, "bend_limit leaves 0 to 180 degrees: segments bend freely"};
 }
 
-Fact decide_oriented_drag(const SceneDesc& scene, const RuntimeFacts&) {
+Fact decide_oriented_drag(const SceneDesc& scene, const RuntimeFacts& facts) {
+  if (scene.volume.air.acts && !leaves_out(facts, DetailLevel::NoHairHair))
+    return {false, "air.acts is true, and goes by the direction of hair itself"};
   if (scene.wind.along_share < 1.0f) return {true, "wind.along_share is below 1"};
   return {false, "wind.along_share is 1: air drags hair alike in all directions"};
 }
@@ -60,7 +62,10 @@ Fact decide_volume(const SceneDesc& scene, const RuntimeFacts& facts) {
   if (scene.volume.repulsion_per_s2 > 0.0) return {true, "volume.repulsion_per_s2 is above zero"};
   if (scene.volume.target_per_s2 > 0.0) return {true, "volume.target_per_s2 is above zero"};
   if (scene.volume.wind_width_m > 0.0) return {true, "volume.wind_width_m is above zero"};
-  return {false, "volume has no friction, repulsion, target or wind_width: hair passes through hair"};
+  if (scene.volume.air.acts) return {true, "air.acts is true"};
+  return {false,
+          "volume has no friction, repulsion, target or wind_width, and air does not act: hair passes "
+          "through hair"};
 }
 
 Fact decide_distance_field(const SceneDesc& scene, const RuntimeFacts&) {

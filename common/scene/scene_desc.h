@@ -220,12 +220,19 @@ struct StreamDesc {
 
 using GroomDesc = std::variant<ProceduralGroomDesc, FileGroomDesc>;
 
+/// Values of SceneDesc::quality.
+inline constexpr const char* kCustomQuality = "custom";
+inline constexpr const char* kAutoQuality = "auto";
+inline constexpr const char* kFastQuality = "fast";
+inline constexpr const char* kFullQuality = "full";
+
 inline constexpr size_t kMaxHeads = 8;  // of one scene, the scene's own among them
 
 struct SceneDesc {
   std::string name = "default";
   GroomDesc groom;
   HeadDesc head;
+  std::string quality = kCustomQuality;  // where solver, volume, air and head.collider come from
   SolverDesc solver;
   double step_rate_hz = 60.0;  // 10 .. 1000
   uint32_t substeps = 1;       // 1 .. 64

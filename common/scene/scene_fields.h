@@ -56,6 +56,8 @@ inline constexpr Range kRestDensityScale{0.1, 100.0, ""};
 inline constexpr Range kVolumeResolution{8, 128, "cells"};
 inline constexpr Range kVolumeSmoothing{0, 3, "passes"};
 inline constexpr Range kVolumeInterval{1, 100, "steps"};
+inline constexpr Range kHairs{1.0, 1e7, "hairs"};
+inline constexpr Range kLockWidth{0.001, 1.0, "m"};
 inline constexpr Range kFullAtPx{1.0, 10'000.0, "pixels"};
 inline constexpr Range kHysteresis{0.0, 0.9, ""};
 inline constexpr Range kWaitingTime{0.0, 3600.0, "s"};
@@ -315,7 +317,10 @@ inline bool have_own_names(const SceneDesc& scene) {
 template <class Visitor>
 void visit_scene(Visitor& v, SceneDesc& scene) {
   v.text("name", scene.name, kMaxNameBytes);
-  v.group("groom", [&] { visit_groom(v, scene.groom); });
+  v.group("groom", [&] {
+    visit_groom(v, scene.groom);
+    v.number("hairs", scene.volume.air.hairs, kHairs);
+  });
   v.group("head", [&] {
     v.path("mesh_path", scene.head.mesh_path);
     v.number("radius_m", scene.head.radius_m, kHeadRadius);
@@ -334,6 +339,11 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
     v.text("name", scene.solver.name, kMaxNameBytes);
     v.map("parameters", scene.solver.parameters, kSolverParameter, kMaxSolverParameters);
   });
+  v.text("quality", scene.quality, kMaxNameBytes);
+  v.require("quality",
+            scene.quality == kCustomQuality || scene.quality == kAutoQuality ||
+                scene.quality == kFastQuality || scene.quality == kFullQuality,
+            "is unknown (known: auto, fast, full, custom)");
   v.number("step_rate_hz", scene.step_rate_hz, kStepRate);
   v.number("substeps", scene.substeps, kSubsteps);
   v.vector("gravity_mps2", scene.gravity_mps2, kGravity);
@@ -379,6 +389,10 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
               std::find(std::begin(kVolumeScatters), std::end(kVolumeScatters), scene.volume.scatter) !=
                   std::end(kVolumeScatters),
               "is unknown (known: auto, host, sort, atomics)");
+  });
+  v.group("air", [&] {
+    v.flag("acts", scene.volume.air.acts);
+    v.number("lock_width_m", scene.volume.air.lock_width_m, kLockWidth);
   });
   v.group("body", [&] { visit_body(v, scene.body); });
   v.group("detail", [&] {

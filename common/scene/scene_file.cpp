@@ -315,6 +315,13 @@ v1::Scene to_message(const SceneDesc& scene) {
   return message;
 }
 
+constexpr const char* kRodSolver = "direct_rod";
+
+bool acts(const v1::Volume& volume) {
+  return volume.friction_per_s() > 0.0 || volume.repulsion_per_s2() > 0.0 || volume.target_per_s2() > 0.0 ||
+         volume.wind_width_m() > 0.0;
+}
+
 /// A groom from a file comes with a style, and keeps it: its shape carries all of its weight, unless the
 /// scene of that file or an override says otherwise. What a scene says of grown hair is not said of a file's.
 /// `place`: in front of the head's fields in overrides.
@@ -328,6 +335,63 @@ void keep_style(v1::Scene& message, bool had_file, const std::vector<std::string
   auto& parameters = *message.mutable_solver()->mutable_parameters();
   if (is_told || (had_file && parameters.contains(kSagFree))) return;
   parameters[kSagFree] = 1.0;
+}
+
+// What hair on hair is in scenes of full quality (hair_in_air in strandcast-report coherence says why).
+constexpr double kFullFrictionPerS = 20.0;
+constexpr double kFullRepulsionPerS2 = 18'000.0;
+// Cells as wide as a lock: finer ones cost more, and hair holds together less.
+constexpr uint32_t kFullResolution = 16;
+
+void add_hair_in_air(v1::Scene& message) {
+  message.mutable_volume()->set_friction_per_s(kFullFrictionPerS);
+  message.mutable_volume()->set_repulsion_per_s2(kFullRepulsionPerS2);
+  message.mutable_volume()->set_resolution(kFullResolution);
+  message.mutable_air()->set_acts(true);
+}
+
+/// What a quality stands for, in place of what the scene says of it.
+void take_quality(v1::Scene& message) {
+  const bool is_fast = message.quality() == kFastQuality;
+  if (!is_fast && message.quality() != kFullQuality && message.quality() != kAutoQuality) return;
+  v1::Solver& solver = *message.mutable_solver();
+  solver.Clear();
+  solver.set_name(is_fast ? "dftl" : kRodSolver);
+  (*solver.mutable_parameters())["sag_free"] = 1.0;
+  message.clear_volume();
+  message.clear_air();
+  message.mutable_head()->set_collider(is_fast ? kSphereCollider : kFieldCollider);
+  if (!is_fast) add_hair_in_air(message);
+}
+
+bool names_any(const std::vector<std::string>& overrides, std::initializer_list<std::string_view> paths) {
+  return std::any_of(overrides.begin(), overrides.end(), [&](const std::string& given) {
+    return std::any_of(paths.begin(), paths.end(),
+                       [&](std::string_view path) { return given.starts_with(path); });
+  });
+}
+
+/// Quality, then overrides: whoever chooses a model by hand gets what the scene itself says, and whoever
+/// changes what a quality stands for has one of his own. Rods that are chosen by hand act on each other, in
+/// air, unless told otherwise.
+Status apply_choices(v1::Scene& message, bool is_text, const std::vector<std::string>& overrides) {
+  const bool names_solver = names_any(overrides, {"solver"});
+  for (const std::string& assignment : overrides)
+    if (assignment.starts_with("quality=")) RETURN_IF_ERROR(apply_override(message, assignment));
+  const bool names_quality = names_any(overrides, {"quality="});
+  const bool says_nothing =
+      !message.has_solver() && !message.has_volume() && !message.has_air() && !message.head().has_collider();
+  if (is_text && !message.has_quality() && says_nothing) message.set_quality(kAutoQuality);
+  if (!names_solver && (names_quality || (is_text && message.has_quality()))) take_quality(message);
+  const bool is_rod_before = message.solver().name() == kRodSolver;
+  for (const std::string& assignment : overrides) RETURN_IF_ERROR(apply_override(message, assignment));
+  if (names_solver || names_any(overrides, {"volume.", "air.", "head.collider"}))
+    message.set_quality(kCustomQuality);
+  const bool is_chosen = is_text ? !message.has_volume() && !message.has_air()
+                                 : !is_rod_before && !acts(message.volume()) && !message.air().acts();
+  const bool is_told = names_any(overrides, {"volume.", "air."});
+  if (message.solver().name() == kRodSolver && is_chosen && !is_told) add_hair_in_air(message);
+  return {};
 }
 
 /// What a further head inherits of its scene: all but what is the scene's own head's. What holds of some hair
@@ -358,6 +422,8 @@ Status complete_heads(v1::Scene& scene, bool had_file, const std::string& place,
                                   "heads.{0}.heads: a further head has none itself, list all in heads", i));
     const bool has_file = head.has_groom() ? head.groom().has_file() : had_file;
     v1::Scene whole = inherited(scene, head);
+    if (head.has_quality()) take_quality(head);
+    if (head.has_solver() && !head.has_quality()) head.set_quality(kCustomQuality);
     whole.MergeFrom(head);
     head = std::move(whole);
     keep_style(head, has_file, overrides, fmt::format("heads.{}.", i));
@@ -368,7 +434,7 @@ Status complete_heads(v1::Scene& scene, bool had_file, const std::string& place,
 Result<SceneDesc> from_message(v1::Scene& message, const pb::TextFormat::ParseInfoTree* tree,
                                const std::string& place, const std::vector<std::string>& overrides) {
   const bool had_file = message.groom().has_file();
-  for (const std::string& assignment : overrides) RETURN_IF_ERROR(apply_override(message, assignment));
+  RETURN_IF_ERROR(apply_choices(message, tree != nullptr, overrides));
   RETURN_IF_ERROR(complete_heads(message, had_file, place, overrides));
   keep_style(message, had_file, overrides);
   Reader reader(message, tree, {place, &overrides});

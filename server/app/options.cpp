@@ -382,8 +382,10 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
 
 Result<ServerConfig> load_config(const ServerOptions& options) {
   const auto load = [&](const std::vector<std::string>& overrides) {
-    return options.scene_path.empty() ? built_in_scene_with(overrides)
-                                      : load_scene(options.scene_path, overrides);
+    if (!options.scene_path.empty()) return load_scene(options.scene_path, overrides);
+    std::vector<std::string> all = {std::string("quality=") + kAutoQuality};
+    all.insert(all.end(), overrides.begin(), overrides.end());
+    return built_in_scene_with(all);
   };
   ServerConfig config = options.config;
   // What is set of live inputs is set of those that the command line names.

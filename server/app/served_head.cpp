@@ -156,6 +156,7 @@ RecordingStart ServedHead::describe_recording() const {
   start.sim_device = simulated.sim_device;
   start.sim_device_name = simulated.sim_device_name;
   SceneDesc scene = source_->scene().value_or(config_.scene);
+  scene.quality = kCustomQuality;  // as it runs, whatever machine replays it
   scene.stream.codec = config_.scene.stream.codec;
   scene.stream.has_codec = true;
   start.scene_text = to_line(with_absolute_paths(std::move(scene)));
@@ -211,6 +212,17 @@ void ServedHead::watch_speed(const ServerCounters& now) {
   if (change != SlowMotionWatch::Change::Began) return;
   ++slow_motions_;
   log_warn("sim", "{}", slow_motion_);
+  lower_quality();
+}
+
+/// Of a scene that leaves its quality to the machine, once: what was measured at rest was too little.
+void ServedHead::lower_quality() {
+  const std::optional<SceneDesc> running = source_->scene();
+  if (has_lowered_quality_ || !running || running->quality != kAutoQuality) return;
+  has_lowered_quality_ = true;
+  if (running->solver.name == kCheapestSolver) return;
+  log_warn("sim", "quality auto: fast from here on, as full does not keep up with real time");
+  source_->post(SetParameter{std::string("quality=") + kFastQuality}, {}, "quality auto");
 }
 
 std::optional<SceneDesc> ServedHead::scene() const {

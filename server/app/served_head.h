@@ -75,6 +75,7 @@ class ServedHead {
   Status choose_codecs();
   RecordingStart describe_recording() const;
   void watch_speed(const ServerCounters& now);
+  void lower_quality();
   void count_strands(ServerCounters& counters) const;
   gl::PassReports idle_picture_passes() const;
 
@@ -102,6 +103,7 @@ class ServedHead {
   SlowMotionWatch slow_watch_;
   std::string slow_motion_;  // what viewers are told; empty = real time
   std::atomic<bool> is_slow_{false};
+  bool has_lowered_quality_ = false;
   std::atomic<uint64_t> slow_motions_{0};
 };
 

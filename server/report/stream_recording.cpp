@@ -70,6 +70,9 @@ double hair_rms_mps(const std::vector<StreamFrame>& frames) {
   return count > 0.0 ? std::sqrt(sum_m2 / count) / kStreamFrameS : 0.0;
 }
 
+/// Of the weight of dftl's hair, what the groomed shape carries: hair that hangs, and swings as one.
+constexpr double kHangingShare = 0.3;
+
 double elapsed_ms(int64_t begin_ns) {
   return static_cast<double>(now_ns() - begin_ns) / kNsPerMs;
 }
@@ -81,6 +84,7 @@ SceneDesc recorded_scene(const RecordingDesc& desc) {
   auto& groom = std::get<ProceduralGroomDesc>(scene.groom);
   groom.strand_count = desc.size.strand_count;
   groom.vertex_count = desc.size.vertex_count;
+  scene.solver.parameters["sag_free"] = kHangingShare;
   if (!desc.solver.empty() && desc.solver != scene.solver.name) scene.solver = {desc.solver, {}};
   scene.step_rate_hz = 1.0 / kStreamFrameS;
   return scene;

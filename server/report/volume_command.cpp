@@ -28,7 +28,9 @@ struct VolumeReportOptions {
 
 Result<SceneDesc> scene_of(const VolumeReportOptions& options) {
   if (!options.scene_path.empty()) return load_scene(options.scene_path, options.overrides);
-  std::vector<std::string> overrides = {fmt::format("groom.procedural.strand_count={}", kAllHairs)};
+  // Hair that hangs: a style that is kept shows less of what a volume does.
+  std::vector<std::string> overrides = {fmt::format("groom.procedural.strand_count={}", kAllHairs),
+                                        "solver.parameters.sag_free=0.3"};
   overrides.insert(overrides.end(), options.overrides.begin(), options.overrides.end());
   return built_in_scene_with(overrides);
 }

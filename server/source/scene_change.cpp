@@ -18,21 +18,15 @@ bool bears_volume(const SolverRow& row) {
 }  // namespace
 
 const std::vector<std::string>& live_fields() {
-  static const std::vector<std::string> kFields = {"solver",
-                                                   "substeps",
-                                                   "gravity_mps2",
-                                                   "follicle_limit_deg",
-                                                   "colliders",
-                                                   "has_auto_collider",
-                                                   "bend_limit",
-                                                   "body",
-                                                   "volume",
-                                                   "detail",
-                                                   "wind",
-                                                   "look",
-                                                   "camera",
-                                                   "stream.bound_m",
-                                                   "stream.strand_rate_hz"};
+  static const std::vector<std::string> kFields = {"solver",         "substeps",
+                                                   "gravity_mps2",   "follicle_limit_deg",
+                                                   "colliders",      "has_auto_collider",
+                                                   "bend_limit",     "body",
+                                                   "volume",         "air",
+                                                   "groom.hairs",    "quality",
+                                                   "detail",         "wind",
+                                                   "look",           "camera",
+                                                   "stream.bound_m", "stream.strand_rate_hz"};
   return kFields;
 }
 
@@ -57,7 +51,11 @@ Status check_solver(const SceneDesc& scene) {
         "solver {} has no kernel and meets no body: body.preset \"{}\" without capsules and planes "
         "is for it",
         row->name, kNoBody);
-  if (scene.volume.acts() && !bears_volume(*row))
+  if (scene.volume.air.acts && !row->has_kernel)
+    return make_error(
+        ErrorCode::BadInput,
+        "solver {} has no kernel and knows no air that hair carries along: set air.acts to false", row->name);
+  if (scene.volume.has_contact() && !bears_volume(*row))
     return make_error(ErrorCode::BadInput,
                       "solver {} takes no forces between strands ({}): set volume.friction_per_s and "
                       "volume.repulsion_per_s2 to 0, or take another solver",
@@ -79,7 +77,12 @@ void fit_to_solver(SceneDesc& scene) {
   SolverDesc& solver = scene.solver;
   const auto row = find_solver(solver.name);
   if (!row) return;
-  if (!bears_volume(**row)) scene.volume = {};
+  if (!bears_volume(**row)) {
+    AirDesc air = scene.volume.air;
+    air.acts = air.acts && (*row)->has_kernel;
+    scene.volume = {};
+    scene.volume.air = air;
+  }
   if (!(*row)->has_kernel) scene.bend_limit = {};
   if (!(*row)->has_kernel) scene.wind.along_share = WindDesc().along_share;
   if (!(*row)->has_kernel) scene.body = {};
@@ -96,7 +99,9 @@ std::string left_out_note(const SceneDesc& before, const SceneDesc& after) {
   std::vector<std::string> names;
   for (const auto& [name, value] : before.solver.parameters)
     if (!after.solver.parameters.contains(name)) names.push_back(fmt::format("{} {:g}", name, value));
-  if (before.volume.acts() && !after.volume.acts()) names.emplace_back("forces between strands (volume)");
+  if (before.volume.has_contact() && !after.volume.has_contact())
+    names.emplace_back("forces between strands (volume)");
+  if (before.volume.air.acts && !after.volume.air.acts) names.emplace_back("air");
   if (before.bend_limit.acts() && !after.bend_limit.acts()) names.emplace_back("bend_limit");
   if (before.wind.along_share != after.wind.along_share) names.emplace_back("wind.along_share");
   if (before.body.acts() && !after.body.acts()) names.emplace_back("body");
@@ -113,7 +118,7 @@ Result<SceneDesc> choose_solver(const SceneDesc& scene, const SolverDesc& scene_
   constexpr std::string_view kGroup = "solver.parameters.";
   for (const std::string& assignment : overrides) {
     const std::string path = assignment.substr(0, assignment.find('='));
-    if (path.starts_with("volume")) fitted.volume = scene.volume;
+    if (path.starts_with("volume") || path.starts_with("air")) fitted.volume = scene.volume;
     if (path == "wind.along_share") fitted.wind.along_share = scene.wind.along_share;
     if (path.starts_with("bend_limit")) fitted.bend_limit = scene.bend_limit;
     if (path.starts_with("body")) fitted.body = scene.body;
@@ -135,6 +140,8 @@ Result<SceneDesc> change_scene(const SceneDesc& scene, const std::string& assign
     return make_error(ErrorCode::BadInput, "'{}' cannot change while running (known: {})", path,
                       fmt::join(fields, ", "));
   ASSIGN_OR_RETURN(SceneDesc changed, with_overrides(scene, {assignment}));
+  // What is loaded stays: a quality that is chosen now meets the head as it is.
+  changed.head.collider = scene.head.collider;
   if (changed.solver.name != scene.solver.name) fit_to_solver(changed);
   RETURN_IF_ERROR(check_solver(changed));
   return changed;

@@ -91,6 +91,7 @@ Status SimLoop::begin() {
                          config_.content->head_field ? config_.content->head_field->size_bytes() : 0};
   stages_.emplace(sizes, explain(config_.scene, facts_));
   RETURN_IF_ERROR(rebuild_solver(config_.scene, analyse(config_.scene, facts_)));
+  RETURN_IF_ERROR(settle_quality());
   publish();
   clock_.emplace(1.0 / config_.scene.step_rate_hz, now_ns());
   if (config_.is_lockstep) clock_->pause();

@@ -135,6 +135,8 @@ class SimLoop {
   LookChange wanted_look() const { return {config_.scene.look, config_.scene.camera}; }
   bool has_other_look() const { return wanted_look() != look_; }
   Status rebuild_solver(const SceneDesc& scene, const SceneFeatures& features);
+  Status settle_quality();
+  Result<double> time_step_ms();
   void apply_demand(const SourceDemand& demand);
   void apply_tap(const TapChange& change);
   void apply_facts(const RuntimeFacts& facts);

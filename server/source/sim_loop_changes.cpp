@@ -1,9 +1,14 @@
 // The part of SimLoop that changes between two steps: commands, assignments, and what readers want.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "common/base/check.h"
+#include "common/base/quantile.h"
 #include "common/base/text.h"
+#include "common/base/units.h"
 #include "common/log/log.h"
 #include "common/strands/strand_codec.h"
 #include "server/source/scene_change.h"
@@ -14,6 +19,9 @@ namespace strandcast {
 namespace {
 
 constexpr size_t kMaxToldChars = 200;  // of an assignment, in its answer
+// A scene's quality is full where a step takes this share of its time at most; so many are timed.
+constexpr double kFullShare = 0.5;
+constexpr int kTimedSteps = 9;
 
 /// Whether a solver built for one set of facts serves another: only what it compiles for counts.
 bool needs_same_solver(const SceneFeatures& a, const SceneFeatures& b) {
@@ -156,13 +164,12 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   const glm::dvec3& groom_gravity = builder_->groom_gravity_in_head_mps2();
   ASSIGN_OR_RETURN(const auto notes, prepare_solver(scene, config_.content->groom, groom_gravity));
   RETURN_IF_ERROR(prepare_guides(scene, config_.content->groom, groom_gravity));
-  const double wetness = scene.look.shading.wetness;
   const SolverContext context = {executor_.get(),
                                  features,
                                  KernelForm::Auto,
                                  strands,
                                  groom_gravity,
-                                 wet_volume(scene.volume, wetness),
+                                 moving_volume(scene, parameters),
                                  config_.content->head_field,
                                  scene.bend_limit,
                                  config_.content->volume_target,
@@ -194,9 +201,45 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
            config_.content->groom.strand_count(), config_.content->groom.uniform_vertex_count(),
            solver_->memory_bytes() / 1000);
   for (const std::string& note : notes) log_info("sim", "{}", note);
+  if (const AirDesc& air = scene.volume.air; features.has_volume && air.acts)
+    log_info("sim", "hair in air: {:.0f} real hairs on the head (groom.hairs), {:.1f} to a strand", air.hairs,
+             air.hairs / simulated_strands_);
   if (!row->has_kernel)
     log_warn("sim", "solver {} is a reference: it runs in double on one thread of the processor", row->name);
   return {};
+}
+
+/// Milliseconds of a step of the hair at rest, which is at rest again afterwards.
+Result<double> SimLoop::time_step_ms() {
+  StepBuilder builder(config_.scene, config_.content->colliders);
+  InputFrame input;
+  std::vector<double> step_ms;
+  for (int step = 1; step <= kTimedSteps; ++step) {
+    const SceneStep& taken = builder.build(input, solver_features_, step / config_.scene.step_rate_hz);
+    step_ms.push_back(timed_ms(*executor_, [&] {
+      for (const StepInput& substep : taken.substeps) solver_->substep(substep);
+    }));
+  }
+  RETURN_IF_ERROR(solver_->load(config_.content->groom, builder_->world_from_head().rotation));
+  return median(step_ms);
+}
+
+/// Of a scene that leaves its quality to the machine: full, where steps take half of the time there is or
+/// less. Simulated time that waits for somebody else has no such limit.
+Status SimLoop::settle_quality() {
+  if (config_.scene.quality != kAutoQuality || config_.is_lockstep || config_.script != nullptr) return {};
+  ASSIGN_OR_RETURN(const double step_ms, time_step_ms());
+  const double most_ms = kFullShare * kMsPerS / config_.scene.step_rate_hz;
+  const std::string why = fmt::format("a step of full takes {:.1f} ms of the {:.1f} ms there are", step_ms,
+                                      kMsPerS / config_.scene.step_rate_hz);
+  if (step_ms <= most_ms) {
+    log_info("sim", "quality auto: full, as {}", why);
+    return {};
+  }
+  log_info("sim", "quality auto: fast, as {}", why);
+  ASSIGN_OR_RETURN(config_.scene, change_scene(config_.scene, std::string("quality=") + kFastQuality));
+  config_.scene.quality = kAutoQuality;
+  return rebuild_solver(config_.scene, analyse(config_.scene, facts_));
 }
 
 void SimLoop::apply_demand(const SourceDemand& demand) {

@@ -25,6 +25,7 @@ SceneDesc scene_of(const SimulatedMotion& motion, const SolverRow& row) {
   auto& hair = std::get<ProceduralGroomDesc>(scene.groom);
   hair.strand_count = motion.strand_count;
   hair.vertex_count = motion.vertex_count;
+  scene.solver.parameters["sag_free"] = 0.3;  // hair that hangs
   scene.solver.name = motion.solver;
   // What the built-in scene sets for its own solver stays as far as others have it.
   std::erase_if(scene.solver.parameters, [&row](const auto& given) {

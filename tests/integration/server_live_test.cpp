@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "common/pictures/image_codec.h"
+#include "common/scene/scene_file.h"
 #include "common/strands/scene_asset.h"
 #include "common/strands/strand_codec.h"
 #include "server/source/sim_loop.h"
@@ -206,6 +207,28 @@ class Loop {
   Error error_;
   std::unique_ptr<SimLoop> loop_;
 };
+
+// What a step takes is a hundredth of the time there is in the one scene, and many times as much in the
+// other.
+TEST(SimLoopQuality, AutoIsFullWhereStepsAreQuickAndElseFast) {
+  const auto running = [](const std::vector<std::string>& overrides, bool is_lockstep) {
+    SimLoopConfig config;
+    config.scene = with_overrides(test::small_scene(400, 16), overrides).value();
+    config.is_lockstep = is_lockstep;
+    const Loop loop(std::move(config));
+    EXPECT_TRUE(loop) << loop.trouble();
+    return loop ? loop->scene() : SceneDesc();
+  };
+  const SceneDesc quick = running({"quality=auto", "step_rate_hz=10"}, false);
+  EXPECT_EQ(quick.solver.name, "direct_rod");
+  EXPECT_TRUE(quick.volume.air.acts);
+  const std::vector<std::string> slow = {"quality=auto", "step_rate_hz=1000", "substeps=64"};
+  const SceneDesc lowered = running(slow, false);
+  EXPECT_EQ(lowered.solver.name, "dftl");
+  EXPECT_FALSE(lowered.volume.acts());
+  EXPECT_EQ(lowered.quality, kAutoQuality);
+  EXPECT_EQ(running(slow, true).solver.name, "direct_rod") << "simulated time waits: nothing is measured";
+}
 
 TEST(SimLoopJobs, AFloodOfChangesOfTheStreamIsPublishedTwiceASecondAndTheLastOneCounts) {
   SimLoopConfig config;

@@ -34,6 +34,7 @@ inline SceneDesc stepped_scene(uint32_t strand_count, uint32_t vertex_count, std
   auto& groom = std::get<ProceduralGroomDesc>(scene.groom);
   groom.strand_count = strand_count;
   groom.vertex_count = vertex_count;
+  scene.solver.parameters["sag_free"] = 0.3;  // hair that hangs
   if (scene.solver.name != solver) scene.solver = {std::move(solver), {}};
   return scene;
 }

@@ -51,7 +51,8 @@ TEST(DeployScenes, EveryFileParsesAndHasAName) {
 }
 
 TEST(DeployScenes, DefaultIsTheBuiltInScene) {
-  EXPECT_EQ(loaded("default"), built_in_scene());
+  EXPECT_EQ(loaded("default"), built_in_scene_with({"quality=auto"}).value());
+  EXPECT_EQ(loaded("default", {"quality=fast"}).solver, built_in_scene().solver);
 }
 
 TEST(DeployScenes, MinimalNeedsNothing) {

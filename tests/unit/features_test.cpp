@@ -54,12 +54,23 @@ TEST(Features, EachFactFollowsItsOwnCause) {
   EXPECT_FALSE(analyse(scene, {}).has_volume);
   scene.volume.friction_per_s = 1.0;
   EXPECT_TRUE(analyse(scene, {}).has_volume);
-  scene.volume = {.repulsion_per_s2 = 1.0};
+  scene.volume = {};
+  scene.volume.repulsion_per_s2 = 1.0;
   EXPECT_TRUE(analyse(scene, {}).has_volume);
-  scene.volume = {.target_per_s2 = 1.0};
+  scene.volume = {};
+  scene.volume.target_per_s2 = 1.0;
   EXPECT_TRUE(analyse(scene, {}).has_volume);
-  scene.volume = {.wind_width_m = 1e-3};
+  scene.volume = {};
+  scene.volume.wind_width_m = 1e-3;
   EXPECT_TRUE(analyse(scene, {}).has_volume);
+  scene.volume = {};
+  scene.volume.air.acts = true;
+  EXPECT_TRUE(analyse(scene, {}).has_volume);
+  scene.wind.along_share = 0.5f;
+  EXPECT_FALSE(analyse(scene, {}).has_oriented_drag) << "air goes by the direction itself";
+  scene.volume = {};
+  EXPECT_TRUE(analyse(scene, {}).has_oriented_drag);
+  scene.wind.along_share = 1.0f;
 
   EXPECT_TRUE(analyse(scene, {.strand_viewers = 1}).has_strand_viewers);
   EXPECT_FALSE(analyse(scene, {.strand_viewers = 1}).has_frame_viewers);

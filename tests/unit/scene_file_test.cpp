@@ -129,7 +129,8 @@ SceneDesc unusual_scene() {
               .smoothing = 2,
               .interval = 3,
               .integration = "explicit",
-              .scatter = "atomics"};
+              .scatter = "atomics",
+              .air = {.acts = true, .hairs = 80'000.0, .lock_width_m = 0.03}};
   s.wind.along_share = 0.25f;
   s.target_groom = ProceduralGroomDesc{.strand_count = 23, .vertex_count = 5, .length_m = 0.12f};
   s.detail = {.mode = "auto",
@@ -180,7 +181,8 @@ SceneDesc unusual_scene() {
 TEST(SceneFile, EmptyTextIsTheDefaultScene) {
   const auto scene = parse_scene("", "s", {});
   ASSERT_TRUE(scene) << scene.error().to_string();
-  EXPECT_EQ(*scene, SceneDesc{});
+  EXPECT_EQ(*scene, with_overrides(SceneDesc{}, {"quality=auto"}).value())
+      << "who says nothing leaves it to the machine";
 }
 
 TEST(SceneFile, TextRoundTripsExactly) {
@@ -208,7 +210,7 @@ TEST(SceneFile, OneLineAndALookAloneReadBackToo) {
 
   const auto part = parse_scene(to_text(unusual_scene().look, unusual_scene().camera), "s", {});
   ASSERT_TRUE(part) << part.error().to_string();
-  SceneDesc expected;
+  SceneDesc expected = with_overrides(SceneDesc{}, {"quality=auto"}).value();
   expected.look = unusual_scene().look;
   expected.camera = unusual_scene().camera;
   EXPECT_EQ(*part, expected) << "all else keeps its default";
@@ -454,7 +456,6 @@ TEST(SceneFile, BuiltInSceneIsValidAndTakesOverrides) {
 
 // What the grown hair lets sag says nothing of a groom from a file: that one keeps its style, unless told.
 TEST(SceneFile, AGroomFromAFileKeepsItsStyle) {
-  ASSERT_LT(built_in_scene().solver.parameters.at("sag_free"), 1.0);
   const auto file = built_in_scene_with({"groom.file.path=hair.tfx"});
   ASSERT_TRUE(file) << file.error().to_string();
   EXPECT_EQ(file->solver.parameters.at("sag_free"), 1.0);
@@ -472,6 +473,63 @@ TEST(SceneFile, AGroomFromAFileKeepsItsStyle) {
   const auto stated = parse_scene(text, "scene", {"groom.file.path=b.tfx"});
   ASSERT_TRUE(stated) << stated.error().to_string();
   EXPECT_EQ(stated->solver.parameters.at("sag_free"), 0.2);
+}
+
+bool is_full(const SceneDesc& scene) {
+  return scene.solver.name == "direct_rod" && scene.solver.parameters.at("sag_free") == 1.0 &&
+         scene.volume.friction_per_s > 0.0 && scene.volume.repulsion_per_s2 > 0.0 && scene.volume.air.acts &&
+         scene.head.collider == kFieldCollider;
+}
+bool is_fast(const SceneDesc& scene) {
+  return scene.solver.name == "dftl" && !scene.volume.acts() && scene.head.collider == kSphereCollider;
+}
+
+// Who says nothing of the simulation leaves it to the machine; who says something gets just that.
+TEST(SceneFile, AQualityStandsForSolverVolumeAirAndCollider) {
+  const auto parsed = [](const std::string& text, const std::vector<std::string>& overrides = {}) {
+    const auto scene = parse_scene(text, "scene", overrides);
+    EXPECT_TRUE(scene) << scene.error().to_string();
+    return scene.value();
+  };
+  EXPECT_EQ(parsed("name: 'a'").quality, kAutoQuality);
+  EXPECT_TRUE(is_full(parsed("name: 'a'")));
+  EXPECT_TRUE(is_full(parsed("quality: 'full' solver { name: 'pbd' } volume { interval: 7 }")));
+  EXPECT_TRUE(is_fast(parsed("quality: 'fast' solver { name: 'pbd' } air { acts: true }")));
+  EXPECT_EQ(parsed("solver { name: 'pbd' }").quality, kCustomQuality);
+  EXPECT_EQ(parsed("solver { name: 'pbd' }").solver.name, "pbd");
+  EXPECT_TRUE(is_fast(parsed("name: 'a'", {"quality=fast"})));
+  EXPECT_THAT(parse_scene("quality: 'best'", "scene", {}).error().to_string(),
+              HasSubstr("known: auto, fast"));
+  // Beside a quality an override changes its field alone, and the scene is one's own.
+  const SceneDesc more = parsed("name: 'a'", {"volume.friction_per_s=40"});
+  EXPECT_TRUE(is_full(more));
+  EXPECT_EQ(more.volume.friction_per_s, 40.0);
+  EXPECT_EQ(more.quality, kCustomQuality);
+  EXPECT_EQ(parse_scene(to_text(more), "again", {}).value(), more);
+  // A model that is chosen by hand brings nothing, but for the rod.
+  EXPECT_TRUE(!parsed("name: 'a'", {"solver.name=pbd"}).volume.acts());
+  for (const SceneDesc& by_hand :
+       {parsed("solver { name: 'direct_rod' }"), parsed("name: 'a'", {"solver.name=direct_rod"}),
+        with_overrides(built_in_scene(), {"solver.name=direct_rod"}).value()}) {
+    EXPECT_TRUE(by_hand.volume.has_contact() && by_hand.volume.air.acts);
+    EXPECT_EQ(by_hand.quality, kCustomQuality);
+  }
+  EXPECT_FALSE(parsed("solver { name: 'direct_rod' } volume { interval: 2 }").volume.acts())
+      << "told otherwise";
+}
+
+// A running scene changes by one assignment at a time, to what that stands for.
+TEST(SceneFile, AQualityIsTakenWhenItIsSet) {
+  SceneDesc scene = built_in_scene();
+  scene = with_overrides(scene, {"quality=full"}).value();
+  EXPECT_TRUE(is_full(scene));
+  scene = with_overrides(scene, {"volume.friction_per_s=40"}).value();
+  EXPECT_EQ(scene.quality, kCustomQuality);
+  scene = with_overrides(scene, {"gravity_mps2.y=-3"}).value();
+  EXPECT_EQ(scene.volume.friction_per_s, 40.0) << "nothing else changes it back";
+  scene = with_overrides(scene, {"quality=fast"}).value();
+  EXPECT_TRUE(is_fast(scene));
+  EXPECT_EQ(scene.gravity_mps2.y, -3.0);
 }
 
 TEST(SceneFile, AFurtherHeadIsAsTheSceneWhereItSaysNothing) {

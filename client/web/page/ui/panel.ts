@@ -94,6 +94,7 @@ export class Panel {
   private readonly colors = new Map<string, HTMLButtonElement>();
   private readonly note = element('p', '', 'note');
   private readonly simulation = element('div');
+  private readonly qualities = new Map<string, HTMLButtonElement>(); // by name
   private readonly solver = element('div');
   private solverKeys = '';
   isOpen = false;
@@ -117,11 +118,25 @@ export class Panel {
     }
     place.append(header, this.note, swatches);
     for (const section of lookSections) place.append(this.section(section, section.title === 'Colour'));
+    this.simulation.append(this.qualityRow());
     for (const section of simulationSections) this.simulation.append(this.section(section, false));
     const own = element('details');
     own.append(element('summary', 'Strand model'), this.solver);
     this.simulation.append(own);
     place.append(this.simulation);
+  }
+  /** How much the server simulates; none is pressed where the scene has a quality of its own. */
+  private qualityRow(): HTMLElement {
+    const row = element('div', '', 'swatches');
+    row.setAttribute('role', 'group');
+    row.setAttribute('aria-label', 'Quality of the simulation');
+    for (const [name, title] of [['auto', 'auto'], ['full', 'full quality'], ['fast', 'fast']] as const) {
+      const button = element('button', title);
+      button.addEventListener('click', () => this.actions.set('quality', name));
+      this.qualities.set(name, button);
+      row.append(button);
+    }
+    return row;
   }
   private section(section: Section, isOpen: boolean): HTMLElement {
     const details = element('details');
@@ -159,6 +174,8 @@ export class Panel {
     const numbers = readScene(text);
     for (const section of simulationSections)
       for (const field of section.fields) this.sliders.get(field.path)!.show(numbers.get(field.path));
+    const quality = /(?:^|\s)quality: "(\w+)"/.exec(text)?.[1];
+    for (const [name, button] of this.qualities) button.setAttribute('aria-pressed', String(name === quality));
     this.showSolver(solverParameters(text));
   }
   /** Parameters whose ranges only the server knows: it refuses what does not fit, and says why. */
