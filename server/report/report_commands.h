@@ -33,6 +33,7 @@ using ReportAction = std::function<Status()>;
 using AddReportCommand = void (*)(CLI::App& app, ReportAction& action);
 
 void add_work_precision_command(CLI::App& app, ReportAction& action);
+void add_coherence_command(CLI::App& app, ReportAction& action);
 void add_collisions_command(CLI::App& app, ReportAction& action);
 void add_pruning_command(CLI::App& app, ReportAction& action);
 void add_recommend_command(CLI::App& app, ReportAction& action);

@@ -1,0 +1,92 @@
+// The measurements of strandcast-report coherence: one shake of the head for every strand model with a
+// kernel, alone and with what hair does to hair and air to hair, and how much of it moves as one.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/base/picture_size.h"
+#include "common/pictures/image_codec.h"
+#include "common/scene/scene_desc.h"
+#include "server/report/coherence.h"
+#include "server/report/hair_reality.h"
+#include "server/sim/executor/executor.h"
+
+namespace strandcast {
+
+/// The head says no: 55 degrees to either side, 2.2 times a second.
+inline constexpr double kShakeYawDeg = 55.0;
+inline constexpr double kShakeHz = 2.2;
+
+/// A model as it is run.
+struct CoherenceRow {
+  std::string name;
+  std::string solver;
+  HairCompany company;
+  double step_rate_hz = 60.0;
+  bool is_main = false;  // it has pictures and a line in plots
+};
+/// Every model with a kernel alone, then `direct_rod` in all company; `is_whole`: also every model in all the
+/// company that it bears, and other step rates.
+std::vector<CoherenceRow> coherence_rows(bool is_whole);
+
+struct CoherenceStudyDesc {
+  SceneDesc scene;  // hair, head and look; wind, solver and volume are those of a row
+  std::vector<CoherenceRow> rows = coherence_rows(true);
+  double shake_s = 4.0;
+  double settle_s = 2.0;  // first part of the shake, which is not measured
+  double hold_s = 9.0;    // after the shake
+  double look_s = 0.5;    // last part of that: hair at rest
+  uint32_t moments = 20;  // of the shake, evenly spaced, that are measured
+  bool has_pictures = true;
+  RenderSize picture_size{320, 320};
+  HairRealityDesc reality;
+};
+
+/// Share of one moment.
+struct CoherenceMoment {
+  double time_s = 0.0;
+  double incoherent_share = 0.0;
+};
+
+struct CoherenceOutcome {
+  CoherenceRow row;
+  uint32_t substeps = 1;
+  Coherence coherence;
+  std::vector<CoherenceMoment> moments;
+  double fastest_over_scalp = 0.0;  // fastest vertex over the fastest root, world
+  double rest_rms_m = 0.0;          // off the groom
+  double rest_speed_mps = 0.0;      // root mean square
+  double step_cpu_ms = 0.0;         // mean over all steps
+};
+
+struct CoherenceStudy {
+  uint32_t strand_count = 0;
+  uint32_t vertex_count = 0;
+  std::string device;
+  std::vector<CoherenceOutcome> outcomes;
+  Image sheet;                          // a line of pictures for each main row; empty without pictures
+  std::vector<std::string> sheet_rows;  // from above
+  std::vector<double> sheet_times_s;    // from the left
+  HairReality reality;
+};
+
+/// Rotation of the head in a shake of so long, which sets in and ends within a quarter of a second.
+Pose yawed_head(double time_s, double shake_s);
+
+/// The scene of a row: that solver, without wind, with all of the groom's weight carried by its shape where
+/// the model knows it, and enough substeps for its stable range.
+Result<SceneDesc> scene_of_row(const CoherenceRow& row, const SceneDesc& scene);
+
+/// One row. BadInput where the scene or the model does not bear it.
+Result<CoherenceOutcome> measure_row(const CoherenceStudyDesc& desc, const CoherenceRow& row,
+                                     Executor& executor);
+
+/// Says what it is at, once per part.
+using CoherenceProgress = std::function<void(const std::string&)>;
+
+Result<CoherenceStudy> run_coherence_study(const CoherenceStudyDesc& desc, Executor& executor,
+                                           const CoherenceProgress& progress);
+
+}  // namespace strandcast

@@ -1,0 +1,83 @@
+// What hair in air does, held against what is known of it: how far hairs and locks lean in a steady wind, how
+// much air a bundle carries along, and how a ponytail sways over a head that goes up and down.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "server/report/hanging_hair.h"
+#include "server/report/ponytail.h"
+#include "server/sim/executor/executor.h"
+
+namespace strandcast {
+
+struct HairRealityDesc {
+  std::vector<double> winds_mps = {0.2, 0.5, 1.0};
+  std::vector<double> step_rates_hz = {60.0, 240.0, 960.0};  // of a single hair in the wind
+  uint32_t lock_strands = 400;
+  double lock_hairs = 40'000.0;
+  std::vector<double> hairs_per_cm2 = {1.0, 3.0, 10.0, 30.0, 100.0, 300.0};
+  double bundle_wind_mps = 1.0;
+  PonytailDesc ponytails;
+};
+
+/// A limp hair in a steady wind; angles from straight down.
+struct WindLean {
+  double wind_mps = 0.0;
+  double step_rate_hz = 0.0;
+  double ours_rad = 0.0;
+  double law_rad = 0.0;       // of the law that strands are dragged by
+  double cylinder_rad = 0.0;  // of the published drag of a cylinder, by the flow across it alone
+};
+
+/// A limp lock of many hairs in a steady wind.
+struct LockLean {
+  double wind_mps = 0.0;
+  double ours_rad = 0.0;
+  double single_rad = 0.0;  // of one of its hairs alone, by the law
+  double solid_rad = 0.0;   // of a solid cylinder as wide and as heavy
+};
+
+/// Share of the air in a bundle that moves with it.
+struct BundleAir {
+  double hairs_per_cm2 = 0.0;
+  double ours = 0.0;
+  double screen = 0.0;      // air is blown through: Taylor's porous plate
+  double viscous = 0.0;     // air seeps in: Brinkman's layer
+  double drag_share = 0.0;  // drag of one hair in it over that of a lone one, by ours
+};
+
+struct HairReality {
+  std::vector<WindLean> hairs;
+  std::vector<LockLean> locks;
+  std::vector<BundleAir> bundles;
+  std::vector<Ponytail> ponytails;
+};
+
+/// Says what it is at, once per part.
+using RealityProgress = std::function<void(const std::string&)>;
+
+Result<HairReality> measure_reality(const HairRealityDesc& desc, Executor& executor,
+                                    const RealityProgress& progress);
+
+/// Lean of a limp string in a steady horizontal wind, by the law of common/kernels/volume/hair_in_air.h: drag
+/// and weight balance across it, and all along it alike, so it is straight. tan(lean) = rate x wind / g.
+double lawful_lean_rad(double wind_mps, double gravity_mps2);
+/// Likewise by the drag of a cylinder as published, of the flow across it alone (independence principle).
+double cylinder_lean_rad(double wind_mps, double gravity_mps2);
+
+/// Strands that hang limp in a steady wind, and how many hairs they stand for.
+struct HangingHair {
+  Groom groom;
+  double hairs = 1.0;
+  double wind_mps = 0.0;  // along x
+  double step_rate_hz = 240.0;
+  uint32_t volume_cells = 32;
+  HairCompany company{.has_air = true};
+};
+/// Mean angle, from straight down to where the wind goes, of the ways from the roots to the tips after they
+/// have settled.
+Result<double> lean_rad(const HangingHair& hair, Executor& executor);
+
+}  // namespace strandcast
