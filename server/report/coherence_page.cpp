@@ -75,10 +75,10 @@ void add_shake(HtmlPage& page, const CoherenceStudy& study) {
               "Motion against the neighbours, of all motion: less is more of a whole.");
   page.table(coherence_table(study));
   page.paragraph(
-      "Contact is friction and repulsion between strands; full is contact and air. Fastest over scalp is the "
-      "fastest vertex over the fastest root: hair that is thrown about is many times as fast as the skin. "
-      "Off the groom and at rest say how the hair lies some seconds after the shake: it has to come back, "
-      "and to stand still.");
+      "A model whose hair hardly moves has a large share of little. Contact is friction and repulsion "
+      "between strands; full is contact and air. Fastest over scalp is the fastest vertex over the fastest "
+      "root: hair that is thrown about is many times as fast as the skin. Off the groom and at rest say how "
+      "the hair lies some seconds after the shake: it has to come back, and to stand still.");
   page.figure(coherence_cost_plot(study),
               "Motion against the neighbours against what a step takes. Down and to the left is better.");
   page.figure(coherence_time_plot(study), "Motion against the neighbours over the time of the shake.");

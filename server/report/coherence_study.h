@@ -1,5 +1,5 @@
 // The measurements of strandcast-report coherence: one shake of the head for every strand model with a
-// kernel, alone and with what hair does to hair and air to hair, and how much of it moves as one.
+// kernel. Each runs alone and with what hair and air do to hair; measured is how much of it moves as one.
 #pragma once
 
 #include <functional>
@@ -75,8 +75,8 @@ struct CoherenceStudy {
 /// Rotation of the head in a shake of so long, which sets in and ends within a quarter of a second.
 Pose yawed_head(double time_s, double shake_s);
 
-/// The scene of a row: that solver, without wind, with all of the groom's weight carried by its shape where
-/// the model knows it, and enough substeps for its stable range.
+/// The scene of a row: that solver, without wind, with enough substeps for its stable range. Where the model
+/// knows it, the groom's shape carries all of its weight.
 Result<SceneDesc> scene_of_row(const CoherenceRow& row, const SceneDesc& scene);
 
 /// One row. BadInput where the scene or the model does not bear it.

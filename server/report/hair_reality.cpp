@@ -41,7 +41,7 @@ double root_of(const Function& function, double low, double high) {
 // ---- bundles ----
 
 /// Taylor 1944, "Air resistance of a flat plate of very porous material": air goes through at u / (1 + k /
-/// 4), k = the pressure it loses there over (density x speed^2 / 2), here with the hairs' drag at that speed.
+/// 4). Its k is the pressure lost there over (density x speed^2 / 2); here by the hairs' drag at that speed.
 double screen_carried(const AirDesc& air, double hairs_per_m2, double wind_mps) {
   const double through_mps = root_of(
       [&](double speed_mps) {
@@ -52,8 +52,8 @@ double screen_carried(const AirDesc& air, double hairs_per_m2, double wind_mps) 
   return 1.0 - through_mps / wind_mps;
 }
 
-/// Brinkman 1949: in a layer as wide as a lock, between air that moves at its faces, the way that momentum
-/// seeps in is sqrt(viscosity / drag per volume and speed); mean of 1 - cosh(y / way) / cosh(half / way).
+/// Brinkman 1949: a layer as wide as a lock, with moving air at its faces. Momentum seeps in by the way
+/// sqrt(viscosity / drag per volume and speed); mean of 1 - cosh(y / way) / cosh(half / way).
 double viscous_carried(const AirDesc& air, double hairs_per_m2, double wind_mps) {
   const double drag_per_speed = kAirDensityKgpm3 * wind_mps * stopping_width_m(air, wind_mps);
   const double way_m = std::sqrt(kAirDensityKgpm3 * kAirViscosityM2ps / (hairs_per_m2 * drag_per_speed));

@@ -1,5 +1,5 @@
-// What hair in air does, held against what is known of it: how far hairs and locks lean in a steady wind, how
-// much air a bundle carries along, and how a ponytail sways over a head that goes up and down.
+// What hair in air does, held against what is known of it: hairs and locks that lean in a steady wind, the
+// air that a bundle carries along, and a ponytail that sways over a head that goes up and down.
 #pragma once
 
 #include <functional>
@@ -61,8 +61,8 @@ using RealityProgress = std::function<void(const std::string&)>;
 Result<HairReality> measure_reality(const HairRealityDesc& desc, Executor& executor,
                                     const RealityProgress& progress);
 
-/// Lean of a limp string in a steady horizontal wind, by the law of common/kernels/volume/hair_in_air.h: drag
-/// and weight balance across it, and all along it alike, so it is straight. tan(lean) = rate x wind / g.
+/// Lean of a limp string in a steady horizontal wind, by the law of common/kernels/volume/hair_in_air.h. Drag
+/// and weight balance across it, all along it alike, so it is straight: tan(lean) = rate x wind / g.
 double lawful_lean_rad(double wind_mps, double gravity_mps2);
 /// Likewise by the drag of a cylinder as published, of the flow across it alone (independence principle).
 double cylinder_lean_rad(double wind_mps, double gravity_mps2);

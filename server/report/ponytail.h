@@ -34,9 +34,9 @@ struct Ponytail {
   std::vector<PonytailSway> rows;
 };
 
-/// Growth per second of q'' + 2 decay q' + frequency^2 (1 + modulation cos(head t)) q = 0 (Mathieu): the
-/// logarithm of the largest Floquet multiplier over the period. Each sway of a hanging string under a head
-/// that goes up and down obeys it (Keller 2010), since gravity and the head's acceleration act alike.
+/// Growth per second of q'' + 2 decay q' + frequency^2 (1 + modulation cos(head t)) q = 0 (Mathieu). It is
+/// the logarithm of the largest Floquet multiplier over the period. A hanging string's sway obeys it under a
+/// head that goes up and down (Keller 2010): gravity and the head's acceleration act alike.
 struct MathieuSway {
   double frequency_radps = 0.0;
   double decay_per_s = 0.0;

@@ -55,8 +55,8 @@ TEST(Coherence, ABlockThatIsCarriedMovesAsOne) {
   EXPECT_EQ(found.vertex_count, 12u * block.strand_count);
 }
 
-// Neighbours lie on one side of a vertex at the block's faces alone, by at most 3/8 of their reach: (5.6 mm /
-// 0.1 m)^2 of the energy there.
+// Neighbours lie on one side of a vertex at the block's faces alone, by at most 3/8 of their reach. That is
+// (5.6 mm / 0.1 m)^2 of the energy there.
 TEST(Coherence, ABlockThatTurnsMovesAsOneButForItsFaces) {
   Block block(40, 0.005);
   spin(block, {0.0, 3.0, 0.0});
