@@ -5,6 +5,7 @@
 
 #include "client/app/recording_commands.h"
 #include "client/app/script_command.h"
+#include "client/app/step_command.h"
 
 namespace strandcast {
 namespace {
@@ -93,7 +94,7 @@ void declare_monitor(CLI::App& app, CtlCommandLine& line) {
 
 void declare_step(CLI::App& app, CtlCommandLine& line) {
   app.add_option("count", line.step_count,
-                 "So many steps; the answer comes when they are done (default: one, answered at once)")
+                 "So many steps, however long they take (default: one, answered at once)")
       ->check(CLI::Range(1u, kMaxStepCount));
 }
 
@@ -186,7 +187,12 @@ int start_test(const Line& line, const Stop& stop) {
 
 template <Command kCommand>
 int control(const Line& line, const Stop&) {
-  return run_command(line.target, ControlCommand{kCommand, line.step_count});
+  return run_command(line.target, ControlCommand{kCommand});
+}
+
+int start_step(const Line& line, const Stop& stop) {
+  if (line.step_count == 0) return run_command(line.target, ControlCommand{Command::StepOnce});
+  return run_step(line.target, line.step_count, stop);
 }
 
 template <LiveAction kAction>
@@ -211,7 +217,7 @@ constexpr CtlCommand kCommands[] = {
      [](const Line& line, const Stop& stop) { return run_monitor(line.target, line.monitor_s, stop); }},
     {"pause", "Halt the simulation", nullptr, control<Command::Pause>},
     {"resume", "Let the simulation run", nullptr, control<Command::Resume>},
-    {"step", "Simulation steps while paused, or in lockstep", declare_step, control<Command::StepOnce>},
+    {"step", "Simulation steps while paused, or in lockstep", declare_step, start_step},
     {"reset", "Set every strand to rest", nullptr, control<Command::Reset>},
     {"set", "Change a scene parameter", declare_set,
      [](const Line& line, const Stop&) { return run_command(line.target, SetParameter{line.assignment}); }},
