@@ -60,7 +60,7 @@ Result<std::unique_ptr<ViewerClient>> connect(const CtlTarget& target, Role role
 
 // ---- feed ----
 
-/// t wrapped into the duration when looped; clips clamp by themselves.
+/// t wrapped into the duration when looped; a series clamps by itself.
 double wrapped(double t_s, double duration_s, bool is_looped) {
   return is_looped && duration_s > 0.0 ? std::fmod(t_s, duration_s) : t_s;
 }
@@ -68,24 +68,27 @@ double wrapped(double t_s, double duration_s, bool is_looped) {
 Status add_motion(const FeedOptions& options, FeedPlan& plan, double& length_s) {
   if (options.motion == "none") return {};
   if (options.motion == "builtin") {
-    plan.motion = built_in_motion;
+    plan.motion = [blend_s = options.blend_s](double t_s) {
+      return built_in_motion(time_from_rest_s(t_s, blend_s));
+    };
     return {};
   }
   MotionFileOptions file = options.motion_file;
   file.has_body = true;
   ASSIGN_OR_RETURN(MotionFile loaded, load_motion_file(options.motion, file));
   for (const std::string& note : loaded.notes) std::cerr << note << '\n';
-  auto clip = std::make_shared<const MotionClip>(std::move(loaded.clip));
-  length_s = clip->duration_s();
-  plan.motion = [clip, is_looped = options.is_looped](double t_s) {
-    return clip->sample(wrapped(t_s, clip->duration_s(), is_looped));
-  };
-  if (clip->joint_name.empty()) return {};
-  std::cerr << fmt::format("{}: joints of the body: {}\n", options.motion, fmt::join(clip->joint_name, ", "));
-  plan.joint_names = clip->joint_name;
-  plan.joints = [clip, is_looped = options.is_looped](double t_s) {
-    return clip->sample_joints(wrapped(t_s, clip->duration_s(), is_looped));
-  };
+  const auto path = std::make_shared<const ClipPath>(std::move(loaded.clip),
+                                                     ClipPathOptions{options.is_looped, options.blend_s});
+  length_s = path->duration_s();
+  if (path->way_back_s() > 0.0)
+    std::cerr << fmt::format("{}: the way back to its start takes {:.2f} s\n", options.motion,
+                             path->way_back_s());
+  plan.motion = [path](double t_s) { return path->sample(t_s); };
+  const std::vector<std::string>& joints = path->clip().joint_name;
+  if (joints.empty()) return {};
+  std::cerr << fmt::format("{}: joints of the body: {}\n", options.motion, fmt::join(joints, ", "));
+  plan.joint_names = joints;
+  plan.joints = [path](double t_s) { return path->sample_joints(t_s); };
   return {};
 }
 

@@ -10,6 +10,7 @@
 
 #include "client/app/feed.h"
 #include "common/client/viewer_client.h"
+#include "common/motion/clip_path.h"
 #include "common/motion/motion_file.h"
 #include "common/wire/messages.h"
 
@@ -38,7 +39,8 @@ struct FeedOptions {
   std::string wind = "gusts";      // "gusts", "none" or a CSV file
   MotionFileOptions motion_file;   // how to read a BVH file
   bool is_looped = false;
-  bool is_live = false;  // does not wait for a slow simulation
+  double blend_s = kClipBlendS;  // in which a motion sets in; 0: at once, and a loop jumps from end to start
+  bool is_live = false;          // does not wait for a slow simulation
   double speed = 1.0;
   double seconds = 0.0;  // 0 = the length of the motion, or without end when looped or built in
   double rate_hz = 120.0;

@@ -31,7 +31,10 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
                  "Joints of the BVH file to send besides neck, chest, shoulders and elbows, by their names");
   app.add_flag("--filter-glitches", feed.motion_file.is_filtering_glitches,
                "Take steps out of the BVH file that are faster than any head moves");
-  app.add_flag("--loop", feed.is_looped, "Start over at the end of the files");
+  app.add_flag("--keep-first-frames", feed.motion_file.is_keeping_first_frames,
+               "Keep frames of the BVH file that the head jumps from, as from a T-pose before the motion");
+  app.add_flag("--loop", feed.is_looped,
+               "Start over at the end of the files; the head is led back to where the motion begins");
   app.add_flag(
       "--live", feed.is_live,
       "Go on in real time when the simulation is slower, as a stage does (default: as slowly as it)");

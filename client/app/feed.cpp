@@ -12,8 +12,8 @@ namespace strandcast {
 namespace {
 
 using std::chrono::milliseconds;
-constexpr int64_t kSkipBehindNs =
-    kSInNs / 4;                            // further behind than this: go on from now, do not send a burst
+// Further behind than this: go on from now. A burst would not reach the head, or move it too fast.
+constexpr int64_t kSkipBehindNs = kSInNs / 20;
 constexpr milliseconds kLongestSleep{50};  // so that a stop is noticed
 constexpr milliseconds kFlushWait{250};    // less than a stop is given
 

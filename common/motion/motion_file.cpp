@@ -1,5 +1,6 @@
 #include "common/motion/motion_file.h"
 
+#include "common/base/units.h"
 #include "common/motion/motion_glitches.h"
 
 namespace strandcast {
@@ -14,6 +15,12 @@ std::string glitch_note(const MotionGlitches& glitches) {
       glitches.first_s, glitches.fastest_mps, glitches.fastest_deg_per_s);
 }
 
+/// A clip begins above the origin, as load_bvh() leaves it.
+void recentre(MotionClip& clip) {
+  const glm::dvec3 start_m = clip.world_from_head.front().position_m * glm::dvec3(1, 0, 1);
+  for (Pose& pose : clip.world_from_head) pose.position_m -= start_m;
+}
+
 }  // namespace
 
 Result<MotionFile> load_motion_file(const std::filesystem::path& path, const MotionFileOptions& options) {
@@ -25,6 +32,7 @@ Result<MotionFile> load_motion_file(const std::filesystem::path& path, const Mot
   bvh.head_joint = options.joint;
   bvh.has_body = options.has_body;
   bvh.body_joints = options.body_joints;
+  bvh.skip_first_frame_if_t_pose = false;  // judged below, with all other first frames
   MotionFile file;
   ASSIGN_OR_RETURN(file.clip, load_bvh(path, bvh));
   const auto note = [&](const std::string& sentence) {
@@ -32,6 +40,15 @@ Result<MotionFile> load_motion_file(const std::filesystem::path& path, const Mot
   };
   if (!file.clip.up_reason.empty()) note(file.clip.up_reason + " (--up states another)");
   if (!file.clip.unit_reason.empty()) note(file.clip.unit_reason + " (--unit states another)");
+  const FirstFrames first = find_first_frames(file.clip);
+  if (first.count > 0 && !options.is_keeping_first_frames) {
+    leave_out_first_frames(file.clip, first.count);
+    recentre(file.clip);
+    note(fmt::format(
+        "{} of its frames left out at the beginning: the head jumps from there by up to {:.0f} mm and "
+        "{:.1f} degrees in a frame, as it does not afterwards (--keep-first-frames keeps them)",
+        first.count, kMmPerM * first.jump_m, first.jump_deg));
+  }
   const MotionGlitches glitches = find_glitches(file.clip);
   if (glitches.step_count == 0) return file;
   if (options.is_filtering_glitches)

@@ -19,6 +19,7 @@ struct MotionFileOptions {
   bool has_body = false;                      // joints of the body too, as far as their names are known
   std::vector<std::string> body_joints = {};  // --body-joint: these besides
   bool is_filtering_glitches = false;         // --filter-glitches
+  bool is_keeping_first_frames = false;       // --keep-first-frames
 };
 
 struct MotionFile {

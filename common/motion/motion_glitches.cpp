@@ -1,6 +1,10 @@
 #include "common/motion/motion_glitches.h"
 
 #include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "common/base/quantile.h"
 
 namespace strandcast {
 namespace {
@@ -50,6 +54,43 @@ uint32_t filter_glitches(MotionClip& clip) {
   }
   for (size_t k = good + 1; k < poses.size(); ++k, ++replaced) poses[k] = poses[good];
   return replaced;
+}
+
+FirstFrames find_first_frames(const MotionClip& clip) {
+  constexpr size_t kFewestAfter = 4;
+  const std::vector<Pose>& poses = clip.world_from_head;
+  const auto frames_in = [&](double time_s) {
+    return static_cast<size_t>(std::lround(time_s / clip.frame_s));
+  };
+  const size_t judged = std::max<size_t>(frames_in(kFirstFramesS), 1);
+  const size_t after = std::max(frames_in(kFirstFramesAfterS), kFewestAfter);
+  FirstFrames first;
+  if (poses.size() <= judged + after) return first;
+  const auto step = [&](size_t i) { return speed_of(poses[i], poses[i + 1], clip.frame_s); };
+  std::vector<double> mps, deg_per_s;
+  for (size_t i = judged; i < judged + after; ++i) {
+    mps.push_back(step(i).mps);
+    deg_per_s.push_back(step(i).deg_per_s);
+  }
+  const double most_mps = std::max(kFirstFramesMps, kFirstFramesRatio * median(std::move(mps)));
+  const double most_deg_per_s =
+      std::max(kFirstFramesDegPerS, kFirstFramesRatio * median(std::move(deg_per_s)));
+  for (size_t i = 0; i < judged; ++i) {
+    const HeadSpeed speed = step(i);
+    if (speed.mps <= most_mps && speed.deg_per_s <= most_deg_per_s) continue;
+    first.count = static_cast<uint32_t>(i + 1);
+    first.jump_m = std::max(first.jump_m, speed.mps * clip.frame_s);
+    first.jump_deg = std::max(first.jump_deg, speed.deg_per_s * clip.frame_s);
+  }
+  return first;
+}
+
+void leave_out_first_frames(MotionClip& clip, uint32_t count) {
+  const auto frames = static_cast<std::ptrdiff_t>(count);
+  clip.world_from_head.erase(clip.world_from_head.begin(), clip.world_from_head.begin() + frames);
+  if (clip.joint_m.empty()) return;
+  const auto joints = static_cast<std::ptrdiff_t>(clip.joint_name.size());
+  clip.joint_m.erase(clip.joint_m.begin(), clip.joint_m.begin() + frames * joints);
 }
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// Glitches of a motion capture: steps from one frame to the next that no head makes. Found, counted, and on
-// request taken out. Any thread.
+// Glitches of a motion capture: steps from one frame to the next that no head makes, and first frames that
+// are not of the motion. Found, counted, and taken out. Any thread.
 #pragma once
 
 #include <cstdint>
@@ -25,5 +25,25 @@ MotionGlitches find_glitches(const MotionClip& clip);
 /// the good frames around it; at the end the last good one stays. Returns how many frames were replaced;
 /// find_glitches() then finds none.
 uint32_t filter_glitches(MotionClip& clip);
+
+/// First frames are judged within this time, by what follows them for this long.
+inline constexpr double kFirstFramesS = 0.1, kFirstFramesAfterS = 0.25;
+/// A step out of them is so many times the median step of what follows, and at least as fast as this.
+inline constexpr double kFirstFramesRatio = 6.0;
+inline constexpr double kFirstFramesMps = 0.5;
+inline constexpr double kFirstFramesDegPerS = 90.0;
+
+/// Frames before a motion begins, as the T-pose that a capture was calibrated with.
+struct FirstFrames {
+  uint32_t count = 0;     // up to the last jump out of them
+  double jump_m = 0.0;    // the longest
+  double jump_deg = 0.0;  // the widest
+};
+
+/// Judges the first frames by the steps of the frames behind them; none in a clip that is too short for that.
+FirstFrames find_first_frames(const MotionClip& clip);
+
+/// Takes so many frames from the beginning of a clip that has more; its time begins with the next one.
+void leave_out_first_frames(MotionClip& clip, uint32_t count);
 
 }  // namespace strandcast

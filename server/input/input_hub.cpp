@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/base/units.h"
 
@@ -55,6 +56,13 @@ JointPlaces joints_of(const HeadSample& sample) {
   return joints;
 }
 
+/// A moving mean to which a gap counts as twice the usual; 0 before the first.
+void add_to_usual(double& usual_ns, int64_t newest_ns) {
+  constexpr double kShare = 0.125;
+  const auto newest = static_cast<double>(newest_ns);
+  usual_ns = usual_ns == 0.0 ? newest : usual_ns + kShare * (std::min(newest, 2.0 * usual_ns) - usual_ns);
+}
+
 /// A time that cannot overflow when the offset is taken from it.
 int64_t bounded(int64_t time_ns) {
   return std::clamp(time_ns, -kMaxSampleTimeNs, kMaxSampleTimeNs);
@@ -78,6 +86,27 @@ bool InputHub::take_allowance(Stream<Value>& stream, uint64_t source_id, int64_t
   return true;
 }
 
+/// What comes next follows nothing that came before.
+template <class Value>
+void InputHub::restart(Stream<Value>& stream) {
+  stream.clock = {};
+  stream.track.clear();
+  stream.is_cut = true;
+  stream.usual_spacing_ns = stream.usual_wait_ns = 0.0;
+}
+
+/// How far the newest sample is from the one before it.
+template <class Value>
+void InputHub::note_spacing(Stream<Value>& stream) {
+  constexpr int64_t kAtOnceNs = 2'000'000;
+  const auto& samples = stream.track.samples();
+  if (samples.size() < 2) return;
+  const auto &newest = samples.back(), &before = samples[samples.size() - 2];
+  add_to_usual(stream.usual_spacing_ns, newest.time_ns - before.time_ns);
+  if (newest.arrival_ns - before.arrival_ns > kAtOnceNs)
+    add_to_usual(stream.usual_wait_ns, newest.arrival_ns - before.arrival_ns);
+}
+
 template <class Value>
 void InputHub::accept(Stream<Value>& stream, uint64_t source_id, const TimedSample<Value>& sample,
                       int64_t stale_ns) {
@@ -87,8 +116,7 @@ void InputHub::accept(Stream<Value>& stream, uint64_t source_id, const TimedSamp
       return;
     }
     stream.owner = source_id;
-    stream.clock = {};
-    stream.track.clear();
+    restart(stream);
   }
   // A step of the source's clock: late samples would be refused for ever, or the mapping would be off by the
   // step.
@@ -97,8 +125,7 @@ void InputHub::accept(Stream<Value>& stream, uint64_t source_id, const TimedSamp
     const int64_t passed_ns = sample.arrival_ns - newest.arrival_ns;
     const int64_t stepped_ns = sample.time_ns - newest.time_ns;
     if (stepped_ns < -kClockJumpNs || stepped_ns > passed_ns + kClockJumpNs) {
-      stream.clock = {};
-      stream.track.clear();
+      restart(stream);
       ++counters_.clock_restarts;
     }
   }
@@ -112,6 +139,7 @@ void InputHub::accept(Stream<Value>& stream, uint64_t source_id, const TimedSamp
     case InsertOutcome::Accepted:
       break;
   }
+  note_spacing(stream);
   stream.clock.add(sample.time_ns, sample.arrival_ns);
   stream.accepted_ns = sample.arrival_ns;
   ++counters_.accepted;
@@ -224,10 +252,22 @@ bool InputHub::update_pose(int64_t server_time_ns) {
   // Both signs are the same rotation; consecutive frames keep to one so that their difference is small.
   if (glm::dot(pose.rotation, frame_.world_from_head.rotation) < 0.0) pose.rotation = -pose.rotation;
   frame_.world_from_head = pose;
+  has_jumped = has_caught_up(interpolates ? time_ns : samples[index].time_ns, server_time_ns) || has_jumped;
+  has_jumped = std::exchange(motion_.is_cut, false) || has_jumped;
   frame_.motion_time_ns = samples[newest].arrival_ns;
   note_used(samples[newest].arrival_ns, samples[newest].time_ns + motion_.clock.offset_ns());
   motion_.track.use(index, newest);
   return has_jumped;
+}
+
+/// True when the frame shows motion of a longer time than passed since the last one.
+bool InputHub::has_caught_up(int64_t shown_ns, int64_t server_time_ns) {
+  const std::optional<int64_t> before_ns = std::exchange(shown_ns_, shown_ns);
+  if (!before_ns || !last_frame_ns_) return false;
+  const double beyond_ns =
+      static_cast<double>(shown_ns - *before_ns) - static_cast<double>(server_time_ns - *last_frame_ns_);
+  const double usual_ns = std::max(motion_.usual_spacing_ns, motion_.usual_wait_ns);
+  return beyond_ns > std::max(static_cast<double>(kCatchUpNs), kCatchUpSpacings * usual_ns);
 }
 
 void InputHub::note_used(int64_t arrival_ns, int64_t made_ns) {

@@ -21,6 +21,11 @@
 //   name the same joints; never across a jump of the head.
 // * A jump beyond kTeleportSpeedMps or kTeleportTurnRadPerS between samples, or between frames, is carried
 //   out in one frame, flagged as a teleport and never interpolated.
+// * Two changes are teleports however short the way: to the first pose of another source, or of one whose
+// clock
+//   stepped; and to now, where a source falls silent and goes on. In the latter the frame shows more than
+//   kCatchUpNs beyond the time that passed, and more than kCatchUpSpacings of what is usual between its
+//   samples.
 #pragma once
 
 #include <cstdint>
@@ -49,6 +54,8 @@ inline constexpr double kTeleportSpeedMps = 50.0;
 inline constexpr double kTeleportTurnRadPerS = 100.0;
 inline constexpr double kTeleportShortestS = 1e-3;  // closer samples count as this far apart
 inline constexpr double kTeleportLongestS = 0.1;    // a pause between frames is not time to travel in
+inline constexpr int64_t kCatchUpNs = 40'000'000;  // of motion that is shown in one frame, beyond the frame's
+inline constexpr double kCatchUpSpacings = 3.0;
 inline constexpr double kMaxSampleRateHz = 1000.0;
 inline constexpr double kMaxSampleBurst = 1000.0;  // samples at once, after a second of silence
 inline constexpr size_t kMaxInputSources = 64;
@@ -115,7 +122,10 @@ class InputHub {
   template <class Value>
   struct Stream {
     std::optional<uint64_t> owner;
-    int64_t accepted_ns = 0;  // arrival of the newest accepted sample
+    int64_t accepted_ns = 0;        // arrival of the newest accepted sample
+    bool is_cut = false;            // what is shown next does not follow what was
+    double usual_spacing_ns = 0.0;  // between samples, by the source's clock; 0: not known
+    double usual_wait_ns = 0.0;     // between their arrivals, likewise; what comes at once counts once
     ClockMap clock;
     SampleTrack<Value> track;
     std::map<uint64_t, Allowance> allowances;  // by source
@@ -127,7 +137,12 @@ class InputHub {
   bool take_allowance(Stream<Value>& stream, uint64_t source_id, int64_t arrival_ns);
   template <class Value>
   void forget(Stream<Value>& stream, uint64_t source_id);
+  template <class Value>
+  void restart(Stream<Value>& stream);
+  template <class Value>
+  void note_spacing(Stream<Value>& stream);
   bool update_pose(int64_t server_time_ns);
+  bool has_caught_up(int64_t shown_ns, int64_t server_time_ns);
   void note_used(int64_t arrival_ns, int64_t made_ns);
   void finish_teleport_check(const Pose& before, int64_t server_time_ns, bool has_jumped);
 
@@ -147,8 +162,9 @@ class InputHub {
   std::deque<UsedSample> used_samples_;  // of motion, oldest first
   int64_t newest_arrival_ns_ = 0;
   std::optional<int64_t> last_frame_ns_;
-  double motion_speed_ = 1.0;  // as the owner said last
-  InputFrame frame_;           // the last one given out
+  std::optional<int64_t> shown_ns_;  // time of the head's source that the last frame shows
+  double motion_speed_ = 1.0;        // as the owner said last
+  InputFrame frame_;                 // the last one given out
   InputCounters counters_;
 };
 

@@ -15,6 +15,9 @@ void add_motion_file_options(CLI::App& command, MotionFileOptions& options) {
   command.add_option("--joint", options.joint, "head joint of the .bvh file; default: found by name");
   command.add_flag("--filter-glitches", options.is_filtering_glitches,
                    "take steps out of the .bvh file that are faster than any head moves");
+  command.add_flag(
+      "--keep-first-frames", options.is_keeping_first_frames,
+      "keep frames of the .bvh file that the head jumps from, as from a T-pose before the motion");
 }
 
 }  // namespace strandcast

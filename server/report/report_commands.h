@@ -14,7 +14,7 @@ class App;
 namespace strandcast {
 
 struct MotionFileOptions;
-/// --unit, --up, --joint and --filter-glitches, as those of strandcast-ctl feed.
+/// --unit, --up, --joint, --filter-glitches and --keep-first-frames, as those of strandcast-ctl feed.
 void add_motion_file_options(CLI::App& command, MotionFileOptions& options);
 
 struct ExecutorConfig;

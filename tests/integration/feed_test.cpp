@@ -5,6 +5,8 @@
 
 #include <atomic>
 #include <future>
+#include <optional>
+#include <thread>
 #include <vector>
 
 #include "tests/support/client_config.h"
@@ -145,6 +147,28 @@ TEST(Feed, AFileEndsWithItsMotionHoweverSlowlyItIsPlayed) {
   EXPECT_GT(done->elapsed_s, 0.06);
   (*client).reset();
   EXPECT_GT(heard.get_future().get(), 10u);
+}
+
+// Who is held up sends no burst of what was missed. It was one up to 250 ms: with that limit nothing is
+// skipped.
+TEST(Feed, AFeederThatWasHeldUpSkipsToNow) {
+  constexpr auto kHeldUp = std::chrono::milliseconds(120);
+  FeedPlan plan = plan_of(true);
+  std::atomic<bool> stop = false;
+  std::vector<double> time_s, place_m;
+  const SendMoment send = [&](double at_s, const Pose& pose, const std::optional<glm::vec3>&) {
+    time_s.push_back(at_s);
+    place_m.push_back(pose.position_m.x);
+    if (time_s.size() == 10) std::this_thread::sleep_for(kHeldUp);
+    stop = time_s.size() == 20;
+    return true;
+  };
+  const FeedProgress done = feed_moments(send, plan, stop, {});
+  EXPECT_GE(done.skipped_samples, 20u) << "of 24";
+  ASSERT_EQ(time_s.size(), 20u);
+  EXPECT_GT(time_s[10] - time_s[9], 0.1);
+  for (size_t i = 1; i < time_s.size(); ++i)
+    EXPECT_NEAR(place_m[i] - place_m[i - 1], time_s[i] - time_s[i - 1], 1e-9) << "no faster than it moves";
 }
 
 TEST(Feed, FollowsAPaceHalfwayWithEveryWordAndIsExactInRealTime) {

@@ -3,8 +3,10 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <random>
 #include <thread>
+#include <utility>
 
 namespace strandcast::input_hub_test {
 namespace {
@@ -202,6 +204,64 @@ TEST(InputHub, AJumpAcrossSkippedSamplesOrAGapIsStillATeleport) {
   hub.sample(kStart + 5000 * kMsInNs);
   hub.push(1, motion(5010 * kMsInNs, pose_at(2.0)), kStart + 5010 * kMsInNs);
   EXPECT_TRUE(hub.sample(kStart + 5016 * kMsInNs).has_teleported);
+}
+
+/// What 60 frames a second show of a head at 1 m/s whose samples come so far apart, and in bursts of so many;
+/// for 300 ms in the middle none come.
+struct Shown {
+  double fastest_mps = 0.0;       // from frame to frame
+  double fastest_felt_mps = 0.0;  // likewise, without teleports
+  uint64_t teleports = 0;         // after the first pose
+};
+
+Shown shown_across_a_stall(int64_t spacing_ns, int per_burst) {
+  constexpr int64_t kFrameNs = 1'000'000'000 / 60, kStallFromNs = 2000 * kMsInNs, kStallNs = 300 * kMsInNs;
+  InputHub hub;
+  Shown shown;
+  std::optional<double> before_m;
+  int64_t next_ns = 0;
+  MotionSamples waiting;
+  for (int64_t now_ns = 0; now_ns < 4000 * kMsInNs; now_ns += kFrameNs) {
+    for (; next_ns <= now_ns; next_ns += spacing_ns) {
+      if (next_ns >= kStallFromNs && next_ns < kStallFromNs + kStallNs) continue;
+      waiting.samples.push_back({next_ns, pose_at(static_cast<double>(next_ns) * 1e-9)});
+      if (waiting.samples.size() < static_cast<size_t>(per_burst)) continue;
+      hub.push(1, std::exchange(waiting, {}), kStart + next_ns);
+    }
+    const InputFrame frame = hub.sample(kStart + now_ns);
+    if (!frame.has_motion) continue;
+    const double x_m = frame.world_from_head.position_m.x;
+    const double mps = before_m ? (x_m - *before_m) / (static_cast<double>(kFrameNs) * 1e-9) : 0.0;
+    shown.fastest_mps = std::max(shown.fastest_mps, mps);
+    if (!frame.has_teleported) shown.fastest_felt_mps = std::max(shown.fastest_felt_mps, mps);
+    if (frame.has_teleported && before_m) ++shown.teleports;
+    before_m = x_m;
+  }
+  return shown;
+}
+
+TEST(InputHub, CatchingUpAfterAStallIsATeleport) {
+  const Shown shown = shown_across_a_stall(25 * kMsInNs / 3, 1);
+  EXPECT_EQ(shown.teleports, 1u);
+  EXPECT_LT(shown.fastest_felt_mps, 1.6) << "but for how samples fall into frames it is the source's";
+  EXPECT_GT(shown.fastest_mps, 10.0) << "felt, the stall would be a blow";
+}
+
+// The counter-example: of sources whose samples always come so far apart all motion is felt.
+TEST(InputHub, SamplesThatAreUsuallyFarApartAreFelt) {
+  EXPECT_EQ(shown_across_a_stall(200 * kMsInNs, 1).teleports, 0u) << "5 samples a second";
+  EXPECT_EQ(shown_across_a_stall(10 * kMsInNs, 20).teleports, 0u) << "bursts of 20, 5 a second";
+}
+
+TEST(InputHub, AnotherSourcesFirstPoseIsATeleport) {
+  InputHub hub;
+  hub.push(1, motion(0, pose_at(0.0)), kStart);
+  EXPECT_TRUE(hub.sample(kStart).has_teleported);
+  hub.remove_source(1);
+  hub.push(2, motion(0, pose_at(0.05)), kStart + 100 * kMsInNs);
+  EXPECT_TRUE(hub.sample(kStart + 100 * kMsInNs).has_teleported) << "0.5 m/s, but it is another head";
+  hub.push(2, motion(16 * kMsInNs, pose_at(0.1)), kStart + 116 * kMsInNs);
+  EXPECT_FALSE(hub.sample(kStart + 116 * kMsInNs).has_teleported) << "the same way of one source is felt";
 }
 
 TEST(InputHub, FastHumanMotionIsNoTeleport) {

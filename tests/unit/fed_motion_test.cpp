@@ -1,0 +1,190 @@
+// What a feeder makes of a clip: it begins from rest, comes back to its start as gently as it moves itself,
+// and leaves out frames that are not of the motion.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "client/app/ctl_commands.h"
+#include "common/base/file.h"
+#include "common/motion/motion_glitches.h"
+#include "tests/support/shared_data.h"
+#include "tests/support/temporary_folder.h"
+
+namespace strandcast::fed_motion_test {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kRateHz = 120.0;
+constexpr double kMost = 1.5;  // of the clip's own peaks
+// With the blending off a loop or a start is at least so many times as violent as the clip.
+constexpr double kJumpLeast = 2.0;
+
+struct FedClip {
+  std::string name;
+  std::filesystem::path path;
+};
+
+/// Somebody who walks 2 m, nods, and turns by 60 degrees; the first frame is 58 mm and 17.5 degrees off.
+std::string walk_with_t_pose() {
+  constexpr int kFrames = 361;
+  std::string text =
+      "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation "
+      "Yrotation\n"
+      "JOINT Head\n{\nOFFSET 0 1.6 0\nCHANNELS 3 Zrotation Xrotation Yrotation\nEnd Site\n{\nOFFSET 0 0.2 "
+      "0\n}\n}\n}\n";
+  text += fmt::format("MOTION\nFrames: {}\nFrame Time: {}\n", kFrames, 1.0 / kRateHz);
+  for (int i = 0; i < kFrames; ++i) {
+    const double t_s = i / kRateHz;
+    const double off_m = i == 0 ? 0.058 : 0.0;
+    const double off_deg = i == 0 ? 17.5 : 0.0;
+    text += fmt::format("{} {} {} 0 0 0 0 {} {}\n", off_m, 0.03 * std::sin(12.6 * t_s), 0.7 * t_s,
+                        10.0 * std::sin(8.0 * t_s), off_deg + 20.0 * t_s);
+  }
+  return text;
+}
+
+class FedMotion : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto path = folder_.path() / "walk.bvh";
+    const std::string text = walk_with_t_pose();
+    ASSERT_TRUE(save_file(path, std::as_bytes(std::span(text))));
+    clips_.push_back({"walk", path});
+    const std::filesystem::path shared = std::filesystem::path(STRANDCAST_SHARED_DATA) / "mocap";
+    for (const char* name :
+         {"cmu_01_01_playground_jumps.bvh", "cmu_05_20_mb.bvh", "cmu_131_01.bvh", "cmu_60_02_scaled.bvh",
+          "cmu_61_05_scaled.bvh", "fair1_dab.bvh", "pirouette.bvh"})
+      if (std::filesystem::exists(shared / name)) clips_.push_back({name, shared / name});
+  }
+
+  static MotionClip clip_of(const FedClip& fed, bool keeps_first_frames = false) {
+    MotionFileOptions options;
+    options.is_keeping_first_frames = keeps_first_frames;
+    auto file = load_motion_file(fed.path, options);
+    EXPECT_TRUE(file) << file.error().to_string();
+    return file ? std::move(file->clip) : MotionClip{};
+  }
+
+  /// What is fed in so many seconds, after a head that rested where the motion begins.
+  static std::vector<Pose> fed(const FeedOptions& options, double seconds) {
+    const auto plan = make_feed_plan(options);
+    EXPECT_TRUE(plan) << plan.error().to_string();
+    if (!plan) return {};
+    std::vector<Pose> poses(3, plan->motion(0.0));
+    for (int i = 1; i < seconds * kRateHz; ++i) poses.push_back(plan->motion(i / kRateHz));
+    return poses;
+  }
+  static FeedOptions options_for(const FedClip& clip) {
+    FeedOptions options;
+    options.motion = clip.path.string();
+    options.wind = "none";
+    return options;
+  }
+  static MotionPeaks own_peaks(const MotionClip& clip) {
+    std::vector<Pose> poses;
+    for (int i = 0; i / kRateHz < clip.duration_s(); ++i) poses.push_back(clip.sample(i / kRateHz));
+    return peaks_of(poses, 1.0 / kRateHz);
+  }
+
+  const TemporaryFolder folder_;
+  std::vector<FedClip> clips_;
+};
+
+TEST_F(FedMotion, ComesBackToItsStartAsItMovesItself) {
+  for (const FedClip& clip : clips_) {
+    SCOPED_TRACE(clip.name);
+    const MotionPeaks own = own_peaks(clip_of(clip));
+    FeedOptions options = options_for(clip);
+    options.is_looped = true;
+    const double twice_s = 2.0 * clip_of(clip).duration_s() + kLongestWayBackS;
+    EXPECT_TRUE(peaks_of(fed(options, twice_s), 1.0 / kRateHz).is_within(own, kMost));
+    options.blend_s = 0.0;
+    EXPECT_FALSE(peaks_of(fed(options, twice_s), 1.0 / kRateHz).is_within(own, kJumpLeast));
+  }
+}
+
+TEST_F(FedMotion, BeginsFromRest) {
+  // In the middle of a stride: at once, the head would be at full speed from one sample to the next.
+  const FedClip& walk = clips_.front();
+  const MotionPeaks own = own_peaks(clip_of(walk));
+  FeedOptions options = options_for(walk);
+  EXPECT_TRUE(peaks_of(fed(options, 1.0), 1.0 / kRateHz).is_within(own, kMost));
+  options.blend_s = 0.0;
+  EXPECT_GT(peaks_of(fed(options, 1.0), 1.0 / kRateHz).mps2, 10.0 * own.mps2);
+  options = {};
+  options.wind = "none";
+  EXPECT_LT(peaks_of(fed(options, 1.0), 1.0 / kRateHz).mps2, 5.0) << "the built-in motion, likewise";
+  options.blend_s = 0.0;
+  EXPECT_GT(peaks_of(fed(options, 1.0), 1.0 / kRateHz).mps2, 20.0);
+}
+
+TEST_F(FedMotion, IsAllOfTheClipOnce) {
+  const FedClip& walk = clips_.front();
+  const auto plan = make_feed_plan(options_for(walk));
+  ASSERT_TRUE(plan);
+  const MotionClip clip = clip_of(walk);
+  EXPECT_EQ(plan->motion_s, clip.duration_s() + 0.5 * kClipBlendS);
+  EXPECT_EQ(plan->motion(plan->motion_s), clip.world_from_head.back());
+  EXPECT_EQ(plan->motion(0.0), clip.world_from_head.front());
+}
+
+TEST_F(FedMotion, LeavesOutFramesBeforeTheMotion) {
+  const FedClip& walk = clips_.front();
+  const MotionClip kept = clip_of(walk, true), clip = clip_of(walk);
+  ASSERT_EQ(clip.world_from_head.size() + 1, kept.world_from_head.size());
+  EXPECT_EQ(clip.world_from_head.front().rotation, kept.world_from_head[1].rotation);
+  EXPECT_EQ(clip.world_from_head.front().position_m.x, 0.0) << "recentred";
+  const FirstFrames first = find_first_frames(kept);
+  EXPECT_EQ(first.count, 1u);
+  EXPECT_NEAR(first.jump_m, 0.058, 0.01);
+  EXPECT_NEAR(first.jump_deg, 17.5, 0.5);
+  // Kept, the head turns an order faster than anywhere in the motion.
+  EXPECT_GT(own_peaks(kept).rad_per_s, 10.0 * own_peaks(clip).rad_per_s);
+  testing::internal::CaptureStderr();
+  EXPECT_TRUE(make_feed_plan(options_for(walk)));
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("walk.bvh: 1 of its frames left out"));
+}
+
+// The share of the frames' peaks is that of captures with a T-pose before them; the others have none.
+TEST_F(FedMotion, CapturesAreFedWithoutTheirTPose) {
+  const std::filesystem::path folder = std::filesystem::path(STRANDCAST_SHARED_DATA) / "mocap";
+  REQUIRE_SHARED(folder);
+  uint32_t begun_with_one = 0;
+  for (const FedClip& clip : clips_) {
+    SCOPED_TRACE(clip.name);
+    const MotionClip kept = clip_of(clip, true), without = clip_of(clip);
+    EXPECT_EQ(find_first_frames(without).count, 0u);
+    if (kept.world_from_head.size() == without.world_from_head.size()) continue;
+    ++begun_with_one;
+    const auto begin_of = [](MotionClip whole) {
+      whole.world_from_head.resize(static_cast<size_t>(0.3 / whole.frame_s));
+      return peaks_of(whole.world_from_head, whole.frame_s);
+    };
+    EXPECT_FALSE(begin_of(kept).is_within(begin_of(without), 2.0));
+  }
+  EXPECT_GE(begun_with_one, 3u);
+}
+
+TEST(FirstFrames, AreNoneOfAMotionThatIsItself) {
+  MotionClip clip;
+  clip.frame_s = 0.01;
+  for (int i = 0; i < 100; ++i) clip.world_from_head.push_back({{0.02 * i, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}});
+  EXPECT_EQ(find_first_frames(clip).count, 0u) << "evenly fast";
+  for (Pose& pose : clip.world_from_head) pose.position_m *= 1e-6;
+  clip.world_from_head.front().position_m.x = -1e-3;
+  EXPECT_EQ(find_first_frames(clip).count, 0u) << "a still head that stirs";
+  clip.world_from_head.front().position_m.x = -0.1;
+  EXPECT_EQ(find_first_frames(clip).count, 1u);
+  clip.world_from_head[3].position_m.x = -0.1;
+  EXPECT_EQ(find_first_frames(clip).count, 4u) << "up to the last jump";
+  clip.world_from_head.resize(20);
+  EXPECT_EQ(find_first_frames(clip).count, 0u) << "too short to judge";
+}
+
+}  // namespace
+}  // namespace strandcast::fed_motion_test
