@@ -1,21 +1,19 @@
 #include "server/report/hanging_hair.h"
 
+#include <string>
+
+#include "common/scene/scene_file.h"
+
 namespace strandcast {
 namespace {
 
 constexpr double kFreeDeg = 180.0;
-/// Of scenes of full quality.
-constexpr double kFullFrictionPerS = 20.0;
-constexpr double kFullRepulsionPerS2 = 18'000.0;
 
 }  // namespace
 
 VolumeDesc volume_of(const HairCompany& company) {
-  VolumeDesc volume;
-  if (company.has_contact) {
-    volume.friction_per_s = kFullFrictionPerS;
-    volume.repulsion_per_s2 = kFullRepulsionPerS2;
-  }
+  VolumeDesc volume = with_overrides(SceneDesc(), {std::string("quality=") + kFullQuality}).value().volume;
+  if (!company.has_contact) volume.friction_per_s = volume.repulsion_per_s2 = 0.0;
   volume.air.acts = company.has_air;
   return volume;
 }

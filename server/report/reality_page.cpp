@@ -81,18 +81,18 @@ void add_locks(HtmlPage& page, const HairReality& reality) {
   if (last.ours_rad >= kLeastSolidShare * last.solid_rad) return;
   page.paragraph(
       fmt::format("Ours is off here: at {:g} m/s it leans by {:.2f} degrees where a solid cylinder leans by "
-                  "{:.2f}. Hair takes shelter twice, behind the hair in front and in the air that moves with "
-                  "it. What either takes of the wind's momentum reaches no hair.",
+                  "{:.2f}. Hair takes shelter behind the hair in front, and in the air that moves with it.",
                   last.wind_mps, glm::degrees(last.ours_rad), glm::degrees(last.solid_rad)));
 }
 
 void add_bundles(HtmlPage& page, const HairReality& reality) {
   page.heading("Reality: air that a bundle carries along");
-  page.paragraph(
-      "Share of the air inside a bundle of 5 cm that moves with its hairs, at 1 m/s. Ours is a balance of "
+  page.paragraph(fmt::format(
+      "Share of the air inside a bundle of {:g} cm that moves with its hairs, at 1 m/s. Ours is a balance of "
       "momentum. Taylor's porous plate (1944) lets air through against a loss of pressure. Brinkman's layer "
       "(1949) lets momentum seep in by viscosity alone, from faces where the air moves. Drag is that of one "
-      "hair in the bundle over that of a lone one, by ours.");
+      "hair in the bundle over that of a lone one, by ours.",
+      100.0 * AirDesc().lock_width_m));
   HtmlTable table{"", {"hairs per cm2", "ours", "porous plate", "viscous layer", "drag of one hair"}, {}};
   PlotDesc plot;
   plot.title = "Air that moves with a bundle of hairs";

@@ -134,7 +134,8 @@ void VolumeExtras::sweep(const VolumeGrid& grid, std::span<const glm::vec4> node
             }
             const auto to = static_cast<size_t>(layer * stride[main] + at_u * stride[u] + at_v * stride[v]);
             lefts[at_u - first_u] = left;
-            depths[at_u - first_u] = -0.5f * depth * (density + nodes[to].w);
+            const float own = shadow.is_arriving ? density : nodes[to].w;
+            depths[at_u - first_u] = -0.5f * depth * (density + own);
           }
           // The project's own function: a library's differs from machine to machine.
           simd::store_lanes(simd::load_lanes(lefts) * simd::exp(simd::load_lanes(depths)), lefts);

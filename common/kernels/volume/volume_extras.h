@@ -23,6 +23,7 @@ TargetDensity make_target(const VolumeGrid& grid, std::span<const glm::vec4> nod
 struct WindShadow {
   glm::vec3 along_in_head{0.0f, 0.0f, 1.0f};  // the way the wind goes, a unit vector
   float width_m = 0.0f;                       // by which a strand stops the wind
+  bool is_arriving = false;  // true: what comes to a node's own hair, who looks up takes that away itself
 };
 
 class VolumeExtras {

@@ -120,6 +120,7 @@ std::span<const glm::vec4> VolumeLaw::fill(const StepBlock& step, const VolumeSt
   WindShadow shadow;
   shadow.width_m = static_cast<float>(
       desc_.air.acts ? hairs_per_strand_ * stopping_width_m(desc_.air, speed_mps) : desc_.wind_width_m);
+  shadow.is_arriving = desc_.air.acts;
   const bool is_windy = desc_.is_sheltered() && speed_mps > 0.0f && shadow.width_m > 0.0f;
   if (is_windy) shadow.along_in_head = input.head_from_world * (wind_mps / speed_mps);
   extras_->update(grid, table.subspan(kHeader, grid.size()), desc_.target_per_s2 > 0.0 ? &target_ : nullptr,
