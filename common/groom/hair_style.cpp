@@ -13,9 +13,11 @@ constexpr float kPartingWidth = 0.05f;  // over which the side changes
 constexpr float kMinSide = 0.6f;
 constexpr float kPartingAt = 0.10f;    // x of the parting: a little to one side looks natural
 constexpr float kPartingWave = 0.03f;  // it is not a straight line
-constexpr float kSwayNoise = 0.22f;    // slow change over the scalp
-constexpr float kSwayStrand = 0.05f;   // from strand to strand
-constexpr float kNoiseCells = 2.5f;    // per skull radius
+// Hair that lies to both sides covers the scalp beside its parting by roots alone: they stand closer there.
+constexpr float kPartingReach = 0.025f;  // over which they do, in skull radii
+constexpr float kSwayNoise = 0.22f;      // slow change over the scalp
+constexpr float kSwayStrand = 0.05f;     // from strand to strand
+constexpr float kNoiseCells = 2.5f;      // per skull radius
 constexpr float kMinClearance = 0.015f;
 constexpr float kTopClearance = 0.11f;  // more at the top of the head
 constexpr float kClearanceNoise = 0.035f;
@@ -89,13 +91,25 @@ glm::vec3 push_out(const glm::vec3& point, const glm::vec3& center, float radius
 
 }  // namespace
 
+float beside_parting(const glm::vec3& root, uint32_t seed) {
+  return root.x - kPartingAt - kPartingWave * noise(root * kNoiseCells * 2.0f, mix_u32(seed + 11));
+}
+
+glm::vec3 moved_from_parting(const glm::vec3& root, uint32_t seed) {
+  const glm::vec3 outward = root / std::max(glm::length(root), 1e-6f);
+  // It ends at the crown.
+  const float share = smooth(kTop, outward.y) * smooth(kBeforeCrown, outward.z);
+  const float moved =
+      (kPartingCloser - 1.0f) * kPartingReach * std::tanh(beside_parting(root, seed) / kPartingReach);
+  return root + glm::vec3(share * moved, 0.0f, 0.0f);
+}
+
 StrandCharacter make_character(const glm::vec3& root, uint32_t strand_hash, uint32_t seed) {
   StrandCharacter character;
   character.root = root;
   const glm::vec3 place = root * kNoiseCells;
-  const float parting = kPartingAt + kPartingWave * noise(place * 2.0f, mix_u32(seed + 11));
   // Nobody stays undecided on the parting: such a strand would fall over the face.
-  const float side = std::tanh((root.x - parting) / kPartingWidth);
+  const float side = std::tanh(beside_parting(root, seed) / kPartingWidth);
   character.side = std::copysign(std::max(std::abs(side), kMinSide), side);
   const float height = smooth(kHeight, root.y / std::max(glm::length(root), 1e-6f));
   const float lift = noise(place * 1.7f, mix_u32(seed + 23)) + (unit_float(mix_u32(strand_hash + 5)) - 0.5f);

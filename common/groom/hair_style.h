@@ -16,6 +16,15 @@ struct StrandCharacter {
   glm::vec3 sway{0.0f};     // added to the direction it is combed in
 };
 
+/// How far a point of the scalp is beside the parting, in skull radii along x; negative to its right (-X).
+float beside_parting(const glm::vec3& root, uint32_t seed);
+
+/// Where to spread roots evenly so that on the scalp they stand closer across the parting than elsewhere: a
+/// point of the scalp, moved away from the parting. Twice differentiable.
+glm::vec3 moved_from_parting(const glm::vec3& root, uint32_t seed);
+/// Roots stand at most so many times closer for it, along x.
+inline constexpr float kPartingCloser = 10.0f;
+
 /// The character of a strand rooted at `root`; varies slowly over the scalp, and a little with `strand_hash`.
 StrandCharacter make_character(const glm::vec3& root, uint32_t strand_hash, uint32_t seed);
 

@@ -200,9 +200,15 @@ const GrownStrand* find_clump(const PointTree& tree, const std::vector<GrownStra
 
 Result<Groom> grow_groom(const Mesh& scalp, const ProceduralGroomOptions& options) {
   RETURN_IF_ERROR(check_options(options));
-  ASSIGN_OR_RETURN(const std::vector<ScalpRoot> roots,
-                   spread_roots(scalp, options.strand_count, options.seed));
   const FittedSphere skull = fit_sphere(scalp.position_m);
+  RootSpread spread;
+  spread.most_times = kPartingCloser;
+  spread.moved = [&](const glm::vec3& point_m) {
+    return skull.center_m +
+           skull.radius_m * moved_from_parting((point_m - skull.center_m) / skull.radius_m, options.seed);
+  };
+  ASSIGN_OR_RETURN(const std::vector<ScalpRoot> roots,
+                   spread_roots(scalp, options.strand_count, options.seed, spread));
   const Grower grower(options, skull);
 
   // The first roots of the progressive order are spread evenly themselves: they lead the clumps.

@@ -92,19 +92,49 @@ std::vector<ScalpRoot> offer_candidates(const Mesh& scalp, const AreaTable& area
   return candidates;
 }
 
+/// How many times the area around a point is stretched.
+float stretched(const ScalpRoot& root, const RootSpread& spread) {
+  constexpr float kStepM = 1e-4f;
+  const glm::vec3 aside = std::abs(root.normal.x) < 0.5f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
+  const glm::vec3 along = glm::normalize(glm::cross(root.normal, aside));
+  const glm::vec3 across = glm::cross(along, root.normal);
+  const glm::vec3 here = spread.moved(root.position_m);
+  const glm::vec3 area = glm::cross(spread.moved(root.position_m + kStepM * along) - here,
+                                    spread.moved(root.position_m + kStepM * across) - here);
+  return glm::length(area) / (kStepM * kStepM);
+}
+
+/// More candidates where roots stand closer: as many in all places for each root.
+void offer_more(const Mesh& scalp, const AreaTable& area, uint32_t seed, const RootSpread& spread,
+                std::vector<ScalpRoot>& candidates) {
+  const auto rounds = static_cast<uint32_t>(std::ceil(spread.most_times - 1.0f));
+  const auto count = static_cast<uint32_t>(candidates.size());
+  for (uint32_t round = 1; round <= rounds; ++round) {
+    const uint32_t salt = mix_u32(seed ^ mix_u32(round));
+    const std::vector<ScalpRoot> more = offer_candidates(scalp, area, count, salt);
+    for (uint32_t i = 0; i < count; ++i) {
+      const float wanted = stretched(more[i], spread) - static_cast<float>(round);
+      if (wanted > unit_float(mix_u32(i ^ mix_u32(salt)))) candidates.push_back(more[i]);
+    }
+  }
+}
+
 }  // namespace
 
-Result<std::vector<ScalpRoot>> spread_roots(const Mesh& scalp, uint32_t count, uint32_t seed) {
+Result<std::vector<ScalpRoot>> spread_roots(const Mesh& scalp, uint32_t count, uint32_t seed,
+                                            const RootSpread& spread) {
   RETURN_IF_ERROR(check_mesh(scalp));
   const AreaTable area = measure_area(scalp);
   if (!std::isfinite(area.total()) || area.total() <= 0.0) {
     return make_error(ErrorCode::BadInput, "the scalp mesh has the area {}", area.total());
   }
   const uint32_t offered = std::max(count * kCandidatesPerRoot, kMinCandidates);
-  const std::vector<ScalpRoot> candidates = offer_candidates(scalp, area, offered, seed);
+  std::vector<ScalpRoot> candidates = offer_candidates(scalp, area, offered, seed);
+  if (spread.moved) offer_more(scalp, area, seed, spread, candidates);
   std::vector<glm::vec3> points(candidates.size());
-  std::transform(candidates.begin(), candidates.end(), points.begin(),
-                 [](const ScalpRoot& root) { return root.position_m; });
+  std::transform(candidates.begin(), candidates.end(), points.begin(), [&](const ScalpRoot& root) {
+    return spread.moved ? spread.moved(root.position_m) : root.position_m;
+  });
   std::vector<ScalpRoot> roots;
   roots.reserve(count);
   for (const uint32_t index : make_progressive_order(points, count, seed)) roots.push_back(candidates[index]);

@@ -196,8 +196,8 @@ TEST(RootTriangles, CoverAScalpWithAboutTwoPerStrand) {
     for (int i = 0; i < 3; ++i) {
       const glm::vec3& a = groom.rest_position_m[groom.offset[triangle[i]]];
       const glm::vec3& b = groom.rest_position_m[groom.offset[triangle[(i + 1) % 3]]];
-      // Roots are about sqrt(area / n) = 4.3 mm apart.
-      ASSERT_LT(glm::distance(a, b), 0.013f);
+      // Roots are about sqrt(area / n) = 4.6 mm apart, but for those along the parting.
+      ASSERT_LT(glm::distance(a, b), 0.014f);
     }
   }
 }

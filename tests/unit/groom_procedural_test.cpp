@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
+#include "common/groom/hair_style.h"
 #include "common/groom/head_field.h"
 #include "common/groom/procedural.h"
 #include "common/groom/scalp_roots.h"
@@ -199,6 +201,63 @@ TEST(Procedural, NeighboursAreAlikeButNotTheSame) {
   std::sort(tip_distance_m.begin(), tip_distance_m.end());
   EXPECT_GT(tip_distance_m.front(), 0.0f);
   EXPECT_LT(tip_distance_m[tip_distance_m.size() / 2], 0.15f * options.length_m);
+}
+
+/// Of roots from the crown to the hairline: the widest strip without any across the parting, m. It is looked
+/// for in stretches of a centimetre along the parting.
+float widest_gap_m(const std::vector<ScalpRoot>& roots, uint32_t seed) {
+  constexpr float kStretchM = 0.01f, kFromM = -0.015f, kBesideM = 0.015f, kMiddleM = 0.002f;
+  constexpr int kStretches = 6;
+  float widest_m = 0.0f;
+  for (int stretch = 0; stretch < kStretches; ++stretch) {
+    const float from_m = kFromM + kStretchM * static_cast<float>(stretch);
+    std::vector<float> beside_m{-kBesideM, kBesideM};
+    for (const ScalpRoot& root : roots) {
+      const bool is_here =
+          root.position_m.y > 0.0f && root.position_m.z >= from_m && root.position_m.z < from_m + kStretchM;
+      const float off_m = beside_parting(root.position_m / kRadiusM, seed) * kRadiusM;
+      if (is_here && std::abs(off_m) < kBesideM) beside_m.push_back(off_m);
+    }
+    std::sort(beside_m.begin(), beside_m.end());
+    for (size_t i = 1; i < beside_m.size(); ++i)
+      if (beside_m[i - 1] < kMiddleM && beside_m[i] > -kMiddleM)
+        widest_m = std::max(widest_m, beside_m[i] - beside_m[i - 1]);
+  }
+  return widest_m;
+}
+
+TEST(Procedural, ThePartingIsNoBaldStrip) {
+  const Mesh cap = scalp();
+  for (const uint32_t seed : {1u, 2u, 3u}) {
+    ProceduralGroomOptions options;
+    options.seed = seed;
+    const auto groom = grow_groom(cap, options);
+    ASSERT_TRUE(groom) << groom.error().to_string();
+    std::vector<ScalpRoot> roots;
+    for (uint32_t strand = 0; strand < groom->strand_count(); ++strand)
+      roots.push_back({groom->rest_position_m[groom->offset[strand]], {}});
+    EXPECT_LT(widest_gap_m(roots, seed), 0.003f) << "seed " << seed;
+    // The counter-example: roots that are as even there as elsewhere.
+    const auto even = spread_roots(cap, options.strand_count, seed);
+    ASSERT_TRUE(even);
+    EXPECT_GT(widest_gap_m(*even, seed), 0.004f) << "seed " << seed;
+  }
+}
+
+TEST(Procedural, HairFallsToBothSidesOfTheParting) {
+  const auto groom = grow_groom(scalp(), {});
+  ASSERT_TRUE(groom) << groom.error().to_string();
+  uint32_t beside = 0, away = 0;
+  for (uint32_t strand = 0; strand < groom->strand_count(); ++strand) {
+    const glm::vec3& root = groom->rest_position_m[groom->offset[strand]];
+    const glm::vec3& tip = groom->rest_position_m[groom->offset[strand + 1] - 1];
+    const float off = beside_parting(root / kRadiusM, 1);
+    if (root.y < 0.8f * kRadiusM || root.z < 0.0f || std::abs(off) > 0.1f) continue;
+    ++beside;
+    away += (tip.x - root.x) * off > 0.0f ? 1 : 0;
+  }
+  EXPECT_GT(beside, 50u);
+  EXPECT_EQ(away, beside) << "none falls across";
 }
 
 TEST(Procedural, RefusesOptionsOutOfRangeByName) {
