@@ -13,6 +13,11 @@ constexpr float kSameRootM = 1e-4f;
 /// frizzy, with 0 it clumps. Median distance to the truth on the built-in scene in motion with 1/4 of the
 /// strands: 3.3 mm with 0, 1.8 mm with 0.5, 2.9 mm with 1.
 constexpr float kOwnShape = 0.5f;
+/// Of so many near roots those guide that fall as the strand does: a tip that is elsewhere from its root by
+/// so much counts as a root that is this share of it away. Else hair beside a parting is guided from its
+/// other side.
+constexpr uint32_t kCandidates = 10;
+constexpr float kFallShare = 0.2f;
 
 /// `along` brought to this length; `otherwise`, which has it, when it has no direction.
 glm::vec3 with_length(const glm::vec3& along, float length_m, const glm::vec3& otherwise) {
@@ -36,7 +41,14 @@ void StrandFill::choose_guides(uint32_t sent_count) {
   for (uint32_t s = sent_count; s < strand_count_; ++s) {
     Guides& guides = guides_[s - sent_count];
     float sum = 0.0f;
-    const auto nearest = tree.nearest(rest_in_head_m_[s], kGuides);
+    auto nearest = tree.nearest(rest_in_head_m_[s], kCandidates);
+    for (auto& root : nearest) {
+      const glm::vec3 apart_m = kFallShare * (fall_m(root.index) - fall_m(s));
+      root.distance_squared += glm::dot(apart_m, apart_m);
+    }
+    std::stable_sort(nearest.begin(), nearest.end(),
+                     [](const auto& a, const auto& b) { return a.distance_squared < b.distance_squared; });
+    nearest.resize(std::min<size_t>(nearest.size(), kGuides));
     for (size_t i = 0; i < nearest.size(); ++i) {
       guides.strand[i] = nearest[i].index;
       guides.weight[i] = 1.0f / (nearest[i].distance_squared + kSameRootM * kSameRootM);
@@ -44,6 +56,11 @@ void StrandFill::choose_guides(uint32_t sent_count) {
     }
     for (float& weight : guides.weight) weight /= sum;
   }
+}
+
+glm::vec3 StrandFill::fall_m(uint32_t strand) const {
+  const size_t tip = size_t{vertex_count_ - 1} * strand_count_;
+  return rest_in_head_m_[tip + strand] - rest_in_head_m_[strand];
 }
 
 std::vector<glm::vec3> StrandFill::positions(const Snapshot& snapshot) {

@@ -32,6 +32,8 @@ class StrandFill {
     std::array<float, kGuides> weight{};  // sum 1
   };
   void choose_guides(uint32_t sent_count);
+  /// From a strand's root to its tip at rest, m.
+  glm::vec3 fall_m(uint32_t strand) const;
 
   uint32_t strand_count_ = 0;
   uint32_t vertex_count_ = 0;
