@@ -3,76 +3,116 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <unordered_map>
+#include <limits>
+#include <span>
+#include <utility>
 
 #include "common/base/quantile.h"
+#include "common/math/point_tree.h"
 
 namespace strandcast {
 namespace {
 
-// More roots of one cell say nothing new, and all roots of a hostile groom could lie in one.
-constexpr size_t kMaxRootsPerCell = 64;
+// What is between roots is between some of this many nearest ones.
+constexpr uint32_t kNearestRoots = 14;
+// Roots that are further apart than so many spacings have bare skin between them.
+constexpr float kMostSpacings = 2.0f;
+// Where roots are far apart the tint fades over this share of their spacing: more gently than the head's mesh
+// steps.
+constexpr float kFadeSpacings = 0.4f;
+// Up to this share of the reach skin beside the area is covered as that between the roots.
+constexpr float kFullReach = 0.2f;
+// So far off a triangle skin still belongs to it: of the reach, and of the triangle's edges.
+constexpr float kOffReach = 0.5f, kOffEdge = 0.25f;
 
-// Roots in cells as wide as the reach, so that only neighbouring cells are searched.
-class RootGrid {
+/// Distance of a point to the segment from a to b, squared.
+float squared_to_segment(const glm::vec3& point, const glm::vec3& a, const glm::vec3& b) {
+  const glm::vec3 along = b - a;
+  const float squared = glm::dot(along, along);
+  const float part = squared > 0.0f ? std::clamp(glm::dot(point - a, along) / squared, 0.0f, 1.0f) : 0.0f;
+  const glm::vec3 off = point - (a + part * along);
+  return glm::dot(off, off);
+}
+
+/// From a point to a triangle, squared. Skin bulges between roots that are far apart, and may lie off those
+/// that are not: up to `off_m` above or below counts as on it.
+float squared_to_triangle(const glm::vec3& point, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c,
+                          float off_m) {
+  const glm::vec3 cross = glm::cross(b - a, c - a);
+  const float length = glm::length(cross);
+  if (!(length > 0.0f)) return squared_to_segment(point, a, b);
+  const glm::vec3 normal = cross / length;
+  const float height = glm::dot(point - a, normal);
+  const glm::vec3 below = point - height * normal;
+  const float off = std::max(0.0f, std::abs(height) - off_m);
+  const bool is_inside = glm::dot(glm::cross(b - a, below - a), normal) >= 0.0f &&
+                         glm::dot(glm::cross(c - b, below - b), normal) >= 0.0f &&
+                         glm::dot(glm::cross(a - c, below - c), normal) >= 0.0f;
+  const float beside_squared =
+      is_inside ? 0.0f
+                : std::min({squared_to_segment(below, a, b), squared_to_segment(below, b, c),
+                            squared_to_segment(below, c, a)});
+  return beside_squared + off * off;
+}
+
+/// How far roots usually are apart, so that six others are nearer: the median over some of them.
+float spacing_of(const PointTree& tree, std::span<const glm::vec3> root_m) {
+  constexpr uint32_t kSamples = 256, kRank = 6;
+  std::vector<float> spacing_m;
+  for (size_t i = 0; i < root_m.size(); i += root_m.size() / kSamples + 1)
+    spacing_m.push_back(std::sqrt(tree.nearest(root_m[i], kRank + 1).back().distance_squared));
+  return median(std::move(spacing_m));
+}
+
+/// The area between roots: all triangles of roots that are no further apart than neighbours are.
+class RootArea {
  public:
-  RootGrid(const glm::vec3* root_m, uint32_t count, float cell_m) : root_m_(root_m), cell_m_(cell_m) {
-    for (uint32_t i = 0; i < count; ++i) {
-      std::vector<uint32_t>& cell = cells_[key(cell_of(root_m[i]))];
-      if (cell.size() < kMaxRootsPerCell) cell.push_back(i);
-    }
+  RootArea(std::span<const glm::vec3> root_m, float reach_m) : root_m_(root_m), tree_(root_m) {
+    const float spacing_m = spacing_of(tree_, root_m);
+    most_m_ = kMostSpacings * spacing_m;
+    reach_m_ = std::max(reach_m, kFadeSpacings * spacing_m);
   }
 
-  // Weight of the roots around a point: 1 for a root at the point, 0 for one at the reach.
-  float weight_at(const glm::vec3& point_m) const {
-    float sum = 0.0f;
-    const glm::ivec3 middle = cell_of(point_m);
-    for (int i = 0; i < 27; ++i) {
-      const auto found = cells_.find(key(middle + glm::ivec3(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1)));
-      if (found == cells_.end()) continue;
-      for (const uint32_t root : found->second)
-        sum += std::max(0.0f, 1.0f - glm::length(root_m_[root] - point_m) / cell_m_);
-    }
-    return sum;
+  /// 1 in the area, falling smoothly to 0 beside it.
+  float cover_at(const glm::vec3& point_m) const {
+    const float left = (1.0f - distance_m(point_m) / reach_m_) / (1.0f - kFullReach);
+    return left > 0.0f ? std::min(left * left, 1.0f) : 0.0f;  // false for NaN
   }
 
  private:
-  glm::ivec3 cell_of(const glm::vec3& point_m) const {
-    // What is no number counts as far away.
-    const auto part = [&](float value_m) {
-      constexpr float kFar = 1e6f;
-      const float cell = value_m / cell_m_;
-      return cell > -kFar ? static_cast<int>(std::floor(std::min(cell, kFar))) : static_cast<int>(-kFar);
-    };
-    return {part(point_m.x), part(point_m.y), part(point_m.z)};
-  }
-  static uint64_t key(const glm::ivec3& cell) {
-    const auto part = [](int value) { return static_cast<uint64_t>(value + (1 << 20)) & 0x1fffff; };
-    return part(cell.x) | part(cell.y) << 21 | part(cell.z) << 42;
+  /// From a point to the area.
+  float distance_m(const glm::vec3& point_m) const {
+    const std::vector<PointTree::Neighbour> near = tree_.nearest(point_m, kNearestRoots);
+    float squared = near.front().distance_squared;
+    // Nothing is nearer than its roots but by what is between them.
+    if (std::sqrt(squared) > most_m_ + reach_m_) return std::sqrt(squared);
+    for (size_t i = 0; i < near.size(); ++i)
+      for (size_t j = i + 1; j < near.size(); ++j)
+        for (size_t k = j + 1; k < near.size() && squared > 0.0f; ++k)
+          squared = std::min(squared, squared_to(point_m, {near[i].index, near[j].index, near[k].index}));
+    return std::sqrt(squared);
   }
 
-  const glm::vec3* root_m_;
-  float cell_m_;
-  std::unordered_map<uint64_t, std::vector<uint32_t>> cells_;
+  float squared_to(const glm::vec3& point_m, const glm::uvec3& corner) const {
+    const glm::vec3 &a = root_m_[corner.x], &b = root_m_[corner.y], &c = root_m_[corner.z];
+    const float edge_m = std::max({glm::distance(a, b), glm::distance(b, c), glm::distance(c, a)});
+    if (!(edge_m <= most_m_)) return std::numeric_limits<float>::max();
+    return squared_to_triangle(point_m, a, b, c, std::max(kOffReach * reach_m_, kOffEdge * edge_m));
+  }
+
+  std::span<const glm::vec3> root_m_;
+  PointTree tree_;
+  float most_m_ = 0.0f;   // between corners
+  float reach_m_ = 0.0f;  // over which it fades
 };
-
-// Full cover at this share of the median weight around roots: the middle of the hair is covered evenly.
-constexpr float kFullShare = 0.5f;
-constexpr uint32_t kMedianSamples = 256;
 
 }  // namespace
 
 std::vector<float> scalp_cover(const SceneAsset& asset, float reach_m) {
   std::vector<float> cover(asset.head.position_m.size(), 0.0f);
   if (cover.empty() || asset.strand_count == 0 || !(reach_m > 0.0f)) return cover;
-  const RootGrid grid(asset.rest_position_m.data(), asset.strand_count, reach_m);
-  std::vector<float> around;
-  const uint32_t step = asset.strand_count / kMedianSamples + 1;
-  for (uint32_t i = 0; i < asset.strand_count; i += step)
-    around.push_back(grid.weight_at(asset.rest_position_m[i]));
-  const float full = kFullShare * median(std::move(around));
-  for (size_t i = 0; i < cover.size(); ++i)
-    cover[i] = std::min(1.0f, grid.weight_at(asset.head.position_m[i]) / full);
+  const RootArea area({asset.rest_position_m.data(), asset.strand_count}, reach_m);
+  for (size_t i = 0; i < cover.size(); ++i) cover[i] = area.cover_at(asset.head.position_m[i]);
   return cover;
 }
 

@@ -7,11 +7,11 @@
 
 namespace strandcast {
 
-/// A root tints the skin this far around it, of the hair's extent.
+/// Hair tints the skin this far around the outermost roots, of the hair's extent.
 inline constexpr float kCoverReach = 0.025f;
 
-/// Per vertex of the asset's head: 1 where there are as many roots within `reach_m` as in the middle of the
-/// hair, 0 where there are none. Empty without a head.
+/// Per vertex of the asset's head: 1 between neighbouring roots, however far apart these are, falling
+/// smoothly to 0 at `reach_m` beside them, or further where they are further apart. Empty without a head.
 std::vector<float> scalp_cover(const SceneAsset& asset, float reach_m);
 
 }  // namespace strandcast
