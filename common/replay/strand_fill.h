@@ -1,6 +1,6 @@
-// StrandFill: the strands that a stream for a slow link leaves out. Each goes with its three nearest strands
-// that were sent: every segment moves as theirs, keeps its rest length and half of what sets its rest shape
-// apart. No network, no GL; one thread.
+// StrandFill: the strands that a stream for a slow link leaves out. Each goes with three near ones that were
+// sent and fall as it does: every segment moves as theirs, keeps its rest length and half of what sets its
+// rest shape apart. No network, no GL; one thread.
 #pragma once
 
 #include <array>
