@@ -699,5 +699,17 @@ TEST_F(LiveServer, MetricsTellWhatRuns) {
     EXPECT_THAT(text, HasSubstr(name));
 }
 
+// Whoever asks for auto on a machine that is too slow for full gets fast, once it has been seen.
+TEST_F(LiveServer, AutoIsLoweredToFastWhereFullIsTooSlow) {
+  if (!start(with_overrides(test::small_scene(400, 16), {"step_rate_hz=1000", "substeps=64"}).value()))
+    return;
+  const auto solver = [this] { return server_->counters().sim.solver_name; };
+  StrandClient controller(server_->port(), Role::Controller);
+  const Notice taken = controller.ask(SetParameter{"quality=auto"});
+  EXPECT_FALSE(taken.is_error) << taken.text;
+  EXPECT_TRUE(eventually([&] { return solver() == "direct_rod"; }));
+  EXPECT_TRUE(eventually([&] { return solver() == "dftl"; })) << "full goes on though it is too slow";
+}
+
 }  // namespace
 }  // namespace strandcast::server_live_test
