@@ -67,8 +67,7 @@ TEST_P(SetLookTest, EveryFieldReachesThePixelsAsIfTheRendererWereMadeWithIt) {
     ASSERT_TRUE(renderer->set_look(base));
     ASSERT_TRUE(draw(*renderer) == before) << "and back";
   }
-  EXPECT_GE(seen, 10u)
-      << "most of what is told above would hold for a renderer that ignores every look";
+  EXPECT_GE(seen, 10u) << "most of what is told above would hold for a renderer that ignores every look";
 }
 
 TEST_P(SetLookTest, ALookWithoutAnyDefaultAndBack) {
