@@ -337,7 +337,7 @@ void keep_style(v1::Scene& message, bool had_file, const std::vector<std::string
   parameters[kSagFree] = 1.0;
 }
 
-// What hair on hair is in scenes of full quality (hair_in_air in strandcast-report coherence says why).
+// What hair on hair is in scenes of full quality (strandcast-report coherence shows what each does).
 constexpr double kFullFrictionPerS = 20.0;
 constexpr double kFullRepulsionPerS2 = 18'000.0;
 // Cells as wide as a lock: finer ones cost more, and hair holds together less.

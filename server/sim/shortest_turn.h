@@ -1,6 +1,7 @@
 // The shortest turn from one direction to another, on vectors. Pure functions.
 #pragma once
 
+#include <cmath>
 #include <glm/glm.hpp>
 
 namespace strandcast {
@@ -12,7 +13,10 @@ inline glm::vec3 shortest_turn(const glm::vec3& v, const glm::vec3& from, const 
   const float cosine = glm::dot(from, to);
   if (1.0f + cosine < kOpposite) return v - 2.0f * glm::dot(from, v) * from;
   const glm::vec3 axis = glm::cross(from, to);
-  return cosine * v + glm::cross(axis, v) + axis * (glm::dot(axis, v) / (1.0f + cosine));
+  const glm::vec3 turned = cosine * v + glm::cross(axis, v) + axis * (glm::dot(axis, v) / (1.0f + cosine));
+  // Near to opposite the last term is a quotient of small numbers: its rounding would change the length.
+  const float squared = glm::dot(turned, turned);
+  return squared > 0.0f ? turned * std::sqrt(glm::dot(v, v) / squared) : turned;
 }
 
 }  // namespace strandcast

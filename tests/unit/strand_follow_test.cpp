@@ -74,7 +74,7 @@ TEST(StrandFollow, KeepsEveryLengthAndTheRootsWhateverGuidesDo) {
         continue;
       }
       const float length = glm::distance(rest[i], rest[i - kStrands]);
-      ASSERT_NEAR(glm::distance(all[i], all[i - kStrands]), length, 3e-5f * length + 1e-7f) << s << " " << v;
+      ASSERT_NEAR(glm::distance(all[i], all[i - kStrands]), length, 1e-5f * length + 1e-7f) << s << " " << v;
     }
   }
 }
