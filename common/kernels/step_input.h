@@ -5,7 +5,9 @@
 // keeps float precision anywhere in the world; each step the origin moves by head_shift_m.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <glm/gtc/quaternion.hpp>
@@ -43,10 +45,19 @@ struct StepInput {
   std::vector<GustWave> gusts;  // at most kMaxGustWaves; x is relative to the head joint
   /// Most that the first free segment leans from its groomed direction, turned with the head; pi = free.
   double follicle_limit_rad = kFreeFollicleRad;
-  bool begins_step = true;                // the first substep of a step: what is computed once a step is
+  bool renews_volume = true;              // the volume of the hair is made anew before this substep
   std::vector<SphereCollider> colliders;  // centres in head-relative world axes, at the end of the substep
   BodyInput body;                         // head space
 };
+
+/// Whether the volume is made anew before substep `index` of `count` in a step of `step_s`: before the first,
+/// and often enough that in a longer step no volume is older than a 60th of a second by more than half.
+inline bool renews_volume(size_t index, size_t count, double step_s) {
+  constexpr double kVolumesPerS = 60.0;
+  const auto most = static_cast<double>(count);
+  const auto volumes = static_cast<size_t>(std::clamp(std::round(step_s * kVolumesPerS), 1.0, most));
+  return index == 0 || index * volumes / count != (index - 1) * volumes / count;
+}
 
 /// Whether roots are held in this substep; no number, and no angle, is no limit.
 inline bool has_follicle_limit(const StepInput& input) {

@@ -94,7 +94,7 @@ std::vector<StepInput> substeps_of(const StepScene& scene, const StepTick& tick,
     const bool is_last = i + 1 == substeps.size();
     const Pose pose = is_last ? tick.world_from_head : between(begin, tick.world_from_head, blend);
     StepInput& substep = substeps[i];
-    substep.begins_step = i == 0;
+    substep.renews_volume = renews_volume(i, substeps.size(), scene.step_s);
     substep.h_s = scene.step_s / count;
     substep.world_from_head_rotation = pose.rotation;
     substep.head_shift_m = pose.position_m - previous.position_m;

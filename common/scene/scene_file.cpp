@@ -342,6 +342,9 @@ constexpr double kFullFrictionPerS = 20.0;
 constexpr double kFullRepulsionPerS2 = 18'000.0;
 // Cells as wide as a lock: finer ones cost more, and hair holds together less.
 constexpr uint32_t kFullResolution = 16;
+// Hair that is shaken needs steps no longer than this, whatever the scene's own are.
+constexpr double kFullStepHz = 60.0;
+constexpr double kMostFullSubsteps = 6.0;
 
 void add_hair_in_air(v1::Scene& message) {
   message.mutable_volume()->set_friction_per_s(kFullFrictionPerS);
@@ -371,6 +374,15 @@ bool names_any(const std::vector<std::string>& overrides, std::initializer_list<
   });
 }
 
+/// At least as many as make the steps of rods short enough; a rate a little below takes one as well.
+void add_substeps(v1::Scene& message) {
+  constexpr double kALittle = 0.25;
+  const double rate_hz = message.has_step_rate_hz() ? message.step_rate_hz() : kFullStepHz;
+  if (!(rate_hz > 0.0) || (message.has_substeps() && message.substeps() == 0)) return;
+  const double count = std::clamp(std::ceil(kFullStepHz / rate_hz - kALittle), 1.0, kMostFullSubsteps);
+  if (count > message.substeps()) message.set_substeps(static_cast<uint32_t>(count));
+}
+
 /// Quality, then overrides: whoever chooses a model by hand gets what the scene itself says, and whoever
 /// changes what a quality stands for has one of his own. Rods that are chosen by hand act on each other, in
 /// air, unless told otherwise.
@@ -382,7 +394,10 @@ Status apply_choices(v1::Scene& message, bool is_text, const std::vector<std::st
   const bool says_nothing =
       !message.has_solver() && !message.has_volume() && !message.has_air() && !message.head().has_collider();
   if (is_text && !message.has_quality() && says_nothing) message.set_quality(kAutoQuality);
-  if (!names_solver && (names_quality || (is_text && message.has_quality()))) take_quality(message);
+  const bool takes_quality = !names_solver && (names_quality || (is_text && message.has_quality()));
+  if (takes_quality) take_quality(message);
+  const bool is_full =
+      takes_quality && !names_any(overrides, {"substeps="}) && message.solver().name() == kRodSolver;
   const bool is_rod_before = message.solver().name() == kRodSolver;
   for (const std::string& assignment : overrides) RETURN_IF_ERROR(apply_override(message, assignment));
   if (names_solver || names_any(overrides, {"volume.", "air.", "head.collider"}))
@@ -391,6 +406,7 @@ Status apply_choices(v1::Scene& message, bool is_text, const std::vector<std::st
                                  : !is_rod_before && !acts(message.volume()) && !message.air().acts();
   const bool is_told = names_any(overrides, {"volume.", "air."});
   if (message.solver().name() == kRodSolver && is_chosen && !is_told) add_hair_in_air(message);
+  if (is_full) add_substeps(message);
   return {};
 }
 

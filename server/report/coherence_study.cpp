@@ -192,7 +192,8 @@ std::vector<CoherenceRow> coherence_rows(bool is_whole) {
   rows.push_back({"direct_rod, full", kRod, kFull, kUsualRateHz, true});
   if (!is_whole) return rows;
   for (const double rate_hz : {30.0, 240.0})
-    rows.push_back({fmt::format("direct_rod, full, {:g} Hz", rate_hz), kRod, kFull, rate_hz, false});
+    rows.push_back({fmt::format("direct_rod, full, {:g} Hz", rate_hz), kRod, kFull, rate_hz, false,
+                    rate_hz < kUsualRateHz ? 2u : 1u});
   for (const SolverRow& solver : solver_table())
     if (solver.has_kernel && solver.name != kRod)
       rows.push_back({solver.name + (solver.bears_volume ? ", full" : " + air"), solver.name,
@@ -222,7 +223,7 @@ Result<SceneDesc> scene_of_row(const CoherenceRow& row, const SceneDesc& scene) 
   changed.step_rate_hz = row.step_rate_hz;
   ASSIGN_OR_RETURN(const SolverParameters parameters,
                    complete_parameters(*solver, changed.solver.parameters));
-  for (changed.substeps = 1; changed.substeps < kMostSubsteps; changed.substeps *= 2)
+  for (changed.substeps = row.least_substeps; changed.substeps < kMostSubsteps; changed.substeps *= 2)
     if (check_step(*solver, parameters, 1.0 / (changed.step_rate_hz * changed.substeps))) break;
   return changed;
 }

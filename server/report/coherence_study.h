@@ -25,7 +25,8 @@ struct CoherenceRow {
   std::string solver;
   HairCompany company;
   double step_rate_hz = 60.0;
-  bool is_main = false;  // it has pictures and a line in plots
+  bool is_main = false;         // it has pictures and a line in plots
+  uint32_t least_substeps = 1;  // more where its model cannot bear so few
 };
 /// Every model with a kernel alone, then `direct_rod` in all company; `is_whole`: also every model in all the
 /// company that it bears, and other step rates.

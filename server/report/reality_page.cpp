@@ -58,10 +58,8 @@ void add_hairs(HtmlPage& page, const HairReality& reality) {
   }
   page.table(table);
   page.paragraph(
-      "What is off at low step rates has one reason: air acts before the model's own step, as if nothing "
-      "else held the hair. The fewer steps a second, the less of its drag a hair feels that stands still in "
-      "the wind. The law takes the rate at the whole speed, the cylinder at the speed across; that is the "
-      "rest.");
+      "The law takes the rate at the whole speed, the cylinder at the speed across; that is where the two "
+      "part.");
 }
 
 void add_locks(HtmlPage& page, const HairReality& reality) {

@@ -198,7 +198,7 @@ void StepBuilder::begin(const InputFrame& input, double end_time_s, double input
     const double blend = static_cast<double>(i + 1) / count;
     const Pose pose = i + 1 == step_.substeps.size() ? target : interpolate(from, target, blend);
     StepInput& substep = step_.substeps[i];
-    substep.begins_step = i == 0;
+    substep.renews_volume = renews_volume(i, step_.substeps.size(), step_s);
     substep.h_s = step_s / count;
     substep.world_from_head_rotation = pose.rotation;
     substep.head_shift_m = pose.position_m - previous.position_m;

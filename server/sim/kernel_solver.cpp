@@ -81,7 +81,7 @@ void KernelSolver::substep(const StepInput& input) {
   adapt(input);
   const StepBlock block = make_step_block(input, parameters_, layout().counts(), strands_->head());
   if (volume_forces_) {
-    if (input.begins_step) gather(input);
+    if (input.renews_volume) gather(input);
     has_gathered_ = false;
     volume_forces_->apply(block, *strands_, carried().way);
   }

@@ -17,7 +17,7 @@ struct Edge {
 };
 
 // Inertia of the edge, half at either end, and its tension.
-void add_edge(Rod rod, Edge edge, float excess, vec3 force0, vec3 force1, float end_length, inout Row row0,
+void add_edge(Rod rod, Edge edge, float excess, vec4 force0, vec4 force1, float end_length, inout Row row0,
               inout Row row1) {
   add_inertia(rod, 0.5 * edge.length_m, force0, row0);
   add_inertia(rod, 0.5 * edge.length_m + end_length, force1, row1);
@@ -71,7 +71,7 @@ void forward(Rod rod, uint solve) {
   vec3 unrestored = position;
   Node node = load_node(rod, at);
   vec3 rate = rate_at(rod, position, node);
-  vec3 force = vec3(0.0);
+  vec4 force = vec4(0.0, 0.0, 0.0, 1.0);
   Edge before = Edge(rod.clamp_direction, rod.clamp_axis, vec4(0.0), 0.0, 0.0);
   vec3 old_direction = rod.clamp_direction;
   Row row0 = empty_row();
@@ -127,8 +127,8 @@ void forward(Rod rod, uint solve) {
       // Carried along the strand.
       edge.axis = carried_axis(before.axis, before.direction, edge.direction);
 #endif
-      const vec3 force_before = force;
-      force = outer_force(rod, node, rate);
+      const vec4 force_before = force;
+      force = vec4(outer_force(rod, node, rate), node.inertia);
 #if HAS_PINNED_TAIL
       const float end_length = 0.0;
 #else

@@ -15,11 +15,11 @@ float angle_per_sine(float q) {
   return series * inversesqrt(1.0 - q);
 }
 
-// Inertia and outer forces of a vertex, times `mass`.
-void add_inertia(Rod rod, float mass, vec3 force, inout Row row) {
+// Inertia and outer forces of a vertex, times `mass`; w = how inert it is.
+void add_inertia(Rod rod, float mass, vec4 force, inout Row row) {
   const float rate = rod.now * rod.inverse_h;
-  row.diagonal += of_positions(scaled(mass * rate * (rate + u_step.contact.y)));
-  row.right += of_position(mass * force);
+  row.diagonal += of_positions(scaled(mass * rate * (rate * force.w + u_step.contact.y)));
+  row.right += of_position(mass * force.xyz);
 }
 
 // One side of a joint: an edge, or a clamp that does not give way.

@@ -6,7 +6,7 @@
 
 // Planes of one vertex per strand: position, velocity, displacement and velocity change as in step.glsl, with
 // w of the velocity = tension of the edge that ends there, and for vertex 0 the length of the step before (0
-// = none).
+// = none); w of the displacement = inertia that air adds in this substep (volume_forces.comp).
 layout(binding = kUnitDisplacement) uniform samplerBuffer u_displacement;       // world, m
 layout(binding = kUnitVelocityChange) uniform samplerBuffer u_velocity_change;  // world, m/s
 // Joint tangent in the frame of the edge before (without twist: rest direction of the edge); w = length, m.
@@ -79,6 +79,7 @@ struct Node {
   float tension;
   vec3 displacement;
   vec3 velocity_change;
+  float inertia;         // against all forces but those of air
 };
 
 uint element(Rod rod, uint vertex) { return vertex * rod.stride + rod.strand; }
@@ -95,7 +96,9 @@ Node load_node(Rod rod, uint at) {
   const vec4 velocity = texelFetch(u_velocity, int(at));
   node.velocity = velocity.xyz;
   node.tension = velocity.w;
-  node.displacement = texelFetch(u_displacement, int(at)).xyz;
+  const vec4 displacement = texelFetch(u_displacement, int(at));
+  node.displacement = displacement.xyz;
+  node.inertia = 1.0 + displacement.w;
   node.velocity_change = texelFetch(u_velocity_change, int(at)).xyz;
   const vec3 relative = node.velocity - u_step.head_velocity.xyz;
   const lane_bool is_fast = dot(relative, relative) > u_step.style.w * u_step.style.w;
@@ -147,6 +150,6 @@ vec3 outer_force(Rod rod, Node node, vec3 rate) {
   const vec3 acceleration =
       (rod.now * (rate - node.velocity) - rod.before * node.velocity_change) * rod.inverse_h;
   const float drag = u_step.contact.y;
-  return rod.force + drag * (gust_velocity(node.stored) - rate) - acceleration;
+  return rod.force + drag * (gust_velocity(node.stored) - rate) - node.inertia * acceleration;
 }
 

@@ -4,7 +4,8 @@
 // stiffness taken implicitly, as drag against the mean velocity). With extras hair is also pushed towards a
 // target's density (document 003, section 6.2), and feels less of the wind behind other hair. With air each
 // hair is dragged, as a thin cylinder, by the air at its place. Hair around it carries that air along, the
-// more the denser it is (common/kernels/volume/hair_in_air.h); models have no drag of their own then. One
+// more the denser it is (common/kernels/volume/hair_in_air.h); models have no drag of their own then. A model
+// that keeps its ways is also told how much more inert a vertex is for all other forces while air drags it. One
 // invocation per strand.
 #pragma variant HAS_WAY 0 1
 #pragma variant HAS_EXTRAS 0 1
@@ -19,6 +20,12 @@ layout(binding = kUnitRestDensity) uniform samplerBuffer u_rest_density;
 #if HAS_WAY
 // Way of every vertex in the last substep, world, m: velocities of such models answer to more than motion.
 layout(binding = kUnitDisplacement) uniform samplerBuffer u_displacement;
+#if HAS_AIR
+// w: inertia against all other forces in this substep, less 1.
+layout(std430, binding = kBindingDisplacement) writeonly restrict buffer DisplacementBlock {
+  vec4 value[];
+} b_displacement;
+#endif
 #endif
 
 uniform float u_friction;      // 1/s
@@ -36,6 +43,9 @@ uniform float u_lock;      // m^2: real hairs of a strand x width of a lock x ra
 
 // Of the drag across a hair, what there is along it (slender bodies at low Reynolds numbers).
 const float kAlongShare = 0.5;
+// Air also goes around hair that lets little through: of its momentum, that of a drag coefficient of 2, a solid
+// cylinder takes 1.1. 1 - sqrt(1.1 / 2).
+const float kAroundShare = 0.25838;
 // Air that stands still against hair is carried along, as far as there is hair.
 const float kLeastReynolds = 1e-6;
 
@@ -51,6 +61,11 @@ float time_at_rate(float h, float rate) {
   return select(faded > 1e-3, (1.0 - exp(-faded)) / max(rate, 1e-6), h * (1.0 - 0.5 * faded));
 }
 
+struct Pull {
+  vec3 gained;    // velocity, m/s
+  float inertia;  // of the hair against all other forces, 1 where no air drags it
+};
+
 struct AirHere {
   vec3 outside;   // velocity of the air that comes in, relative to the head joint, m/s
   vec3 hair;      // mean velocity of the hair here, likewise
@@ -58,22 +73,26 @@ struct AirHere {
   vec3 along;     // the hair's own direction, of any length
 };
 
-// Velocity that a vertex takes on in a substep from air and the hair around it, which brakes it by
-// `friction`, 1/s. Exact, were both as they are for the whole substep: so it goes by seconds, and not by
-// steps.
-vec3 taken_on(AirHere air, vec3 moving, float h, float friction) {
+// What hair around a vertex, which brakes it by `friction`, 1/s, and then the air do to it in a substep. Both
+// are exact, were they as they are for the whole substep: so it goes by seconds, and not by steps. Other forces
+// do less in a substep while air drags: by (1 - exp(-h rate)) / (h rate), the inverse of the inertia. Hair that
+// rests in a wind then leans as far as drag and weight say, at any step rate. The wind that comes in has lost
+// what hair before it took, so hair at rest does not carry it along once more.
+Pull taken_on(AirHere air, vec3 moving, float h, float friction) {
+  const vec3 rubbed = (friction * time_at_rate(h, friction)) * (air.hair - moving);
   const vec3 against = air.outside - air.hair;
   const float lock_reynolds = max(u_reynolds * sqrt(dot(against, against)), kLeastReynolds);
   const float pulled = u_lock * air.density * drag_number(lock_reynolds);
   const float carried = pulled / (pulled + lock_reynolds);
-  const vec3 flow = air.outside - carried * against - moving;
+  const float with_wind =
+      dot(air.hair, air.outside) / max(dot(air.outside, air.outside), kTinySquared);
+  const vec3 own = air.hair - clamp(with_wind, 0.0, 1.0) * air.outside;
+  const vec3 flow = (1.0 - kAroundShare * carried) * air.outside + carried * own - moving - rubbed;
   const float rate = u_air_rate * drag_number(u_reynolds * sqrt(dot(flow, flow)));
-  const vec3 rubbing = friction * (air.hair - moving);
-  const vec3 across = time_at_rate(h, friction + rate) * (rubbing + rate * flow);
-  const float along_rate = kAlongShare * rate;
-  const vec3 all_along = time_at_rate(h, friction + along_rate) * (rubbing + along_rate * flow);
+  const float time = time_at_rate(h, rate);
   const float length_squared = max(dot(air.along, air.along), kTinySquared);
-  return across + air.along * (dot(all_along - across, air.along) / length_squared);
+  const float slip = (1.0 - kAlongShare) * (dot(flow, air.along) / length_squared);
+  return Pull(rubbed + (time * rate) * (flow - slip * air.along), h / time);
 }
 #endif
 
@@ -103,7 +122,8 @@ void main() {
     const vec4 stored = texelFetch(u_velocity, int(at));
     const vec3 position = texelFetch(u_position, int(at)).xyz;
 #if HAS_WAY
-    const vec3 moving = texelFetch(u_displacement, int(at)).xyz * u_step.push.w - u_step.head_velocity.xyz;
+    const vec3 way = texelFetch(u_displacement, int(at)).xyz;
+    const vec3 moving = way * u_step.push.w - u_step.head_velocity.xyz;
 #else
     const vec3 moving = stored.xyz - u_step.head_velocity.xyz;
 #endif
@@ -141,7 +161,12 @@ void main() {
 #endif
     const vec3 after = i + 1u < u_step.shape.y ? texelFetch(u_position, int(at + stride)).xyz : position;
     const AirHere air = AirHere(outside, here.velocity, here.density, after - before);
-    const vec3 limited = held + taken_on(air, moving, h, drag);
+    const Pull pull = taken_on(air, moving, h, drag);
+#if HAS_WAY
+    const vec3 limited = held / pull.inertia + pull.gained;
+#else
+    const vec3 limited = held + pull.gained;
+#endif
     before = position;
 #else
     const vec3 gained = share * (push + drag * (here.velocity - moving));
@@ -150,6 +175,9 @@ void main() {
         select(squared > fastest * fastest, gained * (fastest * inversesqrt(squared)), gained);
 #endif
     const lane_bool is_lost = is_broken(stored.xyz) || is_broken(position) || is_broken(limited);
+#if HAS_AIR && HAS_WAY
+    b_displacement.value[at] = vec4(way, select(is_lost, 0.0, pull.inertia - 1.0));
+#endif
     b_velocity.velocity[at] = vec4(select(is_lost, stored.xyz, stored.xyz + limited), stored.w);
   }
 }

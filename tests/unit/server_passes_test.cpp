@@ -175,7 +175,7 @@ TEST(SimStages, AStepRunInStagesIsTheStepThatTheFactsAskForBitForBit) {
     ASSERT_EQ(world.solver.steps.size(), expected.size());
     for (size_t i = 0; i < expected.size(); ++i) {
       const StepInput& ran = world.solver.steps[i];
-      EXPECT_EQ(ran.begins_step, i % scene.substeps == 0);
+      EXPECT_EQ(ran.renews_volume, i % scene.substeps == 0);
       EXPECT_EQ(ran.world_from_head_rotation, expected[i].world_from_head_rotation);
       EXPECT_EQ(ran.head_shift_m, expected[i].head_shift_m);
       EXPECT_EQ(ran.wind_mps, expected[i].wind_mps);

@@ -174,7 +174,7 @@ Status Predictor::prepare_volume(simd::InstructionSet set) {
 }
 
 void Predictor::run_volume(const StepInput& input, const StepBlock& block, const LanePlanes& planes) {
-  if (input.begins_step) {
+  if (input.renews_volume) {
     const auto view = [&](PlaneRole role) { return planes[static_cast<size_t>(role)]->view(); };
     const PlaneRole motion = kernel_.carries_way ? PlaneRole::Displacement : PlaneRole::Velocity;
     volume_->fill(block, {view(PlaneRole::Position), view(motion), kernel_.carries_way}, volume_table_);
