@@ -8,6 +8,7 @@
 #include "common/base/profile.h"
 #include "common/base/units.h"
 #include "common/groom/groom_asset.h"
+#include "common/scene/scene_file.h"
 #include "common/strands/scene_asset.h"
 #include "server/publish/publisher.h"
 #include "server/scene/scene_content.h"
@@ -23,12 +24,17 @@ constexpr double kSettleS = 1.5;
 // Of the lattice that the publisher is given and nobody sees.
 constexpr float kPublishedBoundM = 1e-4f;
 
-Result<std::unique_ptr<Solver>> make_solver(const SceneDesc& scene, Executor* executor) {
+Result<std::unique_ptr<Solver>> make_solver(const SceneDesc& scene, const SceneContent& content,
+                                            Executor* executor) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
   ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
   RETURN_IF_ERROR(check_step(*row, parameters, kStreamFrameS / scene.substeps));
   if (executor == nullptr) return row->make_reference(parameters);
-  return row->make(parameters, {executor, analyse(scene, {})});
+  SolverContext context{executor, analyse(scene, {})};
+  context.volume = scene.volume;
+  context.head_field = content.head_field;
+  if (scene.quality == kFullQuality) context.groom_gravity_in_head_mps2 = scene.gravity_mps2;
+  return row->make(parameters, context);
 }
 
 /// As the publisher does: head-relative world axes to head space, in double.
@@ -80,13 +86,15 @@ double elapsed_ms(int64_t begin_ns) {
 }  // namespace
 
 SceneDesc recorded_scene(const RecordingDesc& desc) {
-  SceneDesc scene = built_in_scene();
+  const bool is_full = desc.solver == kFullHair;
+  SceneDesc scene = is_full ? built_in_scene_with({"quality=full"}).value() : built_in_scene();
   auto& groom = std::get<ProceduralGroomDesc>(scene.groom);
   groom.strand_count = desc.size.strand_count;
   groom.vertex_count = desc.size.vertex_count;
+  scene.step_rate_hz = 1.0 / kStreamFrameS;
+  if (is_full) return scene;
   scene.solver.parameters["sag_free"] = kHangingShare;
   if (!desc.solver.empty() && desc.solver != scene.solver.name) scene.solver = {desc.solver, {}};
-  scene.step_rate_hz = 1.0 / kStreamFrameS;
   return scene;
 }
 
@@ -112,12 +120,12 @@ Result<StreamRecording> record_strands(const RecordingDesc& desc) {
   RETURN_IF_ERROR(check_recording(desc));
   const SceneDesc scene = recorded_scene(desc);
   ASSIGN_OR_RETURN(const SceneContent content, load_scene_content(scene));
-  ASSIGN_OR_RETURN(const auto solver, make_solver(scene, desc.executor));
+  ASSIGN_OR_RETURN(const auto solver, make_solver(scene, content, desc.executor));
 
   StreamRecording recording;
   recording.motion_name = desc.motion.name;
   recording.moved_by = desc.executor != nullptr ? to_string(desc.executor->info().device) : kMovedByReference;
-  recording.solver = scene.solver.name;
+  recording.solver = desc.solver == kFullHair ? kFullHair : scene.solver.name;
   recording.shape = {desc.size.strand_count, desc.size.vertex_count,
                      make_scene_asset(content.groom, {}).rest_position_m};
   const MotionSurvey survey = survey_motion(desc.motion, desc.seconds);

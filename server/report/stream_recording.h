@@ -30,11 +30,14 @@ std::string to_string(const StreamSize& size);
 /// The double-precision solver, whose steps nobody is told.
 inline constexpr const char* kMovedByReference = "double";
 
+/// In place of a solver's name: the built-in scene in full quality, with its style.
+inline constexpr const char* kFullHair = "full";
+
 struct RecordingDesc {
   StreamMotion motion;
   StreamSize size;
   double seconds = 3.0;
-  std::string solver;            // empty: the built-in scene's
+  std::string solver;            // empty: the built-in scene's; kFullHair
   Executor* executor = nullptr;  // nullptr: the double-precision solver
   MotionPart part = MotionPart::Median;
 };

@@ -66,6 +66,9 @@ inline constexpr double kTimesFewerThanPlain = 5.7;
 // ---- `step` at 0.1 mm when all of the wind is known, half a second each, dftl ----
 
 inline constexpr uint32_t kStepStrands = 2'000;
+/// Bits per vertex of the built-in head motions with hair of full quality: idle, turning, violent.
+inline constexpr double kFullStepBits[] = {0.23, 0.18, 0.3};
+inline constexpr double kFullTangentBits[] = {1.2, 2.3, 6.0};
 /// Bits per vertex of the built-in head motions.
 inline constexpr double kStepIdleBits = 0.15;
 inline constexpr double kStepActiveBits = 0.17;

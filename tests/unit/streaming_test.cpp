@@ -365,6 +365,23 @@ TEST(StreamClaims, BitsOfStepWhenTheWindIsKnown) {
     expect_claimed(stepped(motions[i], false).rows[0].bits, claimed[i], "step, " + motions[i].name);
 }
 
+// The scene as it is served in full quality: rods that act on each other, in air, on the head's own shape.
+TEST(StreamClaims, BitsOfFullQuality) {
+  const std::vector<StreamMotion> motions = built_in_stream_motions();
+  for (size_t i = 0; i < motions.size(); ++i) {
+    const auto recording = record_strands(
+        {motions[i], {claims::kStepStrands, claims::kStreamVertices}, kClaimedSeconds, kFullHair, lanes()});
+    ASSERT_TRUE(recording.ok()) << recording.error().to_string();
+    for (const StreamCodecRow& codec : own_stream_codecs(kGoalBoundM)) {
+      if (codec.name != "tangent" && (codec.name != "step" || codec.wind != WindTold::Known)) continue;
+      const auto measured = measure_codec(codec, *recording);
+      ASSERT_TRUE(measured.ok()) << measured.error().to_string();
+      const auto& claimed = codec.name == "step" ? claims::kFullStepBits : claims::kFullTangentBits;
+      expect_claimed(measured->bits, claimed[i], codec.name + ", full, " + motions[i].name);
+    }
+  }
+}
+
 // What the page and README.md say of half a second.
 TEST(StreamClaims, StepTakesFewerBitsOnceItKnowsHowStrandsMove) {
   const StreamMotion walk = built_in_stream_motions()[1];
