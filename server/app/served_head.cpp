@@ -221,7 +221,10 @@ void ServedHead::lower_quality() {
   if (has_lowered_quality_ || !running || running->quality != kAutoQuality) return;
   has_lowered_quality_ = true;
   if (running->solver.name == kCheapestSolver) return;
-  log_warn("sim", "quality auto: fast from here on, as full does not keep up with real time");
+  log_warn(
+      "sim",
+      "quality auto: fast from here on, as full does not keep up with real time; where fewer strands are "
+      "simulated it may: strandcast-ctl set detail.simulated_share=0.5, then quality=full");
   source_->post(SetParameter{std::string("quality=") + kFastQuality}, {}, "quality auto");
 }
 

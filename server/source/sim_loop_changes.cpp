@@ -236,7 +236,7 @@ Status SimLoop::settle_quality() {
     log_info("sim", "quality auto: full, as {}", why);
     return {};
   }
-  log_info("sim", "quality auto: fast, as {}", why);
+  log_info("sim", "quality auto: fast, as {}; full looks better: strandcast-ctl set quality=full", why);
   ASSIGN_OR_RETURN(config_.scene, change_scene(config_.scene, std::string("quality=") + kFastQuality));
   config_.scene.quality = kAutoQuality;
   return rebuild_solver(config_.scene, analyse(config_.scene, facts_));
