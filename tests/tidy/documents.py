@@ -46,7 +46,8 @@ class Tree:
             text = open(file, encoding="utf-8").read()
             self.tests.update(f"{a}.{b}" for a, b in re.findall(r"^TEST(?:_F|_P)?\((\w+),\s*(\w+)", text, re.M))
         self.proto = open(os.path.join(root, "proto/strandcast/v1/scene.proto"), encoding="utf-8").read()
-        self.helps = read_helps(root, programs, "\n".join(self.documents.values()))
+        self.helps = Helps(root, programs)
+        self.helps.ask_ahead("\n".join(self.documents.values()))
 
     def exists(self, path):
         return bool(glob.glob(os.path.join(self.root, path)))
@@ -55,32 +56,51 @@ class Tree:
         return [d for d in self.documents if any(fnmatch.fnmatch(d, p) for p in patterns)]
 
 
-def read_helps(root, programs, text):
-    """{("strandcast-ctl", "feed"): its --help, ...}: programs, and those of their commands that the text has."""
-    words = set(re.findall(r"[a-z-]+", text))
+def commands_in(text):
+    """Names of commands that a program lists in its --help."""
+    part = text.split("\nSubcommands:\n")
+    return re.findall(r"^  ([a-z-]+)", part[1], re.M) if len(part) > 1 else []
 
-    def ask(key):
+
+class Helps:
+    """What programs, scripts and their commands say to --help: asked when it is needed, since each start takes its time.
+
+    Keys are ("strandcast-ctl", "mocap", "subject"); in: whether there is such a program or command.
+    """
+
+    def __init__(self, root, programs):
+        self.root, self.programs = root, programs
+        first = [(f"strandcast-{p}",) for p in PROGRAMS] + [(s,) for s in SCRIPTS]
+        with concurrent.futures.ThreadPoolExecutor(4) as pool:
+            self.texts = dict(pool.map(lambda key: (key, self.ask(key)), first))
+
+    def ask(self, key):
+        if key == ("tests/nightly.sh",):  # it has no --help
+            return open(os.path.join(self.root, key[0]), encoding="utf-8").read()
+        script = os.path.join(self.root, key[0])
+        call = [os.path.join(self.programs, key[0])]
         if key[0] in SCRIPTS:
-            script = os.path.join(root, key[0])
-            call = ["python3", "-B", script] if not script.endswith(".sh") else ["bash", script]
-        else:
-            call = [os.path.join(programs, key[0])]
-        run = subprocess.run([*call, *key[1:], "--help"], capture_output=True, text=True, timeout=60)
-        return key, run.stdout
+            call = ["bash", script] if script.endswith(".sh") else ["python3", "-B", script]
+        return subprocess.run([*call, *key[1:], "--help"], capture_output=True, text=True, timeout=60).stdout
 
-    def commands_of(text):
-        part = text.split("\nSubcommands:\n")
-        return [c for c in re.findall(r"^  ([a-z-]+)", part[1], re.M) if c in words] if len(part) > 1 else []
+    def ask_ahead(self, text):
+        """Asks several at a time for the commands that the text shows with options."""
+        found = re.findall(r"^    (?:\S*/)?(strandcast-(?:ctl|report)) (?:--\S+ \S+ )*([a-z-]+) [^#\n]*--", text, re.M)
+        keys = {key for key in found if key in self}
+        with concurrent.futures.ThreadPoolExecutor(4) as pool:
+            self.texts.update(pool.map(lambda key: (key, self.ask(key)), keys))
 
-    helps = {}
-    with concurrent.futures.ThreadPoolExecutor(8) as pool:
-        keys = [(f"strandcast-{p}",) for p in PROGRAMS] + [(s,) for s in SCRIPTS if s != "tests/nightly.sh"]
-        keys += [("deploy/fleet/strandcast-fleet", "start")]
-        for _ in range(3):
-            helps.update(pool.map(ask, keys))
-            keys = [(*key, c) for key in keys for c in commands_of(helps[key]) if c not in ("fleet", "grid")]
-    helps[("tests/nightly.sh",)] = open(os.path.join(root, "tests/nightly.sh"), encoding="utf-8").read()
-    return helps
+    def __contains__(self, key):
+        if len(key) == 1:
+            return key in self.texts
+        if key[0] == "deploy/fleet/strandcast-fleet":
+            return len(key) == 2 and key[1] in re.search(r"\{(.*?)\}", self[key[:1]]).group(1).split(",")
+        return key[-1] in commands_in(self[key[:-1]])
+
+    def __getitem__(self, key):
+        if key not in self.texts:
+            self.texts[key] = self.ask(key)
+        return self.texts[key]
 
 
 # ---- sentences
@@ -290,19 +310,21 @@ def faults_of_command(tree, words):
     if (program,) not in tree.helps:
         yield f"no such program: {program}"
         return
-    key, known = (program,), tree.helps[(program,)]
+    keys = [(program,)]
     for word in words[1:]:
-        if word in ("fleet", "grid") and key == ("strandcast-ctl",):
-            key, known = (f"deploy/fleet/strandcast-{word}",), known + tree.helps[(f"deploy/fleet/strandcast-{word}",)]
-        elif (*key, word) in tree.helps:
-            key, known = (*key, word), known + tree.helps[(*key, word)]
-        elif word == "--":
+        if word == "--":
+            keys.append(("strandcast-server",))
             break
-    if program in ("strandcast-ctl", "strandcast-report") and len(key) == 1 and key[0] == program:
+        if word in ("fleet", "grid") and keys == [("strandcast-ctl",)]:
+            keys.append((f"deploy/fleet/strandcast-{word}",))
+        elif re.fullmatch(r"[a-z-]+", word) and not word.startswith("-") and (*keys[-1], word) in tree.helps:
+            keys.append((*keys[-1], word))
+    key = keys[-1]
+    if program in ("strandcast-ctl", "strandcast-report") and len(keys) == 1:
         yield f"{program}: no command in: {' '.join(words)}"
-    options = options_of(known)
-    options |= options_of(tree.helps[("strandcast-server",)]) if "--" in words else set()
-    yield from (f"{' '.join(key)} has no {w}" for w in words[1:] if re.match(r"--[a-z]", w) and w.split("=")[0] not in options)
+    given = [w.split("=")[0] for w in words[1:] if re.match(r"--[a-z]", w)]
+    options = options_of(*(tree.helps[k] for k in keys)) if given else set()
+    yield from (f"{' '.join(key)} has no {option}" for option in given if option not in options)
     for i, word in enumerate(words[1:], 1):
         if "=" in word and words[i - 1] in ("--set", "set") and not field_exists(tree.proto, word.split("=")[0]):
             yield f"a scene has no {word.split('=')[0]}"
@@ -318,7 +340,7 @@ def check_commands(tree):
 
 
 def check_options_in_prose(tree):
-    known = options_of(*tree.helps.values()) | OTHER_OPTIONS
+    known = options_of(*tree.helps.texts.values()) | OTHER_OPTIONS  # of all commands that documents show with options
     for name in tree.matching(COMMAND_DOCUMENTS + ["ARCHITECTURE.md", "CHANGELOG.md", "proto/*.md"]):
         for span in re.findall(r"`([^`\n]+)`", tree.documents[name]):
             for option in re.findall(r"(?:^|[\s|\[])(--[a-z][a-z-]*)", span):
