@@ -42,12 +42,24 @@ class Tree:
         found = sorted({f for name in names for f in glob.glob(os.path.join(root, name))})
         self.documents = {os.path.relpath(f, root): open(f, encoding="utf-8").read() for f in found}
         self.tests = set()
-        for file in glob.glob(os.path.join(root, "tests", "**", "*.cpp"), recursive=True):
-            text = open(file, encoding="utf-8").read()
-            self.tests.update(f"{a}.{b}" for a, b in re.findall(r"^TEST(?:_F|_P)?\((\w+),\s*(\w+)", text, re.M))
+        self.sources = {}  # of each source file that names a document: its lines that do
+        for top in ("client", "cmake", "common", "deploy", "examples", "server", "shaders", "tests"):
+            for folder, _, files in os.walk(os.path.join(root, top)):
+                for file in files:
+                    if file.endswith((".cpp", ".h", ".txt", ".cmake", ".sh", ".py", ".ts", ".comp", ".glsl", "-fleet", "-grid")):
+                        self.read_source(os.path.join(folder, file))
         self.proto = open(os.path.join(root, "proto/strandcast/v1/scene.proto"), encoding="utf-8").read()
         self.helps = Helps(root, programs)
         self.helps.ask_ahead("\n".join(self.documents.values()))
+
+    def read_source(self, file):
+        if "/vectors/" in file or os.path.basename(file) == "documents.py":
+            return
+        text = open(file, encoding="utf-8").read()
+        if file.endswith(".cpp"):
+            self.tests.update(f"{a}.{b}" for a, b in re.findall(r"^TEST(?:_F|_P)?\((\w+),\s*(\w+)", text, re.M))
+        if ".md" in text:
+            self.sources[os.path.relpath(file, self.root)] = "\n".join(l for l in text.split("\n") if ".md" in l)
 
     def exists(self, path):
         return bool(glob.glob(os.path.join(self.root, path)))
@@ -173,6 +185,16 @@ def check_links(tree):
                 yield f"{name}: no such file: {target}"
             elif anchor and anchor not in anchors(tree.documents.get(path, "")):
                 yield f"{name}: no such heading: {target}"
+
+
+def check_references(tree):
+    """Comments and messages of the code name documents that exist; a bare name lies at the top, or beside the file."""
+    for file, text in tree.sources.items():
+        for name in re.findall(r"(?<![\w/*.-])((?:docs|proto|shaders|deploy)/[\w/-]+\.md|[A-Z]{4,}\.md)", text):
+            beside = os.path.join(os.path.dirname(file), name)
+            known = (name, beside, f"proto/{name}")
+            if name != "ORIGINS.md" and not any(n in tree.documents for n in known):  # it lies beside the tests' data
+                yield f"{file}: no such document: {name}"
 
 
 def check_paths(tree):
@@ -355,7 +377,7 @@ def check_runs(tree):
             yield f"{name}: no commands are run"
 
 
-CHECKS = [check_sizes, check_means, check_long_sentences, check_words, check_links, check_paths, check_recipes, check_tests,
+CHECKS = [check_sizes, check_means, check_long_sentences, check_words, check_links, check_references, check_paths, check_recipes, check_tests,
           check_code_map, check_commands, check_options_in_prose, check_runs]
 
 # A fault for each check: document, text that is there, and what a careless hand makes of it.
@@ -366,6 +388,7 @@ PLANTED = [
     (check_words, "README.md", "## Start\n", "## Start\n\nWhoever reads this.\n"),
     (check_links, "README.md", "(SECURITY.md)", "(SAFETY.md)"),
     (check_links, "README.md", "(SECURITY.md)", "(SECURITY.md#no-such-heading)"),
+    (check_references, "client/app/view_options.cpp", "docs/use/try-it.md", "docs/use/tried-it.md"),
     (check_paths, "ARCHITECTURE.md", "`server/stream/stream_hub.h`", "`server/stream/stream_hubs.h`"),
     (check_recipes, "CONTRIBUTING.md", "`shaders/sim/NAME.comp`", "`shaders/sims/NAME.comp`"),
     (check_tests, "ARCHITECTURE.md", "`Roles.EveryMessageAndRole`", "`Roles.EveryMessageAndRoles`"),
@@ -388,17 +411,18 @@ def self_test(tree):
     missed = 0
     before = {}
     for check, name, right, wrong in PLANTED:
-        kept = tree.documents[name]
+        texts = tree.documents if name in tree.documents else tree.sources
+        kept = texts.get(name, "")
         if right not in kept:
             print(f"self-test: {name} no longer has {right!r}")
             missed += 1
             continue
         before.setdefault(check, set(check(tree)))
-        tree.documents[name] = kept.replace(right, wrong, 1)
+        texts[name] = kept.replace(right, wrong, 1)
         if not set(check(tree)) - before[check]:
             print(f"{check.__name__} does not find {wrong[:60]!r} in {name}")
             missed += 1
-        tree.documents[name] = kept
+        texts[name] = kept
     for check in set(CHECKS) - {p[0] for p in PLANTED}:
         print(f"no fault is planted for {check.__name__}")
         missed += 1
