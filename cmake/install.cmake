@@ -9,8 +9,7 @@ install(TARGETS strandcast-server COMPONENT server)
 install(TARGETS strandcast-view COMPONENT viewer)
 install(TARGETS strandcast-ctl strandcast-report COMPONENT tools)
 install(DIRECTORY deploy/scenes DESTINATION ${CMAKE_INSTALL_DATADIR}/strandcast COMPONENT server)
-install(DIRECTORY deploy/scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/strandcast COMPONENT tools
-  PATTERN README.md EXCLUDE)
+install(DIRECTORY deploy/scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/strandcast COMPONENT tools)
 
 # strandcast-ctl fleet and grid start them.
 install(PROGRAMS deploy/fleet/strandcast-fleet deploy/fleet/strandcast-grid DESTINATION lib/strandcast COMPONENT tools)
@@ -26,12 +25,13 @@ install(FILES ${packages}/strandcast.svg DESTINATION ${CMAKE_INSTALL_DATADIR}/ic
 # ---- documents
 
 set(documents ${CMAKE_INSTALL_DATADIR}/doc/strandcast-doc)
-install(FILES README.md ARCHITECTURE.md SECURITY.md CHANGELOG.md DESTINATION ${documents} COMPONENT doc)
+install(FILES README.md ARCHITECTURE.md CONTRIBUTING.md STYLE.md SECURITY.md CHANGELOG.md DESTINATION ${documents}
+  COMPONENT doc)
+install(DIRECTORY docs DESTINATION ${documents} COMPONENT doc)
+install(FILES shaders/README.md DESTINATION ${documents}/shaders COMPONENT doc)
 install(FILES proto/WIRE.md proto/RECORDING.md DESTINATION ${documents}/proto COMPONENT doc)
 install(FILES deploy/hair.png deploy/page.png deploy/streaming.png deploy/work_precision.png
   DESTINATION ${documents}/deploy COMPONENT doc)
-install(FILES deploy/scenarios/README.md DESTINATION ${documents}/deploy/scenarios COMPONENT doc)
-install(FILES deploy/fleet/README.md DESTINATION ${documents}/deploy/fleet COMPONENT doc)
 install(DIRECTORY examples DESTINATION ${documents} COMPONENT doc)
 install(DIRECTORY tests/conformance/vectors DESTINATION ${documents}/conformance COMPONENT doc)
 

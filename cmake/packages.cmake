@@ -49,9 +49,9 @@ strandcast_package(tools strandcast-tools "tools for a hair simulation server"
 "strandcast-ctl feeds, steers, watches and tests a Strandcast server;
 strandcast-report compares strand models, codecs and ways to draw.")
 strandcast_package(doc strandcast-doc "documents and examples of a hair simulation server"
-"How Strandcast is built, its protocol and file formats byte by byte, clients
-in C++, Python and JavaScript as examples, and kept streams to test others
-with.")
+"How Strandcast is used and built, its protocol and file formats byte by byte,
+clients in C++, Python and JavaScript as examples, and kept streams to test
+others with.")
 strandcast_package(dev libstrandcast-dev "strand core of Strandcast, for other programs"
 "Decodes strands that a Strandcast server streams: codecs, replay and the
 protocol's messages. For CMake: find_package(Strandcast).")

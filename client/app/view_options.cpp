@@ -202,7 +202,7 @@ Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
     if (raw.pictures == to_string(codec)) options.picture_codecs = codec_bit(codec);
   if ((options.picture_codecs & decodable_picture_codecs()) == 0)
     return make_error(ErrorCode::Unsupported,
-                      "this build cannot show --pictures {} (README.md says how to build it in)",
+                      "this build cannot show --pictures {} (docs/use/try-it.md says how to build it in)",
                       raw.pictures);
   if (raw.codec != kAnyCodec) {
     RETURN_IF_ERROR(strand_codec_info(raw.codec));

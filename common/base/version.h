@@ -4,7 +4,7 @@
 
 namespace strandcast {
 
-/// That of project() in CMakeLists.txt, for example "0.1.0".
+/// That of project() in CMakeLists.txt, for example "0.2.0".
 const char* version();
 
 }  // namespace strandcast

@@ -190,7 +190,7 @@ void add_view_sections(HtmlPage& page, const StreamView& view) {
   page.heading("Strands or pictures?");
   std::string missing;
   if (!view.missing.empty())
-    missing = fmt::format(" This build has no encoder for {}: see STRANDCAST_H264 in the README.",
+    missing = fmt::format(" This build has no encoder for {}: see STRANDCAST_H264 in docs/use/try-it.md.",
                           fmt::join(view.missing, ", "));
   page.paragraph(fmt::format(
       "What the project's picture codecs need at 60 pictures a second to be as near to the exact picture as "

@@ -19,7 +19,7 @@
 namespace strandcast {
 namespace {
 
-/// Velocities of a shaken tuft's volume, as README has them.
+/// Velocities of a shaken tuft's volume, as docs/internals/measuring.md has them.
 constexpr double kFrictionPerS = 20.0;
 constexpr double kRepulsionPerS2 = 18'000.0;
 constexpr float kTuftLengthM = 0.2f;

@@ -1,5 +1,5 @@
-// The numbers in README.md and ARCHITECTURE.md are those that tests hold (tests/support/claims.h) or that the
-// code has, and where README.md speaks of what was measured there is no other.
+// The numbers in the documents are those that tests hold (tests/support/claims.h) or that the code has, and
+// docs/internals/figures.md has no other measured number. README.md has none at all.
 #include "tests/support/claims.h"
 #include "common/base/units.h"
 
@@ -31,14 +31,14 @@ std::string percent(double share) {
   return fmt::format("{:g} %", 100.0 * share);
 }
 
-std::vector<std::string> readme_claims() {
+std::vector<std::string> measured_claims() {
   using namespace claims;
   return {
       fmt::format("({} vertices, one linear solve per step)", kRodVertices),
       fmt::format("tip of a cantilever within {} of its length up to Gamma {:g}", percent(kCantileverTip),
                   kCantileverGamma),
       fmt::format("within {} up to {:g}", percent(kHeavyCantileverTip), kHeavyCantileverGamma),
-      fmt::format("under an end load within {}", percent(kEndLoadTip)),
+      fmt::format("the tip under an end load within {}", percent(kEndLoadTip)),
       fmt::format("first swing within {} at {:g} Hz", percent(kFirstSwing), kFirstSwingHz),
       fmt::format("curls as helical springs within {}", percent(kCurlSpring)),
       fmt::format("buckling load bracketed within {}", percent(kBuckling)),
@@ -62,22 +62,28 @@ std::vector<std::string> readme_claims() {
           "{:g} in the median half second of a walk ({}): {:g} times fewer than the best of the others "
           "with a prediction in time around it.",
           kStepClipBits, kStreamClip, kStepTimesFewerThanTemporal),
+      fmt::format("`step` takes {:g} bits per vertex when idle, {:g} turning and {:g} in violent motion, and "
+                  "`tangent` "
+                  "{:g}, {:g} and {:g} bits",
+                  kFullStepBits[0], kFullStepBits[1], kFullStepBits[2], kFullTangentBits[0],
+                  kFullTangentBits[1], kFullTangentBits[2]),
       fmt::format("32-bit floats take {}", 3 * 32),
       fmt::format("{} vertices, steps of 1/{:g} s", WorkGrid().reference_vertices,
                   WorkGrid().reference_rate_hz),
-      fmt::format("from `{}`, another model: within {}", kCheckModel, percent(kModelsApart)),
+      fmt::format("from `{}`, another model, by at most {} of the length", kCheckModel,
+                  percent(kModelsApart)),
       fmt::format("at {:g}, {:g}, {:g}, {:g} and {:g} mm", 1e3 * kStreamBoundsM[0], 1e3 * kStreamBoundsM[1],
                   1e3 * kStreamBoundsM[2], 1e3 * kStreamBoundsM[3], 1e3 * kStreamBoundsM[4]),
       fmt::format("from {:g} m and {:g} m at each bound", kViewDistancesM[0], kViewDistancesM[1]),
       fmt::format("stream.bound_m={:g}", 2e-4),
       fmt::format("{:.5f}..{:.4f}", scene_fields::kStreamBound.minimum, scene_fields::kStreamBound.maximum),
-      fmt::format("viewers hear of it within {:g} s", kLookChangeNs / kNsPerS),
+      fmt::format("Viewers hear of it within {:g} s", kLookChangeNs / kNsPerS),
       fmt::format("states per second, {:g}..{:.0f},000, at most", scene_fields::kStrandRate.minimum,
                   scene_fields::kStrandRate.maximum / 1000.0),
   };
 }
 
-std::vector<std::string> architecture_claims() {
+std::vector<std::string> built_claims() {
   using namespace claims;
   return {
       fmt::format("({:g} mm unless the scene says otherwise)", 1e3 * StreamDesc().bound_m),
@@ -98,15 +104,20 @@ std::vector<std::string> architecture_claims() {
   };
 }
 
-TEST(Claims, StandInReadme) {
-  const std::string text = on_one_line(text_of("README.md"));
-  for (const std::string& claim : readme_claims()) EXPECT_NE(text.find(claim), std::string::npos) << claim;
+/// README.md, ARCHITECTURE.md and the pages under docs, in one text.
+std::string documents() {
+  std::string text = text_of("README.md") + text_of("ARCHITECTURE.md");
+  const std::filesystem::path root = STRANDCAST_SOURCE_DIR;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(root / "docs"))
+    if (entry.path().extension() == ".md")
+      text += text_of(std::filesystem::relative(entry.path(), root).string());
+  return on_one_line(text);
 }
 
-TEST(Claims, StandInArchitecture) {
-  const std::string text = on_one_line(text_of("ARCHITECTURE.md"));
-  for (const std::string& claim : architecture_claims())
-    EXPECT_NE(text.find(claim), std::string::npos) << claim;
+TEST(Claims, StandInDocuments) {
+  const std::string text = documents();
+  for (const std::string& claim : measured_claims()) EXPECT_NE(text.find(claim), std::string::npos) << claim;
+  for (const std::string& claim : built_claims()) EXPECT_NE(text.find(claim), std::string::npos) << claim;
 }
 
 /// Numbers with a unit of something measured, outside of commands.
@@ -131,18 +142,22 @@ TEST(Claims, NumbersAreSeenOutsideOfCommands) {
               testing::ElementsAre("0.3 microseconds", "3.8 ms"));
 }
 
-TEST(Claims, AreAllThatReadmeMeasures) {
-  const std::string text = text_of("README.md");
-  const size_t begin = text.find("## What it measures");
-  const size_t end = text.find("## Where to read on");
-  ASSERT_TRUE(begin != std::string::npos && begin < end && end != std::string::npos);
-  std::string rest =
-      on_one_line(std::regex_replace(text.substr(begin, end - begin), std::regex("\n    [^\n]*"), "\n"));
-  for (const std::string& claim : readme_claims())
+TEST(Claims, AreAllThatFiguresMeasure) {
+  const std::string text = text_of("docs/internals/figures.md");
+  const size_t end = text.find("## Where other numbers are held");
+  ASSERT_NE(end, std::string::npos);
+  std::string rest = on_one_line(text.substr(0, end));
+  EXPECT_THAT(measured_numbers(rest), testing::Not(testing::IsEmpty()));
+  for (const std::string& claim : measured_claims())
     for (size_t at = rest.find(claim); at != std::string::npos; at = rest.find(claim))
       rest.erase(at, claim.size());
   EXPECT_THAT(measured_numbers(rest), testing::IsEmpty())
       << "put them into tests/support/claims.h with a test";
+}
+
+TEST(Claims, ReadmeMeasuresNothing) {
+  EXPECT_THAT(measured_numbers(text_of("README.md")), testing::IsEmpty())
+      << "docs/internals/figures.md is the place for them";
 }
 
 }  // namespace

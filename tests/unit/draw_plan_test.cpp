@@ -11,7 +11,7 @@ namespace strandcast::draw_plan_test {
 namespace {
 constexpr int64_t kDisplayNs = kSInNs / 60;
 constexpr size_t kLast = kDrawSteps.size() - 1;
-// As README.md and ARCHITECTURE.md say: ten pictures a second, half a pixel, 200 ms.
+// As docs/internals/rendering.md says: ten pictures a second, half a pixel, 200 ms.
 static_assert(kMovingBudgetMs == 100.0 && kSeenPx == 0.5 && kStandNs == 200 * kMsInNs);
 
 /// A machine on which a picture of the first step takes so long, and the others as the table says.

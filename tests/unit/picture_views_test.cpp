@@ -194,7 +194,7 @@ TEST(PictureViews, WithoutAGpuTheBudgetIsThatOfTheProcessor) {
   EXPECT_TRUE(views.assign({7, "c", false}, scene_view())) << "but the scene's own";
 }
 
-// The figures of SECURITY.md.
+// The figures of docs/internals/more_limits.md.
 TEST(PictureViews, TheBudgetsAreAsPromised) {
   EXPECT_EQ(kHardwareBudget.picture_pixels, 3840u * 2160u);
   EXPECT_EQ(kHardwareBudget.all_pixels, 16'588'800u);

@@ -382,7 +382,7 @@ TEST(StreamClaims, BitsOfFullQuality) {
   }
 }
 
-// What the page and README.md say of half a second.
+// What the page and docs/internals/figures.md say of half a second.
 TEST(StreamClaims, StepTakesFewerBitsOnceItKnowsHowStrandsMove) {
   const StreamMotion walk = built_in_stream_motions()[1];
   const double bits = stepped(walk, false).rows[0].bits;
