@@ -222,7 +222,9 @@ void ServedHead::lower_quality() {
   has_lowered_quality_ = true;
   if (running->solver.name == kCheapestSolver) return;
   log_warn("sim", "quality auto: fast from here on, as full does not keep up with real time");
-  source_->post(SetParameter{std::string("quality=") + kFastQuality}, {}, "quality auto");
+  source_->post(
+      SetParameter{std::string("quality=") + kFastQuality},
+      [this](const Notice&) { desk_->tell_parameters(); }, "quality auto");
 }
 
 std::optional<SceneDesc> ServedHead::scene() const {

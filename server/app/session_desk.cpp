@@ -149,7 +149,6 @@ void SessionDesk::on_parameter_request(SessionId session, const ParameterRequest
   net_->send(session, list_of(parameters, request));
 }
 
-/// Whoever wants to hear of changes hears of what is other now. Any thread.
 void SessionDesk::tell_parameters() {
   if (parameter_watch_.is_empty()) return;
   const std::optional<SceneDesc> scene = parts_.source.scene();

@@ -67,6 +67,8 @@ class SessionDesk : public NetHandler {
   void tell_state_times();
   /// To relays, where something else is simulated; likewise.
   void tell_streams();
+  /// Parameters that are other, to who watches them; call after each change.
+  void tell_parameters();
 
   Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) override;
   void on_motion(SessionId session, const MotionSamples& samples, int64_t arrival_ns) override;
@@ -103,7 +105,6 @@ class SessionDesk : public NetHandler {
   Welcome make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const;
   bool may_control(SessionId session, std::string_view what);
   StateSource::Reply reply_to(SessionId session, const std::string& what);
-  void tell_parameters();
   void tell_quality(SessionId session, const Viewers::Pictures& pictures, const std::string& reason);
 
   const Parts parts_;

@@ -18,15 +18,27 @@ bool bears_volume(const SolverRow& row) {
 }  // namespace
 
 const std::vector<std::string>& live_fields() {
-  static const std::vector<std::string> kFields = {"solver",         "substeps",
-                                                   "gravity_mps2",   "follicle_limit_deg",
-                                                   "colliders",      "has_auto_collider",
-                                                   "bend_limit",     "body",
-                                                   "volume",         "air",
-                                                   "groom.hairs",    "quality",
-                                                   "detail",         "wind",
-                                                   "look",           "camera",
-                                                   "stream.bound_m", "stream.strand_rate_hz"};
+  static const std::vector<std::string> kFields = {"solver",
+                                                   "substeps",
+                                                   "gravity_mps2",
+                                                   "follicle_limit_deg",
+                                                   "colliders",
+                                                   "has_auto_collider",
+                                                   "bend_limit",
+                                                   "body",
+                                                   "volume",
+                                                   "air",
+                                                   "groom.hairs",
+                                                   "quality",
+                                                   "hair.stiffness",
+                                                   "hair.friction",
+                                                   "hair.wind",
+                                                   "detail",
+                                                   "wind",
+                                                   "look",
+                                                   "camera",
+                                                   "stream.bound_m",
+                                                   "stream.strand_rate_hz"};
   return kFields;
 }
 

@@ -227,17 +227,34 @@ bool SimLoop::starts_to_prepare(const Job& job) {
   return true;
 }
 
+/// Whether a slider that is dragged says otherwise before the value that waits last had its turn: only the
+/// newest counts then. Commands of a server in lockstep are all carried out. Under the lock.
+bool SimLoop::is_newer_value(const Job& job) const {
+  if (config_.is_lockstep || jobs_.empty() || jobs_.back().is_prepared) return false;
+  const auto* newer = std::get_if<SetParameter>(&job.what);
+  const auto* older = std::get_if<SetParameter>(&jobs_.back().what);
+  if (newer == nullptr || older == nullptr) return false;
+  const std::string path = newer->assignment.substr(0, newer->assignment.find('='));
+  return path.starts_with("hair.") && older->assignment.starts_with(path + '=');
+}
+
 void SimLoop::push(Job job) {
   const bool is_demand = std::holds_alternative<SourceDemand>(job.what);
   bool is_full = false;
+  std::optional<Job> older;
   {
     const std::lock_guard lock(mutex_);
+    if (is_newer_value(job)) {
+      older = std::move(jobs_.back());
+      jobs_.pop_back();
+    }
     // Of the demands only the newest counts.
     if (is_demand)
       std::erase_if(jobs_, [](const Job& old) { return std::holds_alternative<SourceDemand>(old.what); });
     is_full = job.is_command() && jobs_.size() >= kMaxPendingJobs;
     if (!is_full) jobs_.push_back(std::move(job));
   }
+  if (older && older->reply) older->reply({false, "Left out: a newer value came before its turn."});
   if (!is_full)
     changed_.notify_all();
   else if (job.reply)

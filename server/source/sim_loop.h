@@ -119,6 +119,7 @@ class SimLoop {
   void loop();
   void follow_script();
   void push(Job job);
+  bool is_newer_value(const Job& job) const;
   std::deque<Job> wait_for_jobs();
   std::deque<Job> take_jobs();
   void carry_out_in_turn(const Job& job);
