@@ -30,9 +30,7 @@ const std::vector<std::string>& live_fields() {
                                                    "air",
                                                    "groom.hairs",
                                                    "quality",
-                                                   "hair.stiffness",
-                                                   "hair.friction",
-                                                   "hair.wind",
+                                                   "hair",
                                                    "detail",
                                                    "wind",
                                                    "look",
@@ -40,6 +38,10 @@ const std::vector<std::string>& live_fields() {
                                                    "stream.bound_m",
                                                    "stream.strand_rate_hz"};
   return kFields;
+}
+
+bool is_shaped_otherwise(const SceneDesc& a, const SceneDesc& b) {
+  return a.hair.length != b.hair.length || a.hair.curl != b.hair.curl;
 }
 
 Status check_solver(const SceneDesc& scene) {

@@ -204,22 +204,27 @@ bool SimLoop::starts_to_prepare(const Job& job) {
   const auto* parameter = std::get_if<SetParameter>(&job.what);
   if (parameter == nullptr || job.is_prepared) return false;
   const Result<SceneDesc> scene = change_scene(config_.scene, parameter->assignment);
-  if (!scene || !moves_otherwise(*scene, config_.scene)) return false;
+  const bool has_other_shape = scene && is_shaped_otherwise(*scene, config_.scene);
+  if (!scene || !(has_other_shape || moves_otherwise(*scene, config_.scene))) return false;
   const Result<const SolverRow*> row = find_solver(scene->solver.name);
-  if (!row || !(*row)->prepare) return false;
+  if (!row || !(has_other_shape || (*row)->prepare)) return false;
   {
     const std::lock_guard lock(mutex_);
     is_preparing_ = true;
   }
   preparation_ =
-      std::jthread([this, job, scene = *scene, content = config_.content,
-                    gravity = builder_->groom_gravity_in_head_mps2()](const std::stop_token& stop) {
+      std::jthread([this, job, scene = *scene, content = config_.content, has_other_shape,
+                    gravity = builder_->groom_gravity_in_head_mps2()](const std::stop_token& stop) mutable {
         // Its error comes again, and is told, when the change is carried out.
+        if (has_other_shape)
+          if (auto other = load_scene_content(scene))
+            content = std::make_shared<const SceneContent>(std::move(other).value());
         static_cast<void>(prepare_solver(scene, content->groom, gravity, stop));
         {
           const std::lock_guard lock(mutex_);
           jobs_.push_front(job);
           jobs_.front().is_prepared = true;
+          if (has_other_shape) jobs_.front().content = content;
           is_preparing_ = false;
         }
         changed_.notify_all();
@@ -280,10 +285,16 @@ int64_t SimLoop::next_step_ns(int64_t time_ns) const {
   return std::llround(static_cast<double>(tick_ + 1) / config_.scene.step_rate_hz * kNsPerS);
 }
 
+std::shared_ptr<const SceneAsset> SimLoop::asset() const {
+  const std::lock_guard lock(mutex_);
+  return asset_;
+}
+
 SimStats SimLoop::stats() const {
   const std::lock_guard lock(mutex_);
   SimStats stats = stats_;
   stats.last_step_ns = last_step_ns_;
+  stats.built_ns = is_preparing_ ? now_ns() : built_ns_.load();
   if (const int64_t begin_ns = turn_begin_ns_; begin_ns != 0) stats.busy_ns = now_ns() - begin_ns;
   return stats;
 }

@@ -202,6 +202,16 @@ TEST(HairControls, FrictionIsThatOfTheVolume) {
   EXPECT_TRUE(moves_otherwise(scene, slides));
 }
 
+TEST(HairControls, AnotherLengthOrCurlIsAnotherShapeAndNothingElseIs) {
+  const SceneDesc scene = scene_with({});
+  for (const HairControl& control : kHairControls) {
+    SceneDesc other = scene;
+    other.hair.*control.value = 0.5;
+    const std::string name = control.name;
+    EXPECT_EQ(is_shaped_otherwise(scene, other), name == "length" || name == "curl") << name;
+  }
+}
+
 TEST(HairControls, LengthAndCurlAreThoseOfTheStrands) {
   const SceneDesc usual = scene_with({"quality=fast", "groom.procedural.curl_radius_m=0.01"});
   const auto groomed = load_scene_content(usual);
@@ -212,6 +222,8 @@ TEST(HairControls, LengthAndCurlAreThoseOfTheStrands) {
     return content->groom;
   };
   const Groom half = with("hair.length=0.5"), combed = with("hair.curl=0");
+  EXPECT_EQ(combed.rest_position_m, with("groom.procedural.curl_radius_m=0").rest_position_m)
+      << "as if it had grown without curls";
   const auto turned = [](const Groom& groom, uint32_t strand) {
     double sum = 0.0;
     const glm::vec3* point = groom.rest_position_m.data() + groom.offset[strand];

@@ -23,7 +23,7 @@ if (missing) {
   process.exit(77);
 }
 const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-page-'));
-const SLIDERS = ['Quality', 'Stiffness', 'Friction', 'Wind'];
+const SLIDERS = ['Quality', 'Length', 'Curl', 'Stiffness', 'Friction', 'Wind'];
 const SMALL = ['--set', 'groom.procedural.strand_count=400', '--set', 'groom.procedural.vertex_count=12'];
 
 class Server {
