@@ -79,6 +79,8 @@ Status ViewerSession::handle(ClientEvent& event) {
     take_mode(std::move(*change));
   } else if (const auto* look = std::get_if<LookChange>(&event)) {
     take_look(*look);
+  } else if (const auto* list = std::get_if<ParameterList>(&event)) {
+    take_parameters(*list);
   } else if (auto* scene = std::get_if<SceneText>(&event)) {
     scene_ = std::move(*scene);
   } else if (const auto* camera = std::get_if<CameraChange>(&event)) {
@@ -105,6 +107,21 @@ void ViewerSession::take_look(const LookChange& look) {
   if (look == look_) return;
   look_ = look;
   ++look_changes_;
+}
+
+/// A change tells the new values alone.
+void ViewerSession::take_parameters(const ParameterList& list) {
+  auto all = std::make_shared<std::vector<ParameterInfo>>();
+  if (list.is_change && parameters_ != nullptr) *all = *parameters_;
+  for (const ParameterInfo& one : list.parameters) {
+    const auto known = std::find_if(all->begin(), all->end(),
+                                    [&](const ParameterInfo& info) { return info.path == one.path; });
+    if (known != all->end())
+      *known = one;
+    else if (all->size() < kMaxListedParameters)
+      all->push_back(one);
+  }
+  parameters_ = std::move(all);
 }
 
 void ViewerSession::take_mode(ModeChange change) {

@@ -95,6 +95,8 @@ class ViewerSession {
   uint64_t camera_moves() const { return camera_moves_; }
   /// That, else the scene's own.
   const CameraDesc& camera() const { return moved_camera_ ? *moved_camera_ : look_.camera; }
+  /// Of the server's parameters those that were asked for last, as they are now; null: nobody has asked yet.
+  std::shared_ptr<const std::vector<ParameterInfo>> parameters() const { return parameters_; }
   /// The answer to the last SceneRequest, once.
   std::optional<SceneText> take_scene() { return std::exchange(scene_, std::nullopt); }
 
@@ -134,6 +136,7 @@ class ViewerSession {
   void acknowledge(const MediaEvent& event, int64_t decode_begin_ns);
   void take_mode(ModeChange change);
   void take_look(const LookChange& look);
+  void take_parameters(const ParameterList& list);
   void show(StreamMode mode);
 
   std::shared_ptr<ViewerClient> client_;
@@ -157,6 +160,7 @@ class ViewerSession {
   uint64_t look_changes_ = 0;
   std::optional<CameraDesc> moved_camera_;
   uint64_t camera_moves_ = 0;
+  std::shared_ptr<const std::vector<ParameterInfo>> parameters_;
   std::optional<SceneText> scene_;
   ServerStatus status_;
   bool has_status_ = false;

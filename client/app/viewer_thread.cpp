@@ -97,6 +97,7 @@ void ViewerThread::describe(ViewerState& state) {
   state.quality_changes = session.quality_changes();
   state.look = session.look();
   state.look_changes = session.look_changes();
+  state.parameters = session.parameters();
   state.moved_camera = session.moved_camera();
   state.camera_moves = session.camera_moves();
   state.status = session.status();

@@ -36,7 +36,8 @@ struct ViewerState {
   uint64_t quality_changes = 0;
   LookChange look;  // of the scene
   uint64_t look_changes = 0;
-  std::optional<CameraDesc> moved_camera;  // by somebody who controls
+  std::shared_ptr<const std::vector<ParameterInfo>> parameters;  // asked for; null: none yet
+  std::optional<CameraDesc> moved_camera;                        // by somebody who controls
   uint64_t camera_moves = 0;
   ServerStatus status;
   bool has_status = false;

@@ -1,9 +1,12 @@
 #include "client/app/windowed_view.h"
 
 #include <algorithm>
+#include <array>
 #include <future>
+#include <string_view>
 #include <utility>
 
+#include "client/app/hair_sliders.h"
 #include "client/app/look_control.h"
 #include "client/app/save_scene.h"
 #include "client/app/strand_drawer.h"
@@ -28,7 +31,13 @@ constexpr double kLeastHairPx = 0.1;        // 0 says nothing
 constexpr int64_t kWayNs = 1000 * kMsInNs;  // medians of so long
 constexpr int64_t kSceneWaitNs = 5000 * kMsInNs;
 constexpr const char* kDebugViewPath = "debug_view";
-constexpr const char* kLookAnswer = "look={";  // the slider says it already
+// Answers to sliders, which say it already.
+constexpr std::array<std::string_view, 4> kSliderAnswers{"look={", "hair.", "quality=", "Left out: a newer"};
+
+bool is_slider_answer(const std::string& text) {
+  return std::any_of(kSliderAnswers.begin(), kSliderAnswers.end(),
+                     [&](std::string_view begin) { return text.starts_with(begin); });
+}
 
 /// A further head of the server.
 struct OtherHead {
@@ -88,8 +97,9 @@ class WindowedView {
       save(drawn_.image);
     }
     for (const Notice& notice : viewer_->take_notices())
-      if (notice.is_error || !notice.text.starts_with(kLookAnswer)) show_message(notice.text);
+      if (notice.is_error || !is_slider_answer(notice.text)) show_message(notice.text);
     follow_look();
+    follow_sliders();
     follow_camera();
     return {};
   }
@@ -121,6 +131,16 @@ class WindowedView {
     others_.push_back({std::make_unique<ViewerThread>(
         LiveConnection::begin(config), [this, head](const auto& state) { drawer_.set_state(state, head); })});
     others_.back().viewer->set_playout(playout_);
+  }
+
+  /// What the panel has on top, once it is open.
+  void follow_sliders() {
+    const bool is_asked = asked_session_ == state_->session_number;
+    if (window_->is_form_visible() && !is_asked && state_->is_connected &&
+        send(ParameterRequest{kHairSliderPrefixes, 0, true}))
+      asked_session_ = state_->session_number;
+    sliders_.follow(state_->parameters != nullptr ? *state_->parameters : std::vector<ParameterInfo>{},
+                    look_.is_steering());
   }
 
   void follow_look() {
@@ -227,6 +247,7 @@ class WindowedView {
       debug_view_ = debug_view_named(std::get<std::string>(edit.value));
       return true;
     });
+    sliders_.take_edits(done.edits, time_ns);
     if (const Status status = look_.edit(done.edits, time_ns); !status)
       show_message(status.error().to_string());
     if (done.wants_undo) look_.undo();
@@ -235,6 +256,7 @@ class WindowedView {
     if (done.wants_share) send(CameraCommand{0, orbit_.camera()});
     drawer_.set_own_look(look_.own_look());
     if (!state_->is_connected) return;
+    if (const auto assignment = sliders_.take_assignment(time_ns)) send(SetParameter{*assignment});
     if (auto assignment = look_.take_assignment(time_ns); assignment && !send(SetParameter{*assignment}))
       look_.put_back();
   }
@@ -355,6 +377,9 @@ class WindowedView {
   /// The look, and below it what this window alone shows.
   FormState form(int64_t time_ns) const {
     FormState form = look_.form(is_frames(), time_ns);
+    const std::vector<FormField> sliders = sliders_.fields(time_ns);
+    form.fields.insert(form.fields.begin(), sliders.begin(), sliders.end());
+    form.top_note = sliders_.reason();
     FormField view;
     view.path = kDebugViewPath;
     view.section = "View";
@@ -443,6 +468,8 @@ class WindowedView {
   std::string own_reason_;  // why this machine needs frames; empty = the server's reason counts
   Playout playout_;
   LookControl look_;
+  HairSliders sliders_;
+  uint64_t asked_session_ = 0;  // for the sliders' values; 0 = none
   DebugView debug_view_ = DebugView::None;
   std::string look_trouble_;    // as it was told
   int64_t scene_asked_ns_ = 0;  // for saving it; 0 = not asked

@@ -13,11 +13,12 @@ namespace strandcast {
 /// Of a number, of a colour or direction, of a name.
 using FormValue = std::variant<double, glm::vec3, std::string>;
 
-enum class FormWidget { Slider, Whole, Color, Direction, Choice, Text };
+// Stops: names in an order, along a slider.
+enum class FormWidget { Slider, Whole, Color, Direction, Choice, Text, Stops };
 
 struct FormField {
   std::string path;     // names it in an edit
-  std::string section;  // fields of one section stand together
+  std::string section;  // fields of one section stand together; empty: on top, and all else below More
   std::string title;
   std::string help;  // shown beside the pointer; may be empty
   std::string unit;  // may be empty
@@ -27,13 +28,16 @@ struct FormField {
   double maximum = 1.0;
   double handy_maximum = 1.0;  // where a slider ends; more can be typed, up to maximum
   double shown_per_unit = 1.0;
+  bool is_logarithmic = false;       // a Slider, of a minimum above 0
+  std::optional<FormValue> usual;    // that a double click on the title brings back; nothing: none does
   bool is_idle = false;              // shown, but it decides nothing now
-  std::vector<std::string> choices;  // of a Choice
+  std::vector<std::string> choices;  // of a Choice or Stops
 };
 
 struct FormState {
   std::string title;
   std::vector<std::string> notes;  // whom it concerns
+  std::string top_note;            // of the fields on top; may be empty
   std::vector<FormField> fields;
   std::string undo;       // the name of a button that takes all changes back; empty: there is none
   std::string share;      // of one that shows others this view; empty: there is none

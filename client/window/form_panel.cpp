@@ -23,9 +23,9 @@ const ImVec4 kTitleColor(0.92f, 0.93f, 0.95f, 1.0f);
 const ImVec4 kNoteColor(0.62f, 0.85f, 1.0f, 1.0f);
 const ImVec4 kFormLabelColor(0.62f, 0.66f, 0.72f, 1.0f);
 
-constexpr ImGuiWindowFlags kFormFlags =
-    ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
-    ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing;
+constexpr ImGuiWindowFlags kFormFlags = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize |
+                                        ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse |
+                                        ImGuiWindowFlags_NoSavedSettings;
 
 std::string number_format(const FormField& field) {
   const double reach = field.handy_maximum * field.shown_per_unit;
@@ -40,8 +40,9 @@ std::optional<double> slider(const FormField& field, double value) {
   double shown = value * scale;
   const double low = field.minimum * scale;
   const double high = field.handy_maximum * scale;
-  if (!ImGui::SliderScalar("##value", ImGuiDataType_Double, &shown, &low, &high,
-                           number_format(field).c_str()))
+  const ImGuiSliderFlags flags = field.is_logarithmic ? ImGuiSliderFlags_Logarithmic : ImGuiSliderFlags_None;
+  if (!ImGui::SliderScalar("##value", ImGuiDataType_Double, &shown, &low, &high, number_format(field).c_str(),
+                           flags))
     return std::nullopt;
   return std::clamp(shown / scale, field.minimum, field.maximum);
 }
@@ -93,6 +94,18 @@ std::optional<FormValue> draw_choice(const FormField& field) {
   return chosen;
 }
 
+/// What is none of the stops stands in the middle.
+std::optional<FormValue> draw_stops(const FormField& field) {
+  const auto& present = std::get<std::string>(field.value);
+  const auto found = std::find(field.choices.begin(), field.choices.end(), present);
+  const int count = static_cast<int>(field.choices.size());
+  int stop = found != field.choices.end() ? static_cast<int>(found - field.choices.begin()) : count / 2;
+  const std::string shown = present.find('%') == std::string::npos ? present : std::string();
+  if (!ImGui::SliderInt("##value", &stop, 0, count - 1, shown.c_str(), ImGuiSliderFlags_NoInput))
+    return std::nullopt;
+  return field.choices[static_cast<size_t>(std::clamp(stop, 0, count - 1))];
+}
+
 constexpr size_t kMaxTextBytes = 256;
 
 /// The text as it stands when the person leaves the box or hits Enter.
@@ -117,6 +130,8 @@ std::optional<FormValue> draw_widget(const FormField& field) {
       return draw_direction(field);
     case FormWidget::Choice:
       return draw_choice(field);
+    case FormWidget::Stops:
+      return draw_stops(field);
     case FormWidget::Text:
       if (const auto text = text_box("##value", std::get<std::string>(field.value))) return *text;
       return std::nullopt;
@@ -129,7 +144,10 @@ void draw_field(const FormField& field, float width, FormActions& actions) {
   ImGui::BeginDisabled(field.is_idle);
   ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted(field.title.c_str());
-  if (!field.help.empty() && ImGui::IsItemHovered()) ImGui::SetTooltip("%s", field.help.c_str());
+  if (!field.help.empty() && ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled))
+    ImGui::SetTooltip("%s", field.help.c_str());
+  if (field.usual && ImGui::IsItemHovered() && ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left))
+    actions.edits.push_back({field.path, *field.usual});
   ImGui::SameLine(width * kTitleShare);
   ImGui::SetNextItemWidth(-1.0f);
   if (auto value = draw_widget(field)) actions.edits.push_back({field.path, std::move(*value)});
@@ -157,11 +175,24 @@ void draw_saving(const FormState& form, FormActions& actions) {
   if (!form.share.empty() && ImGui::Button(form.share.c_str())) actions.wants_share = true;
 }
 
+/// Those on top, whether there are any.
+bool draw_top(const FormState& form, float width, FormActions& actions) {
+  bool has_any = false;
+  for (const FormField& field : form.fields) {
+    if (!field.section.empty()) continue;
+    has_any = true;
+    draw_field(field, width, actions);
+  }
+  draw_note(kFormLabelColor, form.top_note);
+  return has_any;
+}
+
 /// Sections in the order in which their first fields come; the first is open.
 void draw_sections(const FormState& form, float width, FormActions& actions) {
   std::vector<std::string> sections;
   for (const FormField& field : form.fields)
-    if (std::find(sections.begin(), sections.end(), field.section) == sections.end())
+    if (!field.section.empty() &&
+        std::find(sections.begin(), sections.end(), field.section) == sections.end())
       sections.push_back(field.section);
   for (const std::string& section : sections) {
     ImGui::SetNextItemOpen(section == sections.front(), ImGuiCond_Once);
@@ -185,10 +216,12 @@ PanelSize draw_form_panel(const FormState& form, FormActions& actions) {
   ImGui::SetNextWindowBgAlpha(kFormAlpha);
   PanelSize size;
   if (ImGui::Begin("form", nullptr, kFormFlags | ImGuiWindowFlags_AlwaysAutoResize)) {
-    draw_note(kTitleColor, form.title);
-    for (const std::string& note : form.notes) draw_note(kNoteColor, note);
-    draw_sections(form, width, actions);
-    draw_saving(form, actions);
+    if (!draw_top(form, width, actions) || ImGui::CollapsingHeader("More")) {
+      draw_note(kTitleColor, form.title);
+      for (const std::string& note : form.notes) draw_note(kNoteColor, note);
+      draw_sections(form, width, actions);
+      draw_saving(form, actions);
+    }
     size = {ImGui::GetWindowWidth(), ImGui::GetWindowHeight()};
   }
   ImGui::End();

@@ -69,12 +69,19 @@ struct Window::State {
     glfwTerminate();
   }
 
+  /// Keys that go from one field of the form to the next, and turn it.
+  static bool moves_in_form(int key) {
+    return key == GLFW_KEY_UP || key == GLFW_KEY_DOWN || key == GLFW_KEY_LEFT || key == GLFW_KEY_RIGHT ||
+           key == GLFW_KEY_SPACE || key == GLFW_KEY_ESCAPE;
+  }
+
   /// Something on the screen answers to the pointer.
   bool has_widgets() const { return is_form_visible || has_timeline; }
 
   void on_key(int key) {
     actions.is_touched = true;
     if (is_form_visible && ImGui::GetIO().WantTextInput) return;  // it is being typed
+    if (is_form_visible && ImGui::GetIO().NavVisible && moves_in_form(key)) return;
     switch (key) {
       case GLFW_KEY_ESCAPE:
       case GLFW_KEY_Q:
@@ -194,6 +201,12 @@ struct Window::State {
   void add_panels(const HudState& hud, const std::optional<FormState>& form) {
     draw_hud_panel(hud, fold);
     if (form && is_form_visible) draw_form_panel(*form, actions.form);
+    // From the next picture on; without a form the arrows are the recording's.
+    ImGuiConfigFlags& flags = ImGui::GetIO().ConfigFlags;
+    if (is_form_visible)
+      flags |= ImGuiConfigFlags_NavEnableKeyboard;
+    else
+      flags &= ~ImGuiConfigFlags_NavEnableKeyboard;
     if (hud.banner) draw_banner(*hud.banner);
     if (hud.timeline) draw_timeline(*hud.timeline, actions.timeline);
     if (is_help_visible) draw_help_panel(hud.timeline ? HelpTopic::Recording : HelpTopic::Server);

@@ -17,12 +17,14 @@ bool leaves_out(const RuntimeFacts& facts, DetailLevel level) {
 
 // Facts carry their cause, so that analyse() and explain() cannot disagree.
 Fact decide_wind(const SceneDesc& scene, const RuntimeFacts& facts) {
+  if (scene.hair.wind == 0.0) return {false, "hair.wind is zero: the air is still"};
   if (facts.has_wind_stream) return {true, "a wind stream is connected"};
   if (scene.wind.mean_mps != glm::vec3(0.0f)) return {true, "wind.mean_mps is not zero"};
   return {false, "wind.mean_mps is zero and no wind stream is connected"};
 }
 
 Fact decide_turbulence(const SceneDesc& scene, const RuntimeFacts& facts) {
+  if (scene.hair.wind == 0.0) return {false, "hair.wind is zero: the air is still"};
   if (facts.has_wind_stream)
     return {false, "a wind stream replaces the scene's gusts and is the same over the head"};
   if (scene.wind.mean_mps == glm::vec3(0.0f))
@@ -58,7 +60,8 @@ Fact decide_oriented_drag(const SceneDesc& scene, const RuntimeFacts& facts) {
 
 Fact decide_volume(const SceneDesc& scene, const RuntimeFacts& facts) {
   if (scene.volume.acts() && leaves_out(facts, DetailLevel::NoHairHair)) return {false, facts.detail_reason};
-  if (scene.volume.friction_per_s > 0.0) return {true, "volume.friction_per_s is above zero"};
+  if (scene.volume.friction_per_s * scene.hair.friction > 0.0)
+    return {true, "volume.friction_per_s is above zero"};
   if (scene.volume.repulsion_per_s2 > 0.0) return {true, "volume.repulsion_per_s2 is above zero"};
   if (scene.volume.target_per_s2 > 0.0) return {true, "volume.target_per_s2 is above zero"};
   if (scene.volume.wind_width_m > 0.0) return {true, "volume.wind_width_m is above zero"};

@@ -18,6 +18,7 @@
 #include "common/math/pose.h"
 #include "common/math/sphere_collider.h"
 #include "common/scene/body_desc.h"
+#include "common/scene/hair_controls.h"
 #include "common/scene/live_desc.h"
 #include "common/scene/render_methods.h"
 
@@ -233,6 +234,7 @@ struct SceneDesc {
   GroomDesc groom;
   HeadDesc head;
   std::string quality = kCustomQuality;  // where solver, volume, air and head.collider come from
+  HairControls hair;                     // factors on all that
   SolverDesc solver;
   double step_rate_hz = 60.0;  // 10 .. 1000
   uint32_t substeps = 1;       // 1 .. 64

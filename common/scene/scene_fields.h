@@ -344,6 +344,10 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
             scene.quality == kCustomQuality || scene.quality == kAutoQuality ||
                 scene.quality == kFastQuality || scene.quality == kFullQuality,
             "is unknown (known: auto, fast, full, custom)");
+  v.group("hair", [&] {
+    for (const HairControl& control : kHairControls)
+      v.number(control.name, scene.hair.*control.value, {control.minimum, control.maximum, control.unit});
+  });
   v.number("step_rate_hz", scene.step_rate_hz, kStepRate);
   v.number("substeps", scene.substeps, kSubsteps);
   v.vector("gravity_mps2", scene.gravity_mps2, kGravity);

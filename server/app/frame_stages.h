@@ -78,6 +78,9 @@ class StageSink : public StateSink {
   void put(std::shared_ptr<const Snapshot> state) override;
   void change_stream(const StreamDesc& stream) override { next_.change_stream(stream); }
   void change_look(const LookChange& look) override { next_.change_look(look); }
+  void change_shape(std::shared_ptr<const SceneAsset> asset) override {
+    next_.change_shape(std::move(asset));
+  }
 
  private:
   StateSink& next_;

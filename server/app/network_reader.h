@@ -18,9 +18,15 @@ namespace strandcast {
 class NetworkReader : public StreamReader {
  public:
   using OnClasses = std::function<void(const std::vector<StrandClass>&, const std::string& reason)>;
-  /// `head`: of those of the network, that the stream is of. `on_classes`: told before any viewer is.
-  NetworkReader(NetServer& net, FrameStages& stages, size_t head, OnClasses on_classes)
-      : net_(net), stages_(stages), head_(head), on_classes_(std::move(on_classes)) {}
+  /// Makes the message of another asset, for who joins from now on too; null: there is none.
+  using OnShape = std::function<EncodedFramePtr(const SceneAsset&)>;
+  /// `head`: of those of the network, that the stream is of. The others are called before any viewer is told.
+  NetworkReader(NetServer& net, FrameStages& stages, size_t head, OnClasses on_classes, OnShape on_shape)
+      : net_(net),
+        stages_(stages),
+        head_(head),
+        on_classes_(std::move(on_classes)),
+        on_shape_(std::move(on_shape)) {}
 
   void on_strands(const EncodedFramePtr& frame) override {
     stages_.note_encoded(frame->header.sim_time_ns, now_ns());
@@ -51,11 +57,20 @@ class NetworkReader : public StreamReader {
         classes, kReason, [until_told] {}, head_);
   }
 
+  void on_shape_change(const std::shared_ptr<const SceneAsset>& asset,
+                       std::shared_ptr<void> until_told) override {
+    const EncodedFramePtr frame = on_shape_(*asset);
+    if (frame != nullptr)
+      net_.renew_asset(
+          frame, [until_told] {}, head_);
+  }
+
  private:
   NetServer& net_;
   FrameStages& stages_;
   const size_t head_;
   const OnClasses on_classes_;
+  const OnShape on_shape_;
 };
 
 }  // namespace strandcast

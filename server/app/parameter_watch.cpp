@@ -6,7 +6,7 @@ void ParameterWatch::add(SessionId session, const std::string& prefix,
                          const std::vector<ParameterInfo>& parameters) {
   Watcher watcher{prefix, {}};
   for (const ParameterInfo& info : parameters)
-    if (info.path.starts_with(prefix)) watcher.value_of[info.path] = info.value;
+    if (begins_so(info.path, prefix)) watcher.value_of[info.path] = info.value;
   const std::lock_guard lock(mutex_);
   watchers_.insert_or_assign(session, std::move(watcher));
 }
@@ -29,7 +29,7 @@ std::vector<std::pair<SessionId, ParameterList>> ParameterWatch::news(
     ParameterList list;
     list.is_change = true;
     for (const ParameterInfo& info : parameters) {
-      if (!info.path.starts_with(watcher.prefix)) continue;
+      if (!begins_so(info.path, watcher.prefix)) continue;
       const auto [known, is_new] = watcher.value_of.try_emplace(info.path, info.value);
       if (!is_new && known->second == info.value) continue;
       known->second = info.value;

@@ -111,7 +111,7 @@ Status RecordDesk::attach(Stream stream) {
 }
 
 void RecordDesk::begin() {
-  if (recorder_ != nullptr) recorder_->begin(stream_->describe(), stream_->asset);
+  if (recorder_ != nullptr) recorder_->begin(stream_->describe(), stream_->asset());
   if (!folder_) return;
   if (folder_->file_ending.empty())
     log_info("record", "who controls may record into {}", folder_->path.string());
@@ -270,7 +270,7 @@ Result<std::string> RecordDesk::start_recording(const std::string& name) {
   ASSIGN_OR_RETURN(std::shared_ptr<Recorder> recorder, make_recorder(name));
   RETURN_IF_ERROR(recorder->attach(stream_->hub));
   ASSIGN_OR_RETURN(const uint64_t tick, change_tap(recorder.get()));
-  recorder->begin(stream_->describe(), stream_->asset);
+  recorder->begin(stream_->describe(), stream_->asset());
   const std::lock_guard lock(mutex_);
   recorder_ = std::move(recorder);
   ended_.clear();

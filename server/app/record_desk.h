@@ -55,7 +55,7 @@ class RecordDesk {
     StreamHub& hub;
     StateSource& source;
     std::function<RecordingStart()> describe;  // as it runs; any thread
-    EncodedFramePtr asset;
+    std::function<EncodedFramePtr()> asset;    // message of the newest
     std::string scene_name;
   };
 

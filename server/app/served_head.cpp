@@ -14,21 +14,6 @@
 #include "server/encode/picture_passes.h"
 
 namespace strandcast {
-namespace {
-
-Result<EncodedFramePtr> encode_asset(const SceneAsset& asset) {
-  FrameHeader header;
-  header.opcode = Opcode::Asset;
-  header.sequence = 1;
-  EncodedFramePtr frame = make_encoded_frame(header, encode_scene_asset(asset));
-  if (frame == nullptr)
-    return make_error(ErrorCode::LimitExceeded, "the scene does not fit into one message of {} bytes",
-                      kMaxMediaPayloadBytes);
-  return frame;
-}
-
-}  // namespace
-
 Result<std::unique_ptr<ServedHead>> ServedHead::load(const ServerConfig& config, size_t number,
                                                      OtherHeads others) {
   std::unique_ptr<ServedHead> head(new ServedHead(config, number));
@@ -56,16 +41,19 @@ Status ServedHead::load(OtherHeads others) {
   const std::shared_ptr<const SceneAsset> asset = source_->asset();
   RETURN_IF_ERROR(choose_stream());
   RETURN_IF_ERROR(choose_codecs());
-  ASSIGN_OR_RETURN(asset_frame_, encode_asset(*asset));
-  const PainterConfig painter{
-      {config_.renderer, config_.gl_device, config_.shader_folder}, asset, scene.look};
+  ASSIGN_OR_RETURN(asset_frame_, make_asset_frame(*asset));
+  painting_ = {config_.renderer, config_.gl_device, config_.shader_folder};
+  const PainterConfig painter{painting_, asset, scene.look};
   ASSIGN_OR_RETURN(hub_, StreamHub::make({scene.stream,
                                           codecs_.size() > 1 ? codecs_.back().name : std::string(),
                                           scene.step_rate_hz,
                                           make_scene_view(scene, scene_picture_size(scene), 0),
                                           asset,
                                           make_painter(painter, std::move(others)),
-                                          {scene.look, scene.camera}}));
+                                          {scene.look, scene.camera},
+                                          [this](const auto& other, const LookDesc& look) {
+                                            return config_.make_painter({painting_, other, look});
+                                          }}));
   is_drawn_by_processors_ = config_.is_drawn_by_processors(painter.device);
   ASSIGN_OR_RETURN(idle_picture_passes_,
                    plan_picture_passes(*asset, scene.look, likely_renderer(config_.renderer, scene.look), 0));
@@ -136,8 +124,8 @@ Status ServedHead::start(NetServer& net) {
   net_ = &net;
   desk_->connect(net);
   if (records_ != nullptr)
-    RETURN_IF_ERROR(records_->attach(
-        {*hub_, *source_, [this] { return describe_recording(); }, asset_frame_, config_.scene.name}));
+    RETURN_IF_ERROR(records_->attach({*hub_, *source_, [this] { return describe_recording(); },
+                                      [this] { return desk_->asset(); }, config_.scene.name}));
   stages_.set_source_times([this](int64_t arrival_ns) { return inputs_.source_time_ns(arrival_ns); });
   if (!config_.trace_path.empty()) RETURN_IF_ERROR(stages_.open_trace(config_.trace_path));
   stage_sink_.emplace(*hub_, stages_);
@@ -197,7 +185,9 @@ void ServedHead::tell_status() {
 
 void ServedHead::watch_speed(const ServerCounters& now) {
   if (now.sim.substeps == 0) return;
-  const auto change = slow_watch_.update(now.sim.realtime_factor, now.sim.is_paused, now_ns());
+  // What a change took is no reason to simulate less: time counts anew behind it.
+  const bool has_changed = now.sim.built_ns != 0 && now_ns() - now.sim.built_ns < kSlowNs;
+  const auto change = slow_watch_.update(now.sim.realtime_factor, now.sim.is_paused || has_changed, now_ns());
   is_slow_ = slow_watch_.is_slow();
   if (!is_slow_) slow_motion_.clear();
   if (change == SlowMotionWatch::Change::Ended) log_info("sim", "The simulation runs in real time again.");
@@ -225,7 +215,9 @@ void ServedHead::lower_quality() {
       "sim",
       "quality auto: fast from here on, as full does not keep up with real time; where fewer strands are "
       "simulated it may: strandcast-ctl set detail.simulated_share=0.5, then quality=full");
-  source_->post(SetParameter{std::string("quality=") + kFastQuality}, {}, "quality auto");
+  source_->post(
+      SetParameter{std::string("quality=") + kFastQuality},
+      [this](const Notice&) { desk_->tell_parameters(); }, "quality auto");
 }
 
 std::optional<SceneDesc> ServedHead::scene() const {

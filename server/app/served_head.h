@@ -86,7 +86,8 @@ class ServedHead {
   std::unique_ptr<RecordDesk> records_;  // null: nothing is recorded, nor can be
   FrameStages stages_;
   std::vector<StrandCodecInfo> codecs_;  // that strands are served by, the scene's first
-  EncodedFramePtr asset_frame_;
+  EncodedFramePtr asset_frame_;          // at first
+  RenderDeviceConfig painting_;
   LiveDesk* live_ = nullptr;
   NetServer* net_ = nullptr;
   // In the order in which each is used by those below it.

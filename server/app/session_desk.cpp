@@ -40,11 +40,40 @@ std::string make_start_id() {
   return fmt::format("{:08x}{:08x}", random(), random());
 }
 
+Result<EncodedFramePtr> make_asset_frame(const SceneAsset& asset) {
+  FrameHeader header;
+  header.opcode = Opcode::Asset;
+  header.sequence = 1;
+  EncodedFramePtr frame = make_encoded_frame(header, encode_scene_asset(asset));
+  if (frame == nullptr)
+    return make_error(ErrorCode::LimitExceeded, "the scene does not fit into one message of {} bytes",
+                      kMaxMediaPayloadBytes);
+  return frame;
+}
+
 SessionDesk::SessionDesk(Parts parts)
     : parts_(std::move(parts)),
       session_id_(make_start_id()),
       viewers_(parts_.scene, parts_.hub),
-      codecs_({parts_.codecs, parts_.source.asset()->rest_position_m.size(), parts_.scene.step_rate_hz}) {}
+      codecs_({parts_.codecs, parts_.source.asset()->rest_position_m.size(), parts_.scene.step_rate_hz}),
+      asset_(parts_.asset) {}
+
+EncodedFramePtr SessionDesk::asset() const {
+  const std::lock_guard lock(asset_mutex_);
+  return asset_;
+}
+
+/// Null where it cannot be told: everybody keeps the shape of before.
+EncodedFramePtr SessionDesk::follow_shape(const SceneAsset& asset) {
+  Result<EncodedFramePtr> frame = make_asset_frame(asset);
+  if (!frame) {
+    log_error("app", "{}", frame.error().to_string());
+    return nullptr;
+  }
+  const std::lock_guard lock(asset_mutex_);
+  asset_ = *frame;
+  return asset_;
+}
 
 void SessionDesk::connect(NetServer& net) {
   net_ = &net;
@@ -58,7 +87,8 @@ void SessionDesk::connect(NetServer& net) {
   };
   tell_classes(parts_.hub.strand_classes(), {});
   tell_streams();
-  reader_ = std::make_unique<NetworkReader>(net, parts_.stages, parts_.head, tell_classes);
+  reader_ = std::make_unique<NetworkReader>(net, parts_.stages, parts_.head, tell_classes,
+                                            [this](const SceneAsset& asset) { return follow_shape(asset); });
   // It hears of changes of the stream while no session is there, too.
   (void)parts_.hub.add(*reader_);
 }
@@ -87,7 +117,7 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
   if (parts_.all_records != nullptr && hello.head.empty()) whole_viewers_.insert(visitor.session);
   Admission admission;
   admission.welcome = make_welcome(*place, codec);
-  if (visitor.subscription.gets(StreamMode::Strands)) admission.asset = parts_.asset;
+  if (visitor.subscription.gets(StreamMode::Strands)) admission.asset = asset();
   if (const auto pictures = viewers_.pictures(visitor.session))
     tell_quality(visitor.session, *pictures, "to begin with");
   return admission;
@@ -135,8 +165,26 @@ void SessionDesk::on_command(SessionId session, const ControlCommand& command) {
 }
 
 void SessionDesk::on_parameter(SessionId session, const SetParameter& parameter) {
-  if (may_control(session, parameter.assignment))
+  if (!may_control(session, parameter.assignment)) return;
+  if (const Status status = may_change(parameter.assignment); !status)
+    net_->send(session, Notice{true, status.error().message});
+  else
     parts_.source.post(parameter, reply_to(session, parameter.assignment), viewers_.describe(session));
+}
+
+/// Another shape of the hair is another asset, of which a recording has one, and pictures of several heads.
+Status SessionDesk::may_change(const std::string& assignment) const {
+  const bool reshapes = assignment.starts_with("hair.length") || assignment.starts_with("hair.curl") ||
+                        assignment.starts_with("hair=");
+  if (!reshapes) return {};
+  if (!parts_.heads.empty())
+    return make_error(ErrorCode::Unsupported,
+                      "A scene of several heads has its lengths and curls from the start: set hair in the "
+                      "scene or by --set.");
+  if (parts_.records != nullptr && parts_.records->counters())
+    return make_error(ErrorCode::Unsupported,
+                      "Length and curl stay while a recording is written: record stop ends it.");
+  return {};
 }
 
 void SessionDesk::on_parameter_request(SessionId session, const ParameterRequest& request) {
@@ -149,7 +197,6 @@ void SessionDesk::on_parameter_request(SessionId session, const ParameterRequest
   net_->send(session, list_of(parameters, request));
 }
 
-/// Whoever wants to hear of changes hears of what is other now. Any thread.
 void SessionDesk::tell_parameters() {
   if (parameter_watch_.is_empty()) return;
   const std::optional<SceneDesc> scene = parts_.source.scene();
@@ -318,7 +365,7 @@ LinkAnswer SessionDesk::on_link(SessionId session, const LinkState& link, int64_
                             .picture_rate_hz = parts_.scene.stream.frame_rate_hz};
   LinkAnswer answer;
   if (auto change = viewers_.consider(session, gather_mode_facts(sources), time_ns))
-    answer.mode = ModeAnswer{std::move(*change), parts_.asset};
+    answer.mode = ModeAnswer{std::move(*change), asset()};
   const double states_hz =
       link.strand_class < classes.size() ? classes[link.strand_class].frame_rate_hz : 0.0;
   answer.codec =

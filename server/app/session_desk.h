@@ -31,6 +31,9 @@ namespace strandcast {
 /// 16 hex digits, others at every start of a server or a relay.
 std::string make_start_id();
 
+/// The message of an asset. LimitExceeded where none is large enough.
+Result<EncodedFramePtr> make_asset_frame(const SceneAsset& asset);
+
 class SessionDesk : public NetHandler {
  public:
   /// What outlives it. `asset` is the message for who gets strands.
@@ -61,12 +64,16 @@ class SessionDesk : public NetHandler {
   // From any thread.
   uint32_t viewer_count() const { return viewers_.viewer_count(); }
   bool is_shut_down_wanted() const { return is_shut_down_wanted_; }
+  /// The message of the newest.
+  EncodedFramePtr asset() const;
   /// To every session, what it sees of what is recorded filled in; call about twice a second.
   void tell_status(ServerStatus status);
   /// To those who asked for them; likewise.
   void tell_state_times();
   /// To relays, where something else is simulated; likewise.
   void tell_streams();
+  /// Parameters that are other, to who watches them; call after each change.
+  void tell_parameters();
 
   Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) override;
   void on_motion(SessionId session, const MotionSamples& samples, int64_t arrival_ns) override;
@@ -102,8 +109,9 @@ class SessionDesk : public NetHandler {
  private:
   Welcome make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const;
   bool may_control(SessionId session, std::string_view what);
+  Status may_change(const std::string& assignment) const;
+  EncodedFramePtr follow_shape(const SceneAsset& asset);
   StateSource::Reply reply_to(SessionId session, const std::string& what);
-  void tell_parameters();
   void tell_quality(SessionId session, const Viewers::Pictures& pictures, const std::string& reason);
 
   const Parts parts_;
@@ -118,6 +126,8 @@ class SessionDesk : public NetHandler {
   NetServer* net_ = nullptr;
   std::unique_ptr<NetworkReader> reader_;  // of all sessions
   std::function<std::string()> metrics_;
+  mutable std::mutex asset_mutex_;  // guards the one below
+  EncodedFramePtr asset_;
   std::mutex times_mutex_;             // guards the one below
   std::set<SessionId> times_readers_;  // who asked for StateTimes
   std::atomic<bool> is_shut_down_wanted_{false};

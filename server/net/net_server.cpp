@@ -306,6 +306,14 @@ void NetServer::set_strand_classes(std::vector<StrandClass> classes, std::string
   });
 }
 
+void NetServer::renew_asset(EncodedFramePtr asset, std::function<void()> then, size_t head) {
+  net::asio::post(state_->context.io,
+                  [state = state_.get(), asset = std::move(asset), then = std::move(then), head] {
+                    state->for_head(head, [&](net::Session& session) { session.renew_asset(asset); });
+                    then();
+                  });
+}
+
 void NetServer::begin_anew(std::vector<StrandClass> classes, std::vector<StrandByteModel> codecs,
                            std::string reason, std::function<void()> then, size_t head) {
   CHECK(!classes.empty() && !codecs.empty());

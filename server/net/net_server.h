@@ -95,6 +95,9 @@ class NetServer {
   /// gone. `then` runs on the network thread after that, before any frame published later.
   void set_strand_classes(std::vector<StrandClass> classes, std::string reason, std::function<void()> then,
                           size_t head = 0);
+  /// Strands have another shape at rest, and as many vertices: viewers of strands get this asset, and strands
+  /// from a keyframe on; relays are asked to join again. `then` as above.
+  void renew_asset(EncodedFramePtr asset, std::function<void()> then, size_t head = 0);
   /// Another stream begins: all who are there go with this sentence, to come back. `then` as above.
   void begin_anew(std::vector<StrandClass> classes, std::vector<StrandByteModel> codecs, std::string reason,
                   std::function<void()> then, size_t head = 0);

@@ -18,6 +18,13 @@ void SendQueue::set_asset(EncodedFramePtr asset) {
   is_pending_asset_ = pending_ != nullptr;
 }
 
+void SendQueue::renew_asset(EncodedFramePtr asset) {
+  if (pending_ != nullptr && !is_pending_asset_) drop_pending();
+  behind_.clear();
+  if (chain_ == Chain::Following) chain_ = Chain::Waiting;
+  set_asset(std::move(asset));
+}
+
 void SendQueue::start_strands() {
   chain_ = Chain::Waiting;
 }

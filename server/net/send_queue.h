@@ -39,6 +39,8 @@ class SendQueue {
   size_t control_count() const { return control_.size(); }
   /// First media of a session; strand frames wait until it is written.
   void set_asset(EncodedFramePtr asset);
+  /// Another asset in its place: what waits of the one before is dropped, and strands begin again behind it.
+  void renew_asset(EncodedFramePtr asset);
   /// From now on the session wants strand frames, beginning with a keyframe.
   void start_strands();
   Offer offer_strands(const EncodedFramePtr& frame);

@@ -36,6 +36,23 @@ void Session::start_again(int64_t time_ns) {
   ask_for_keyframe(time_ns);
 }
 
+void Session::renew_asset(const EncodedFramePtr& asset) {
+  if (is_relay()) return close(CloseCode::GoingAway, "The hair has another shape: join again.");
+  if (state_ != State::Joined || subscription_.is_empty()) return;
+  guarded([&] {
+    // Who sees pictures gets it with the next change to strands.
+    if (!subscription_.gets(StreamMode::Strands))
+      has_asset_ = false;
+    else if (has_asset_)
+      queue_.renew_asset(asset);
+    if (subscription_.gets(StreamMode::Frames)) queue_.start_pictures();
+    flow_.forget_in_flight();
+    account_drops();
+    ask_for_keyframe(now_ns());
+    pump();
+  });
+}
+
 /// A relay keeps what it had: the keyframe is for those who join there.
 void Session::ask_for_anchor(int64_t time_ns) {
   const int64_t interval_ns = context_.config.limits.keyframe_interval_ms * kMsInNs;

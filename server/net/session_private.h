@@ -32,6 +32,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void deliver_chain(const std::vector<EncodedFramePtr>& chain);
   /// The strand classes are others now: announces what this session gets.
   void follow_strand_classes(const std::string& reason);
+  /// Strands have another shape: begins again with this asset, and a relay joins again.
+  void renew_asset(const EncodedFramePtr& asset);
   /// Whether pictures of this class are for this session.
   bool watches(PictureClass picture_class) const;
   void deliver_picture(PictureClass picture_class, const PicturePtr& picture);

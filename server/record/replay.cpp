@@ -46,6 +46,7 @@ class ReplayScript : public StepScript, public StateSink {
   }
   void change_stream(const StreamDesc&) override {}
   void change_look(const LookChange&) override {}
+  void change_shape(std::shared_ptr<const SceneAsset>) override {}
 
   /// True when it has ended.
   bool wait(std::chrono::milliseconds longest) {

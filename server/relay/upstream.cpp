@@ -361,7 +361,9 @@ void Upstream::begin_if_complete() {
   is_connected_ = true;
   trouble_.reset();
   newest_frame_ns_ = now_ns();
-  if (relayed_ == nullptr || relayed_->welcome.session_id != next_.welcome.session_id) return begin_anew();
+  if (relayed_ == nullptr || relayed_->welcome.session_id != next_.welcome.session_id)
+    return begin_anew("The server was started anew.");
+  if (relayed_->asset->message != next_.asset->message) return begin_anew("The hair has another shape now.");
   ++counters_.reconnects;
   log_info("relay", "{} is back", server());
   take_list(next_.streams);
@@ -369,8 +371,8 @@ void Upstream::begin_if_complete() {
   if (std::exchange(was_away_, false)) net_->broadcast(Notice{false, "The server is back."}, number_);
 }
 
-/// Another server, or the same one started anew: nothing of before is of use to anybody.
-void Upstream::begin_anew() {
+/// Another server, the same one started anew, or other hair: nothing of before is of use to anybody.
+void Upstream::begin_anew(const char* reason) {
   if (relayed_ != nullptr) ++counters_.reconnects;
   log_info("relay", "relaying '{}' of {}, {} strands by {}", next_.welcome.scene_name, server(),
            next_.welcome.strand_count, next_.welcome.codec);
@@ -379,7 +381,7 @@ void Upstream::begin_anew() {
   demand_.clear();
   relayed_ = std::make_shared<const Relayed>(next_);
   net_->begin_anew(
-      classes_of(next_.streams), byte_models(next_.streams.codecs), "The server was started anew.",
+      classes_of(next_.streams), byte_models(next_.streams.codecs), reason,
       [this, relayed = relayed_] { hooks_.on_relayed(relayed); }, number_);
 }
 

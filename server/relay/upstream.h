@@ -117,7 +117,7 @@ class Upstream {
   void on_first_event(ClientEvent event);
   void take_list(const StreamList& list);
   void begin_if_complete();
-  void begin_anew();
+  void begin_anew(const char* reason);
   void leave_server();
   void tell_relayed();
   void ask(Stream& stream);

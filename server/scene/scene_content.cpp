@@ -10,6 +10,7 @@
 #include "common/groom/head_shape.h"
 #include "common/groom/head_spheres.h"
 #include "common/groom/procedural.h"
+#include "common/groom/restyled.h"
 
 namespace strandcast {
 namespace {
@@ -46,15 +47,18 @@ Result<PlacedGroom> load_hair_of(const FileGroomDesc& file) {
   return hair;
 }
 
-Result<Groom> grow_hair_of(const SceneDesc& scene, const ProceduralGroomDesc& procedural) {
+/// Hair that grows has the length and the curls that are asked for; those of a file are changed.
+Result<Groom> grow_hair_of(const SceneDesc& scene, const ProceduralGroomDesc& procedural,
+                           const HairControls& hair) {
+  const auto length = static_cast<float>(hair.length), curl = static_cast<float>(hair.curl);
   const float radius_m = scene.head.radius_m > 0.0f ? scene.head.radius_m : kDefaultHeadRadiusM;
   ProceduralGroomOptions options;
   options.strand_count = procedural.strand_count;
   options.vertex_count = procedural.vertex_count;
-  options.length_m = procedural.length_m;
+  options.length_m = std::min(length * procedural.length_m, kMaxGrownLengthM);
   options.length_variation = procedural.length_variation;
-  options.curl_radius_m = procedural.curl_radius_m;
-  options.curl_turns = procedural.curl_turns;
+  options.curl_radius_m = std::min(curl * procedural.curl_radius_m, kMaxCurlRadiusM);
+  options.curl_turns = std::min(length * procedural.curl_turns, kMaxCurlTurns);
   options.seed = procedural.seed;
   // Where no head is seen or felt hair just hangs.
   options.has_bust = scene.head.is_visible || (scene.colliders.empty() && scene.has_auto_collider);
@@ -78,7 +82,7 @@ Result<Groom> load_target_of(const SceneDesc& scene, const Groom& groom) {
     ASSIGN_OR_RETURN(PlacedGroom hair, load_hair_of(*file));
     target = std::move(hair.groom);
   } else {
-    ASSIGN_OR_RETURN(target, grow_hair_of(scene, std::get<ProceduralGroomDesc>(desc)));
+    ASSIGN_OR_RETURN(target, grow_hair_of(scene, std::get<ProceduralGroomDesc>(desc), {}));
   }
   const auto own = box_of(groom), other = box_of(target);
   const glm::dvec3 shared =
@@ -113,31 +117,20 @@ Result<Mesh> load_head_meshes(const HeadDesc& head, const GroomPlacement& placem
   return whole;
 }
 
-/// What is drawn under the hair, and as spheres what collides.
-struct Head {
-  Mesh mesh;
-  std::vector<FittedSphere> spheres;
-};
-
-/// The head under the hair, drawn or not.
-Result<Head> make_head_under(const SceneDesc& scene, const Groom& groom, const GroomPlacement& placement) {
+/// The head under the hair as loaded, drawn or not.
+Result<Mesh> make_head_under(const SceneDesc& scene, const Groom& groom, const GroomPlacement& placement) {
   const HeadDesc& desc = scene.head;
-  Head head;
-  if (!desc.mesh_path.empty()) {
-    ASSIGN_OR_RETURN(head.mesh, load_head_meshes(desc, placement));
-  } else if (!std::holds_alternative<FileGroomDesc>(scene.groom)) {
+  if (!desc.mesh_path.empty()) return load_head_meshes(desc, placement);
+  if (!std::holds_alternative<FileGroomDesc>(scene.groom)) {
     const FittedSphere skull{head_center(desc), desc.radius_m > 0.0f ? desc.radius_m : kDefaultHeadRadiusM};
-    head.mesh = HeadShape(groom, skull, HeadFit::BustOnly).mesh();
-  } else {
-    // Under a groom from a file the built-in head is fitted, but for what the scene says of it.
-    FittedSphere fitted = fit_head(groom);
-    if (desc.has_center) fitted.center_m = desc.center_m;
-    const HeadFit fit = desc.radius_m > 0.0f ? HeadFit::BustOnly : HeadFit::Whole;
-    if (fit == HeadFit::BustOnly) fitted.radius_m = desc.radius_m;
-    head.mesh = HeadShape(groom, fitted, fit).mesh();
+    return HeadShape(groom, skull, HeadFit::BustOnly).mesh();
   }
-  if (desc.collider == kSphereCollider) head.spheres = fit_spheres(head.mesh, kHeadSpheres, groom);
-  return head;
+  // Under a groom from a file the built-in head is fitted, but for what the scene says of it.
+  FittedSphere fitted = fit_head(groom);
+  if (desc.has_center) fitted.center_m = desc.center_m;
+  const HeadFit fit = desc.radius_m > 0.0f ? HeadFit::BustOnly : HeadFit::Whole;
+  if (fit == HeadFit::BustOnly) fitted.radius_m = desc.radius_m;
+  return HeadShape(groom, fitted, fit).mesh();
 }
 
 }  // namespace
@@ -157,27 +150,32 @@ Result<SceneContent> load_scene_content(const SceneDesc& scene) {
     content.notes = std::move(hair.notes);
     placement = hair.placement;
   } else {
-    ASSIGN_OR_RETURN(content.groom, grow_hair_of(scene, std::get<ProceduralGroomDesc>(scene.groom)));
+    ASSIGN_OR_RETURN(content.groom,
+                     grow_hair_of(scene, std::get<ProceduralGroomDesc>(scene.groom), scene.hair));
   }
   if (scene.target_groom) {
     auto target = load_target_of(scene, content.groom);
     if (!target) return at("target_groom", target.error());
     content.volume_target = std::make_shared<const Groom>(std::move(target).value());
   }
-  ASSIGN_OR_RETURN(Head head, make_head_under(scene, content.groom, placement));
-  const std::vector<FittedSphere> spheres = shrink_under(std::move(head.spheres), content.groom);
+  ASSIGN_OR_RETURN(Mesh head, make_head_under(scene, content.groom, placement));
+  if (std::holds_alternative<FileGroomDesc>(scene.groom))
+    content.groom = restyled(std::move(content.groom), scene.hair.length, scene.hair.curl);
+  std::vector<FittedSphere> spheres;
+  if (scene.head.collider == kSphereCollider)
+    spheres = shrink_under(fit_spheres(head, kHeadSpheres, content.groom), content.groom);
   for (const FittedSphere& sphere : spheres)
     content.head_colliders.push_back({sphere.center_m, sphere.radius_m});
   if (std::holds_alternative<FileGroomDesc>(scene.groom) && scene.head.collider == kSphereCollider)
-    content.notes.push_back(to_sentence(measure_head(head.mesh, spheres, content.groom), spheres.size()));
+    content.notes.push_back(to_sentence(measure_head(head, spheres, content.groom), spheres.size()));
   if (scene.head.collider == kFieldCollider) {
-    auto field = make_distance_field(head.mesh, scene.head.field_resolution);
+    auto field = make_distance_field(head, scene.head.field_resolution);
     if (!field) return at(scene.head.mesh_path.empty() ? "head.collider" : "head.mesh_path", field.error());
     content.notes.push_back(to_sentence(measure_inside(*field, content.groom), *field));
     content.head_field = std::make_shared<const DistanceField>(std::move(field).value());
   }
   content.colliders = colliders_of(scene, content.head_colliders);
-  if (scene.head.is_visible) content.head = std::move(head.mesh);
+  if (scene.head.is_visible) content.head = std::move(head);
   return content;
 }
 

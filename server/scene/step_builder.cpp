@@ -83,7 +83,9 @@ void StepBuilder::change(const SceneDesc& scene, std::vector<SphereCollider> col
   colliders_ = std::move(colliders);
   const WindDesc& wind = scene.wind;
   gust_generator_.emplace(wind.mean_mps, wind.gust_intensity, wind.gust_length_m, wind.seed);
+  // Gusts keep their way and their time, so that a slider that moves does not make others of them.
   waves_ = make_gust_waves(wind);
+  for (GustWave& wave : waves_) wave.amplitude_mps *= static_cast<float>(scene.hair.wind);
   step_.substeps.resize(scene.substeps);
   end_time_s_.resize(scene.substeps);
   head_position_m_.resize(scene.substeps);
@@ -92,7 +94,8 @@ void StepBuilder::change(const SceneDesc& scene, std::vector<SphereCollider> col
 void StepBuilder::add_wind() {
   for (size_t i = 0; i < step_.substeps.size(); ++i)
     step_.substeps[i].wind_mps =
-        input_.has_wind_stream ? input_.wind_mps : gust_generator_->sample(end_time_s_[i]);
+        scene_.hair.wind *
+        glm::dvec3(input_.has_wind_stream ? input_.wind_mps : gust_generator_->sample(end_time_s_[i]));
 }
 
 void StepBuilder::add_gusts() {

@@ -18,16 +18,30 @@ bool bears_volume(const SolverRow& row) {
 }  // namespace
 
 const std::vector<std::string>& live_fields() {
-  static const std::vector<std::string> kFields = {"solver",         "substeps",
-                                                   "gravity_mps2",   "follicle_limit_deg",
-                                                   "colliders",      "has_auto_collider",
-                                                   "bend_limit",     "body",
-                                                   "volume",         "air",
-                                                   "groom.hairs",    "quality",
-                                                   "detail",         "wind",
-                                                   "look",           "camera",
-                                                   "stream.bound_m", "stream.strand_rate_hz"};
+  static const std::vector<std::string> kFields = {"solver",
+                                                   "substeps",
+                                                   "gravity_mps2",
+                                                   "follicle_limit_deg",
+                                                   "colliders",
+                                                   "has_auto_collider",
+                                                   "bend_limit",
+                                                   "body",
+                                                   "volume",
+                                                   "air",
+                                                   "groom.hairs",
+                                                   "quality",
+                                                   "hair",
+                                                   "detail",
+                                                   "wind",
+                                                   "look",
+                                                   "camera",
+                                                   "stream.bound_m",
+                                                   "stream.strand_rate_hz"};
   return kFields;
+}
+
+bool is_shaped_otherwise(const SceneDesc& a, const SceneDesc& b) {
+  return a.hair.length != b.hair.length || a.hair.curl != b.hair.curl;
 }
 
 Status check_solver(const SceneDesc& scene) {

@@ -19,6 +19,9 @@ const std::vector<std::string>& live_fields();
 /// that a newly chosen solver does not take are left out. Errors name what is known.
 Result<SceneDesc> change_scene(const SceneDesc& scene, const std::string& assignment);
 
+/// Whether strands at rest are others: another length or other curls of the same groom.
+bool is_shaped_otherwise(const SceneDesc& a, const SceneDesc& b);
+
 /// Takes out the parameters that the scene's solver does not have, or not with this value, and what else of
 /// the scene it does not take: forces between strands, limits of bending.
 void fit_to_solver(SceneDesc& scene);

@@ -150,16 +150,29 @@ std::vector<ParameterInfo> walk(SceneDesc scene) {
   return lister.take();
 }
 
+/// What a person should know of quality and the factors on it.
+std::string control_note(const ParameterInfo& info, const SceneDesc& scene) {
+  if (info.path == "quality" && scene.quality == kAutoQuality)
+    return fmt::format("{}; {} runs", info.note, scene.volume.acts() ? kFullQuality : kFastQuality);
+  if (info.path == "hair.friction" && scene.volume.friction_per_s == 0.0)
+    return "rests: hair does not act on hair here, quality full lets it";
+  for (const HairControl& control : kHairControls)
+    if (info.path == std::string("hair.") + control.name) return control.note;
+  return info.note;
+}
+
 }  // namespace
 
 std::vector<ParameterInfo> list_parameters(const SceneDesc& scene) {
   static const std::map<std::string, std::string> kUnset = [] {
     std::map<std::string, std::string> values;
     for (const ParameterInfo& info : walk(SceneDesc())) values.emplace(info.path, info.value);
+    values["quality"] = kAutoQuality;  // of a scene that says nothing of it
     return values;
   }();
   std::vector<ParameterInfo> parameters = walk(scene);
   for (ParameterInfo& info : parameters) {
+    info.note = control_note(info, scene);
     if (!info.unset_value.empty()) continue;
     if (const auto found = kUnset.find(info.path); found != kUnset.end()) info.unset_value = found->second;
   }
@@ -168,10 +181,19 @@ std::vector<ParameterInfo> list_parameters(const SceneDesc& scene) {
   return parameters;
 }
 
+bool begins_so(const std::string& path, const std::string& prefixes) {
+  for (size_t begin = 0; begin <= prefixes.size();) {
+    const size_t end = std::min(prefixes.find(',', begin), prefixes.size());
+    if (path.starts_with(std::string_view(prefixes).substr(begin, end - begin))) return true;
+    begin = end + 1;
+  }
+  return false;
+}
+
 ParameterList list_of(const std::vector<ParameterInfo>& parameters, const ParameterRequest& request) {
   ParameterList list;
   for (const ParameterInfo& info : parameters) {
-    if (!info.path.starts_with(request.prefix)) continue;
+    if (!begins_so(info.path, request.prefix)) continue;
     if (list.total++ < request.first || list.parameters.size() >= kMaxListedParameters) continue;
     list.parameters.push_back(info);
   }

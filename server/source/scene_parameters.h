@@ -14,6 +14,9 @@ namespace strandcast {
 /// In the order of scene.proto.
 std::vector<ParameterInfo> list_parameters(const SceneDesc& scene);
 
+/// Whether a path begins with one of the prefixes, which commas part; all begin with an empty one.
+bool begins_so(const std::string& path, const std::string& prefixes);
+
 /// Those whose path begins so; of these at most kMaxListedParameters from the first-th on.
 ParameterList list_of(const std::vector<ParameterInfo>& parameters, const ParameterRequest& request);
 

@@ -204,22 +204,27 @@ bool SimLoop::starts_to_prepare(const Job& job) {
   const auto* parameter = std::get_if<SetParameter>(&job.what);
   if (parameter == nullptr || job.is_prepared) return false;
   const Result<SceneDesc> scene = change_scene(config_.scene, parameter->assignment);
-  if (!scene || !moves_otherwise(*scene, config_.scene)) return false;
+  const bool has_other_shape = scene && is_shaped_otherwise(*scene, config_.scene);
+  if (!scene || !(has_other_shape || moves_otherwise(*scene, config_.scene))) return false;
   const Result<const SolverRow*> row = find_solver(scene->solver.name);
-  if (!row || !(*row)->prepare) return false;
+  if (!row || !(has_other_shape || (*row)->prepare)) return false;
   {
     const std::lock_guard lock(mutex_);
     is_preparing_ = true;
   }
   preparation_ =
-      std::jthread([this, job, scene = *scene, content = config_.content,
-                    gravity = builder_->groom_gravity_in_head_mps2()](const std::stop_token& stop) {
+      std::jthread([this, job, scene = *scene, content = config_.content, has_other_shape,
+                    gravity = builder_->groom_gravity_in_head_mps2()](const std::stop_token& stop) mutable {
         // Its error comes again, and is told, when the change is carried out.
+        if (has_other_shape)
+          if (auto other = load_scene_content(scene))
+            content = std::make_shared<const SceneContent>(std::move(other).value());
         static_cast<void>(prepare_solver(scene, content->groom, gravity, stop));
         {
           const std::lock_guard lock(mutex_);
           jobs_.push_front(job);
           jobs_.front().is_prepared = true;
+          if (has_other_shape) jobs_.front().content = content;
           is_preparing_ = false;
         }
         changed_.notify_all();
@@ -227,17 +232,34 @@ bool SimLoop::starts_to_prepare(const Job& job) {
   return true;
 }
 
+/// Whether a slider that is dragged says otherwise before the value that waits last had its turn: only the
+/// newest counts then. Commands of a server in lockstep are all carried out. Under the lock.
+bool SimLoop::is_newer_value(const Job& job) const {
+  if (config_.is_lockstep || jobs_.empty() || jobs_.back().is_prepared) return false;
+  const auto* newer = std::get_if<SetParameter>(&job.what);
+  const auto* older = std::get_if<SetParameter>(&jobs_.back().what);
+  if (newer == nullptr || older == nullptr) return false;
+  const std::string path = newer->assignment.substr(0, newer->assignment.find('='));
+  return path.starts_with("hair.") && older->assignment.starts_with(path + '=');
+}
+
 void SimLoop::push(Job job) {
   const bool is_demand = std::holds_alternative<SourceDemand>(job.what);
   bool is_full = false;
+  std::optional<Job> older;
   {
     const std::lock_guard lock(mutex_);
+    if (is_newer_value(job)) {
+      older = std::move(jobs_.back());
+      jobs_.pop_back();
+    }
     // Of the demands only the newest counts.
     if (is_demand)
       std::erase_if(jobs_, [](const Job& old) { return std::holds_alternative<SourceDemand>(old.what); });
     is_full = job.is_command() && jobs_.size() >= kMaxPendingJobs;
     if (!is_full) jobs_.push_back(std::move(job));
   }
+  if (older && older->reply) older->reply({false, "Left out: a newer value came before its turn."});
   if (!is_full)
     changed_.notify_all();
   else if (job.reply)
@@ -263,10 +285,16 @@ int64_t SimLoop::next_step_ns(int64_t time_ns) const {
   return std::llround(static_cast<double>(tick_ + 1) / config_.scene.step_rate_hz * kNsPerS);
 }
 
+std::shared_ptr<const SceneAsset> SimLoop::asset() const {
+  const std::lock_guard lock(mutex_);
+  return asset_;
+}
+
 SimStats SimLoop::stats() const {
   const std::lock_guard lock(mutex_);
   SimStats stats = stats_;
   stats.last_step_ns = last_step_ns_;
+  stats.built_ns = is_preparing_ ? now_ns() : built_ns_.load();
   if (const int64_t begin_ns = turn_begin_ns_; begin_ns != 0) stats.busy_ns = now_ns() - begin_ns;
   return stats;
 }

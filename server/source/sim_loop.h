@@ -91,6 +91,8 @@ class SimLoop {
   SimStats stats() const;
   /// As it runs now.
   SceneDesc scene() const;
+  /// Of strands that have another shape than the content that it began with; null: they have not.
+  std::shared_ptr<const SceneAsset> asset() const;
   /// Ends the thread after the substep or command that is under way. From one thread.
   void stop();
   /// Why the simulation ended; nothing while it runs.
@@ -104,8 +106,9 @@ class SimLoop {
   struct Job {
     std::variant<ControlCommand, SetParameter, SourceDemand, TapChange> what;
     Reply reply;
-    std::string who = {};      // asked for it
-    bool is_prepared = false;  // what takes long of it is done
+    std::string who = {};                              // asked for it
+    bool is_prepared = false;                          // what takes long of it is done
+    std::shared_ptr<const SceneContent> content = {};  // of other lengths or curls, loaded by then
 
     /// What waits for its turn; all else is carried out before the next step.
     bool is_command() const {
@@ -119,6 +122,7 @@ class SimLoop {
   void loop();
   void follow_script();
   void push(Job job);
+  bool is_newer_value(const Job& job) const;
   std::deque<Job> wait_for_jobs();
   std::deque<Job> take_jobs();
   void carry_out_in_turn(const Job& job);
@@ -127,7 +131,10 @@ class SimLoop {
   /// Nothing: the answer comes later.
   std::optional<Notice> command(const ControlCommand& command, const Reply& reply);
   void finish_steps();
-  Notice change(const std::string& assignment);
+  Notice change(const std::string& assignment, std::shared_ptr<const SceneContent> content);
+  Status reshape(const SceneDesc& scene, const SceneFeatures& features,
+                 std::shared_ptr<const SceneContent> content);
+  void take_content(std::shared_ptr<const SceneContent> content);
   void follow_stream_settings();
   void begin_stream();
   bool has_other_stream() const { return config_.scene.stream != stream_; }
@@ -211,6 +218,7 @@ class SimLoop {
   uint32_t counted_steps_ = 0;     // as they were asked for
   std::shared_ptr<const Snapshot> counted_state_;  // published last while steps are counted
   std::atomic<int64_t> last_step_ns_{0};
+  std::atomic<int64_t> built_ns_{0};       // the newest solver, but for the first
   std::atomic<int64_t> turn_begin_ns_{0};  // of the loop; 0 = it waits for what comes next
 
   mutable std::mutex mutex_;  // guards the block below
@@ -220,6 +228,7 @@ class SimLoop {
   std::atomic<bool> is_stopping_{false};
   SimStats stats_;
   SceneDesc scene_;  // as it runs
+  std::shared_ptr<const SceneAsset> asset_;
   std::optional<Error> failure_;
 
   std::jthread preparation_;  // of the command that comes next; started by thread_

@@ -9,6 +9,7 @@
 #include "common/base/quantile.h"
 #include "common/base/text.h"
 #include "common/base/units.h"
+#include "common/groom/groom_asset.h"
 #include "common/log/log.h"
 #include "common/strands/strand_codec.h"
 #include "server/source/scene_change.h"
@@ -58,7 +59,7 @@ void SimLoop::carry_out(const Job& job) {
     posted.what = *parameter;
   if (config_.tap != nullptr) config_.tap->on_change(posted);
   const std::optional<Notice> notice =
-      control != nullptr ? command(*control, job.reply) : change(parameter->assignment);
+      control != nullptr ? command(*control, job.reply) : change(parameter->assignment, job.content);
   if (config_.tap != nullptr) config_.tap->on_answer(notice.value_or(Notice{false, "Steps follow."}));
   update_stats();  // whoever reads the answer may count on it
   if (job.reply && notice) job.reply(*notice);
@@ -92,14 +93,18 @@ std::optional<Notice> SimLoop::command(const ControlCommand& command, const Repl
   return Notice{true, "Unknown command."};
 }
 
-Notice SimLoop::change(const std::string& assignment) {
+Notice SimLoop::change(const std::string& assignment, std::shared_ptr<const SceneContent> content) {
   const Result<SceneDesc> scene = change_scene(config_.scene, assignment);
   if (!scene) return {true, scene.error().to_string()};
   const SceneFeatures features = analyse(*scene, facts_);
   const bool is_other_solver = moves_otherwise(*scene, config_.scene);
-  if (is_other_solver || needs_other_solver(*scene, features))
-    if (const Status status = rebuild_solver(*scene, features); !status)
-      return {true, status.error().to_string()};
+  const bool has_other_shape = is_shaped_otherwise(*scene, config_.scene);
+  Status status;
+  if (has_other_shape)
+    status = reshape(*scene, features, std::move(content));
+  else if (is_other_solver || needs_other_solver(*scene, features))
+    status = rebuild_solver(*scene, features);
+  if (!status) return {true, status.error().to_string()};
   if (scene->substeps != config_.scene.substeps) stages_->plan_step(scene->substeps, explain(*scene, facts_));
   const std::string what = excerpt(assignment, kMaxToldChars);
   const std::string left_out = left_out_note(config_.scene, *scene);
@@ -110,6 +115,16 @@ Notice SimLoop::change(const std::string& assignment) {
   }
   builder_->change(stepped_scene(*scene, features), colliders_of(*scene, config_.content->head_colliders));
   detail_.change(scene->detail);
+  if (has_other_shape) {
+    auto asset =
+        std::make_shared<const SceneAsset>(make_scene_asset(config_.content->groom, config_.content->head));
+    {
+      const std::lock_guard lock(mutex_);
+      asset_ = asset;
+    }
+    sink_.change_shape(std::move(asset));
+    publish();
+  }
   follow_stream_settings();
   follow_look();
   if (has_other_look())
@@ -120,6 +135,33 @@ Notice SimLoop::change(const std::string& assignment) {
                                kStreamChangeNs / 1'000'000)};
   return {false,
           fmt::format("{} from step {} on{}{}.", what, tick_ + 1, left_out.empty() ? "" : "; ", left_out)};
+}
+
+/// Hair of another length or other curls begins at rest. On an error all is as it was, but at rest.
+Status SimLoop::reshape(const SceneDesc& scene, const SceneFeatures& features,
+                        std::shared_ptr<const SceneContent> content) {
+  if (content == nullptr) {
+    ASSIGN_OR_RETURN(SceneContent loaded, load_scene_content(scene));
+    content = std::make_shared<const SceneContent>(std::move(loaded));
+  }
+  const std::shared_ptr<const SceneContent> before = config_.content;
+  take_content(std::move(content));
+  const Status status = rebuild_solver(scene, features);
+  if (status) return {};
+  take_content(before);
+  CHECK(rebuild_solver(config_.scene, analyse(config_.scene, facts_)).ok());  // as it ran until now
+  return status;
+}
+
+/// What the next solver is loaded with.
+void SimLoop::take_content(std::shared_ptr<const SceneContent> content) {
+  config_.content = std::move(content);
+  solver_.reset();
+  is_behind_ = false;
+  carried_.reset();
+  const Result<float> quantum_m = lattice_step_m(stream_.codec, stream_.bound_m);
+  CHECK(quantum_m.ok());  // of a stream that runs
+  publisher_.emplace(config_.content->groom, *quantum_m);
 }
 
 /// Publishes the present state once more, so that viewers see the change also while paused. Of many settings
@@ -194,7 +236,7 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
     step_log_.set_model(is_whole ? solver_->step_model() : nullptr);
   stages_->plan_step(stepped_scene(scene, features).substeps, explain(scene, facts_));
   stages_->set_solver_bytes(solver_->memory_bytes());
-  ++solver_builds_;
+  if (++solver_builds_ > 1) built_ns_ = now_ns();
   // The same model, built for other facts, says nothing new.
   if (!is_first && scene.solver == config_.scene.solver) return {};
   log_info("sim", "solver {}: {} strands x {} vertices, {} kB", row->name,

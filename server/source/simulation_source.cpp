@@ -18,7 +18,10 @@ class SimulationSource : public StateSource {
         asset_(std::make_shared<const SceneAsset>(make_scene_asset(content_->groom, content_->head))),
         inputs_(inputs) {}
 
-  std::shared_ptr<const SceneAsset> asset() const override { return asset_; }
+  std::shared_ptr<const SceneAsset> asset() const override {
+    auto newest = loop_ != nullptr ? loop_->asset() : nullptr;
+    return newest != nullptr ? newest : asset_;
+  }
   Status start(StateSink& sink, const StreamDesc& stream) override {
     SimLoopConfig config{config_.scene, content_,       config_.device,     config_.on_publish,
                          config_.tap,   config_.script, config_.is_lockstep};
@@ -53,7 +56,7 @@ class SimulationSource : public StateSource {
  private:
   const SimulationConfig config_;
   const std::shared_ptr<const SceneContent> content_;
-  const std::shared_ptr<const SceneAsset> asset_;
+  const std::shared_ptr<const SceneAsset> asset_;  // at first
   InputHub& inputs_;
   std::unique_ptr<SimLoop> loop_;  // null before start()
 };

@@ -3,16 +3,20 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/source/hair_factors.h"
+
 namespace strandcast {
 
 Result<SolverParameters> moving_parameters(const SolverRow& row, const SceneDesc& scene) {
   ASSIGN_OR_RETURN(SolverParameters parameters, complete_parameters(row, scene.solver.parameters));
-  return wet_parameters(row, std::move(parameters), static_cast<double>(scene.look.shading.wetness));
+  parameters = wet_parameters(row, std::move(parameters), static_cast<double>(scene.look.shading.wetness));
+  return stiff_parameters(row, std::move(parameters), scene.hair.stiffness);
 }
 
 bool moves_otherwise(const SceneDesc& a, const SceneDesc& b) {
   return a.solver != b.solver || a.volume != b.volume || a.bend_limit != b.bend_limit ||
-         a.wind.along_share != b.wind.along_share || a.look.shading.wetness != b.look.shading.wetness;
+         a.wind.along_share != b.wind.along_share || a.look.shading.wetness != b.look.shading.wetness ||
+         a.hair.stiffness != b.hair.stiffness || a.hair.friction != b.hair.friction;
 }
 
 SolverParameters wet_parameters(const SolverRow& row, SolverParameters complete, double wetness) {
@@ -47,6 +51,7 @@ VolumeDesc wet_volume(VolumeDesc volume, double wetness) {
 
 VolumeDesc moving_volume(const SceneDesc& scene, const SolverParameters& moving) {
   VolumeDesc volume = wet_volume(scene.volume, static_cast<double>(scene.look.shading.wetness));
+  volume = held_volume(std::move(volume), scene.hair.friction);
   const auto take = [&](const char* name, double& value) {
     if (const auto found = moving.find(name); found != moving.end()) value = found->second;
   };

@@ -15,7 +15,7 @@ inline constexpr double kWetDensity = 3.0;
 inline constexpr double kWetFrictionPerS = 60.0;
 
 /// What a scene's strands move by: its parameters, complete, for hair as wet as it is drawn
-/// (look.shading.wetness). As complete_parameters().
+/// (look.shading.wetness) and as stiff as `hair` says. As complete_parameters().
 Result<SolverParameters> moving_parameters(const SolverRow& row, const SceneDesc& scene);
 /// Whether another solver, or one of other parameters, is needed.
 bool moves_otherwise(const SceneDesc& a, const SceneDesc& b);
@@ -25,8 +25,8 @@ bool moves_otherwise(const SceneDesc& a, const SceneDesc& b);
 SolverParameters wet_parameters(const SolverRow& row, SolverParameters complete, double wetness);
 /// Likewise of a volume that acts; one that does not stays so.
 VolumeDesc wet_volume(VolumeDesc volume, double wetness);
-/// What strands of these moving_parameters() do to each other: their air goes by the hair of a model that
-/// knows its radius and density.
+/// What strands of these moving_parameters() do to each other, with the friction that `hair` says: their air
+/// goes by the hair of a model that knows its radius and density.
 VolumeDesc moving_volume(const SceneDesc& scene, const SolverParameters& moving);
 
 }  // namespace strandcast

@@ -40,6 +40,7 @@ struct SimStats {
   uint32_t simulated_strands = 0;          // the others follow them; 0 = none: all go with the head
   uint64_t detail_changes = 0;
   uint64_t solver_builds = 0;
+  int64_t built_ns = 0;  // server clock at the newest solver, or now while one is prepared; 0 = the first
   uint64_t solver_bytes = 0;
   double step_cost = 0.0;       // StepKernel::cost of the model; 0 = it has no kernel that others run
   std::string sim_device;       // what simulates: "gl", "lanes"; empty = nothing does
@@ -61,6 +62,8 @@ class StateSink {
   virtual void change_stream(const StreamDesc& stream) = 0;
   /// The scene looks so from now on; before the first call as it did at the start.
   virtual void change_look(const LookChange& look) = 0;
+  /// Strands have this shape at rest from the next state on; there are as many as before.
+  virtual void change_shape(std::shared_ptr<const SceneAsset> asset) = 0;
 };
 
 class StepTap;
@@ -73,7 +76,7 @@ class StateSource {
   using OnTapped = std::function<void(uint64_t tick)>;
 
   virtual ~StateSource() = default;
-  /// The strands at rest and what else viewers draw; the same all the time.
+  /// The strands at rest and what else viewers draw; the newest of StateSink::change_shape(). Any thread.
   virtual std::shared_ptr<const SceneAsset> asset() const = 0;
   /// Returns when the first state was put, or with the error. States are on the lattice of `stream`. `sink`
   /// outlives the source. Call once.

@@ -35,10 +35,12 @@ StreamHub::StreamHub(StreamHubConfig config)
     : config_(std::move(config)),
       codecs_(codecs_of(config_)),
       picture_source_(stream_id_of({codecs_.size() - 1, 0})),
+      asset_(config_.asset),
+      make_painter_(config_.make_painter),
       stream_(config_.stream),
       look_(config_.look),
       book_(config_.scene_view, kSoftwareBudget, picture_source_) {
-  if (config_.asset != nullptr) book_.set_hair(hair_extent(*config_.asset));
+  if (asset_ != nullptr) book_.set_hair(hair_extent(*asset_));
 }
 
 Result<std::unique_ptr<StreamHub>> StreamHub::make(StreamHubConfig config) {
@@ -54,11 +56,17 @@ StreamHub::~StreamHub() {
 Status StreamHub::begin() {
   // A wrong codec is told here, and encoders can be made later without a way to fail.
   for (const std::string& codec : codecs_) RETURN_IF_ERROR(make_strand_encoder(codec));
-  const SceneAsset& asset = *config_.asset;
+  classes_ = classes_of(stream_);
+  ASSIGN_OR_RETURN(frames_, make_frames());
+  return {};
+}
+
+/// What draws strands of the present shape.
+Result<std::unique_ptr<FrameWorker>> StreamHub::make_frames() {
+  const SceneAsset& asset = *asset_;
   ASSIGN_OR_RETURN(auto decoder,
                    make_strand_decoder(codecs_.back(), {asset.strand_count, asset.vertex_count}));
   decoder->set_rest_shape(asset.rest_position_m);
-  classes_ = classes_of(stream_);
   FrameWorker::Hooks hooks;
   hooks.sink = [this](PictureClass picture_class, PicturePtr picture) {
     give([&](const Entry& entry) { return entry.picture_class == picture_class; },
@@ -80,9 +88,8 @@ Status StreamHub::begin() {
   hooks.on_failure = [this](const Error& error) {
     give([](const Entry&) { return true; }, [&](StreamReader& reader) { reader.on_pictures_failed(error); });
   };
-  frames_ = std::make_unique<FrameWorker>(std::move(decoder), config_.make_painter,
-                                          FrameWorkerConfig{stream_.frame_rate_hz}, std::move(hooks));
-  return {};
+  return std::make_unique<FrameWorker>(std::move(decoder), make_painter_,
+                                       FrameWorkerConfig{stream_.frame_rate_hz}, std::move(hooks));
 }
 
 /// Gives something to every reader with a demand for it, once.
@@ -152,7 +159,7 @@ void StreamHub::set_source(std::function<void(const SourceDemand&)> on_demand) {
 void StreamHub::follow_demand() {
   {
     const std::lock_guard lock(mutex_);
-    if (has_stopped_) return;
+    if (has_stopped_ || is_reshaping_) return;
     frames_->set_views(book_.picture_views());
     const std::set<uint16_t> wanted = book_.strand_streams();
     for (const uint16_t stream_id : wanted)
@@ -184,7 +191,7 @@ StrandEncodeWorker& StreamHub::encoder(uint16_t stream_id) {
   if (StrandEncodeWorker* present = find_encoder(stream_id)) return *present;
   auto made = make_strand_encoder(codecs_[strand_stream_of(stream_id).codec]);
   CHECK(made.ok());  // begin() has made one
-  (*made)->set_rest_shape(config_.asset->rest_position_m);
+  (*made)->set_rest_shape(asset_->rest_position_m);
   auto worker = std::make_unique<StrandEncodeWorker>(
       slot_, std::move(*made), [this](const EncodedFramePtr& frame) { give_strands(frame); },
       encode_config(stream_id));
@@ -203,7 +210,7 @@ void StreamHub::give_strands(const EncodedFramePtr& frame) {
 
 std::vector<StrandClass> StreamHub::classes_of(const StreamDesc& stream) const {
   return make_strand_classes(
-      {config_.step_rate_hz, stream.strand_rate_hz, stream.bound_m, config_.asset->strand_count});
+      {config_.step_rate_hz, stream.strand_rate_hz, stream.bound_m, asset_->strand_count});
 }
 
 StrandEncodeConfig StreamHub::encode_config(uint16_t stream_id) const {
@@ -237,6 +244,44 @@ void StreamHub::change_look(const LookChange& look) {
     if (frames_ != nullptr) frames_->set_look(look.look);
   }
   give([](const Entry&) { return true; }, [&](StreamReader& reader) { reader.on_look_change(look); });
+}
+
+/// Encoders and painters of the old shape end first, so that nothing of theirs comes behind the news; those
+/// of the new one begin when every reader has told whoever must know.
+void StreamHub::change_shape(std::shared_ptr<const SceneAsset> asset) {
+  std::map<uint16_t, std::unique_ptr<StrandEncodeWorker>> encoders;
+  std::unique_ptr<FrameWorker> frames;
+  uint64_t number = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    if (has_stopped_) return;
+    is_reshaping_ = true;
+    number = ++shapes_;
+    encoders.swap(encoders_);
+    frames.swap(frames_);
+  }
+  encoders.clear();
+  frames.reset();
+  const std::shared_ptr<void> until_told(nullptr,
+                                         [this, asset, number](void*) { begin_shape(asset, number); });
+  give([](const Entry&) { return true; },
+       [&](StreamReader& reader) { reader.on_shape_change(asset, until_told); });
+}
+
+void StreamHub::begin_shape(std::shared_ptr<const SceneAsset> asset, uint64_t number) {
+  const std::lock_guard order(demand_mutex_);
+  {
+    const std::lock_guard lock(mutex_);
+    if (has_stopped_ || number != shapes_) return;  // the newest alone
+    asset_ = std::move(asset);
+    if (config_.painter_of) make_painter_ = config_.painter_of(asset_, look_.look);
+    book_.set_hair(hair_extent(*asset_));
+    auto frames = make_frames();
+    CHECK(frames.ok());  // begin() has made some, for as many strands
+    frames_ = std::move(frames).value();
+    is_reshaping_ = false;
+  }
+  follow_demand();
 }
 
 void StreamHub::begin_stream(const StreamDesc& stream, const std::vector<StrandClass>& classes) {

@@ -30,6 +30,9 @@ struct StreamHubConfig {
   std::shared_ptr<const SceneAsset> asset;
   MakePicturePainter make_painter;  // called when somebody wants pictures
   LookChange look = {};             // that the painters are made with
+  /// Makes `make_painter` anew for strands of another shape; empty: they have one.
+  std::function<MakePicturePainter(const std::shared_ptr<const SceneAsset>&, const LookDesc&)> painter_of =
+      {};
 };
 
 class StreamHub : public StateSink, public DemandDesk {
@@ -63,6 +66,7 @@ class StreamHub : public StateSink, public DemandDesk {
   void put(std::shared_ptr<const Snapshot> state) override;
   void change_stream(const StreamDesc& stream) override;
   void change_look(const LookChange& look) override;
+  void change_shape(std::shared_ptr<const SceneAsset> asset) override;
   // What comes in, for readers that want inputs.
   void tell_motion(uint64_t source, const MotionSamples& samples, int64_t arrival_ns);
   void tell_wind(uint64_t source, const WindSamples& samples, int64_t arrival_ns);
@@ -107,6 +111,8 @@ class StreamHub : public StateSink, public DemandDesk {
   StrandEncodeConfig encode_config(uint16_t stream_id) const;
   std::vector<StrandClass> classes_of(const StreamDesc& stream) const;
   void begin_stream(const StreamDesc& stream, const std::vector<StrandClass>& classes);
+  void begin_shape(std::shared_ptr<const SceneAsset> asset, uint64_t number);
+  Result<std::unique_ptr<FrameWorker>> make_frames();
   void give_strands(const EncodedFramePtr& frame);
   template <class IsWanted, class Give>
   void give(IsWanted is_wanted, Give give_one);
@@ -123,6 +129,10 @@ class StreamHub : public StateSink, public DemandDesk {
 
   std::mutex giving_mutex_;   // held while readers are called; taken after demand_mutex_
   mutable std::mutex mutex_;  // guards the block below; taken last, and never held while a reader is called
+  std::shared_ptr<const SceneAsset> asset_;
+  MakePicturePainter make_painter_;
+  uint64_t shapes_ = 0;        // that were told of
+  bool is_reshaping_ = false;  // nothing is encoded or drawn until all know of the newest
   StreamDesc stream_;
   LookChange look_;
   std::vector<StrandClass> classes_;

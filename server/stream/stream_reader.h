@@ -10,6 +10,7 @@
 #include "common/base/result.h"
 #include "common/pictures/picture.h"
 #include "common/strands/frame_header.h"
+#include "common/strands/scene_asset.h"
 #include "common/strands/snapshot.h"
 #include "common/wire/messages.h"
 #include "server/net/strand_class.h"
@@ -42,6 +43,10 @@ class StreamReader {
   /// `until_told`.
   virtual void on_stream_change(const std::vector<StrandClass>& /*classes*/,
                                 std::shared_ptr<void> /*until_told*/) {}
+  /// Strands have this shape at rest from now on. Told to all; nothing is encoded of it while anybody holds
+  /// `until_told`, and nothing that comes later is of the shape before.
+  virtual void on_shape_change(const std::shared_ptr<const SceneAsset>& /*asset*/,
+                               std::shared_ptr<void> /*until_told*/) {}
 };
 
 }  // namespace strandcast

@@ -42,6 +42,9 @@ class RecordedRun : public test::ServerFixture {
     EXPECT_EQ(change("substeps=2"), kDoneExit);
     EXPECT_EQ(change("stream.bound_m=0.0002"), kDoneExit);
     EXPECT_EQ(change("wind.mean_mps.x=400000"), kRefusedExit);
+    EXPECT_EQ(change("hair.wind=2.5"), kDoneExit);
+    EXPECT_EQ(change("hair.stiffness=0.5"), kDoneExit);
+    EXPECT_EQ(change("hair.stiffness=nan"), kRefusedExit);
     run_steps(20);
     EXPECT_EQ(command(Command::Pause), kDoneExit);
     EXPECT_EQ(command(Command::StepOnce), kDoneExit);
@@ -132,8 +135,9 @@ TEST_F(RecordedRun, SaysWhoChangedWhatAndWhatCameIn) {
                       (change->answer.is_error ? ": refused" : ""));
   }
   EXPECT_EQ(changes, (std::vector<std::string>{"substeps=2", "stream.bound_m=0.0002",
-                                               "wind.mean_mps.x=400000: refused", "command", "command",
-                                               "command", "command", "solver.name=pbd"}));
+                                               "wind.mean_mps.x=400000: refused", "hair.wind=2.5",
+                                               "hair.stiffness=0.5", "hair.stiffness=nan: refused", "command",
+                                               "command", "command", "command", "solver.name=pbd"}));
   EXPECT_GT(motion, 10u);
   EXPECT_GT(wind, 10u);
   EXPECT_GT(steps_with_motion, 30u);

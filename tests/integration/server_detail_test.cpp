@@ -34,6 +34,7 @@ class StateSinkOfTest : public StateSink {
   }
   void change_stream(const StreamDesc&) override {}
   void change_look(const LookChange&) override {}
+  void change_shape(std::shared_ptr<const SceneAsset>) override {}
   std::vector<std::shared_ptr<const Snapshot>> take() {
     const std::lock_guard lock(mutex_);
     return std::exchange(states_, {});

@@ -127,6 +127,7 @@ class LoopSink : public StateSink {
     const std::lock_guard lock(mutex_);
     looks_.push_back(look);
   }
+  void change_shape(std::shared_ptr<const SceneAsset>) override {}
   std::vector<StreamDesc> streams() const {
     const std::lock_guard lock(mutex_);
     return streams_;

@@ -9,6 +9,7 @@
 #include <set>
 #include <utility>
 
+#include "client/app/hair_sliders.h"
 #include "client/app/look_control.h"
 #include "client/app/save_scene.h"
 #include "client/window/form_panel.h"
@@ -342,6 +343,92 @@ TEST(FormPanel, AnEditIsWhatThePersonTurned) {
   expected.skin_color = changed->skin_color;
   EXPECT_EQ(*changed, expected) << "and nothing else";
   EXPECT_NE(changed->background, sample_look().background);
+}
+
+std::vector<ParameterInfo> listed_sliders() {
+  return {
+      {"quality", "auto", "auto", "", false, 0.0, 0.0, true, "known: auto, fast, full, custom; fast runs"},
+      {"hair.length", "1", "1", "of its length", true, 0.3, 1.5, false, "only at the start"},
+      {"hair.stiffness", "1", "1", "times as stiff", true, 0.1, 10.0, true,
+       "how strongly hair keeps its style"},
+      {"hair.wind", "0.5", "1", "of the wind", true, 0.0, 3.0, true, "0 = still air"},
+      {"look.ambient", "0.2", "0.22", "", true, 0.0, 1.0, true, "none of them"}};
+}
+
+TEST(HairSliders, AreWhatTheServerListsAndCanChange) {
+  HairSliders sliders;
+  sliders.follow(listed_sliders(), true);
+  const std::vector<FormField> fields = sliders.fields(0);
+  ASSERT_EQ(fields.size(), 3u);
+  EXPECT_EQ(fields[0].title, "Quality");
+  EXPECT_EQ(fields[0].choices, (std::vector<std::string>{"fast", "auto", "full"}));
+  EXPECT_EQ(fields[1].title, "Stiffness");
+  EXPECT_TRUE(fields[1].is_logarithmic);
+  EXPECT_EQ(fields[2].value, FormValue(0.5));
+  EXPECT_EQ(fields[2].usual, FormValue(1.0));
+  EXPECT_FALSE(fields[2].is_logarithmic);
+  for (const FormField& field : fields) EXPECT_TRUE(field.section.empty() && !field.is_idle) << field.path;
+  EXPECT_EQ(sliders.reason(), "");
+  sliders.follow(listed_sliders(), false);
+  for (const FormField& field : sliders.fields(0)) EXPECT_TRUE(field.is_idle) << field.path;
+  EXPECT_THAT(sliders.reason(), HasSubstr("may not steer"));
+}
+
+TEST(HairSliders, SayWhatWasMovedOneAfterTheOther) {
+  HairSliders sliders;
+  sliders.follow(listed_sliders(), true);
+  std::vector<FormEdit> edits{
+      {"hair.wind", 2.0}, {"ambient", 0.5}, {"quality", std::string("full")}, {"hair.wind", 2.5}};
+  sliders.take_edits(edits, kSInNs);
+  EXPECT_EQ(edits, (std::vector<FormEdit>{{"ambient", 0.5}})) << "what is not theirs stays";
+  EXPECT_EQ(sliders.take_assignment(kSInNs), "hair.wind=2.5") << "the newest alone";
+  EXPECT_EQ(sliders.take_assignment(kSInNs + kLookSendNs / 2), std::nullopt) << "not too often";
+  EXPECT_EQ(sliders.take_assignment(kSInNs + kLookSendNs), "quality=full");
+  EXPECT_EQ(sliders.take_assignment(kSInNs + 2 * kLookSendNs), std::nullopt);
+  // It stays where it was put until the server says something else.
+  EXPECT_EQ(sliders.fields(kSInNs + kLookSendNs).at(2).value, FormValue(2.5));
+  EXPECT_EQ(sliders.fields(kSInNs + 2 * kLookHoldNs).at(2).value, FormValue(0.5));
+  // Who may not steer moves nothing.
+  sliders.follow(listed_sliders(), false);
+  edits = {{"hair.wind", 1.0}};
+  sliders.take_edits(edits, 9 * kSInNs);
+  EXPECT_TRUE(edits.empty());
+  EXPECT_EQ(sliders.take_assignment(9 * kSInNs), std::nullopt);
+}
+
+// They stand above all else, which is folded below More, and fit into a small window.
+TEST(FormPanel, SlidersStandOnTopAndTheRestIsFolded) {
+  LookControl control;
+  control.follow(scene_with(sample_look()), true);
+  HairSliders sliders;
+  sliders.follow(listed_sliders(), true);
+  FormState form = control.form(false, kSInNs);
+  const std::vector<FormField> top = sliders.fields(kSInNs);
+  FormBench bench;
+  FormActions actions;
+  const ImVec2 area{640.0f, 360.0f};
+  PanelSize all, folded;
+  for (int i = 0; i < 3; ++i) all = bench.turn(form, actions, area);
+  form.fields.insert(form.fields.begin(), top.begin(), top.end());
+  for (int i = 0; i < 3; ++i) folded = bench.turn(form, actions, area);
+  EXPECT_LT(folded.height, 0.7f * all.height) << "all else is closed";
+  // A drag along each line turns what stands there.
+  ImGuiIO& io = ImGui::GetIO();
+  std::vector<FormEdit> done;
+  const auto turn = [&](const ImVec2& pointer, bool is_down) {
+    io.MousePos = pointer;
+    io.MouseDown[0] = is_down;
+    for (FormEdit& edit : bench.picture(form).edits) done.push_back(std::move(edit));
+  };
+  for (float y = 360.0f; y > 0.0f; y -= 3.0f) {
+    turn({1150.0f, y}, false);
+    turn({1150.0f, y}, true);
+    turn({1210.0f, y}, true);
+    turn({1210.0f, y}, false);
+  }
+  std::set<std::string> turned;
+  for (const FormEdit& edit : done) turned.insert(edit.path);
+  EXPECT_EQ(turned, (std::set<std::string>{"quality", "hair.stiffness", "hair.wind"}));
 }
 
 }  // namespace

@@ -142,5 +142,21 @@ TEST(ParameterWatch, TellsWhoWantsItWhatIsOther) {
   EXPECT_TRUE(watch.is_empty());
 }
 
+TEST(ParameterWatch, TellsOfSeveralPrefixes) {
+  SceneDesc scene = built_in_scene();
+  ParameterWatch watch;
+  watch.add(1, "quality,hair.", list_parameters(scene));
+  scene.look.ambient = 0.75f;
+  EXPECT_TRUE(watch.news(list_parameters(scene)).empty()) << "not asked for";
+  scene.hair.wind = 2.0;
+  scene.quality = kFullQuality;
+  const auto news = watch.news(list_parameters(scene));
+  ASSERT_EQ(news.size(), 1u);
+  EXPECT_EQ(news[0].second.parameters.size(), 2u);
+  EXPECT_TRUE(begins_so("hair.wind", "")) << "all";
+  EXPECT_FALSE(begins_so("look.ambient", "quality,hair."));
+  EXPECT_FALSE(begins_so("hai", "quality,hair."));
+}
+
 }  // namespace
 }  // namespace strandcast::scene_parameters_test

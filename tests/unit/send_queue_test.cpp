@@ -106,6 +106,29 @@ TEST(SendQueue, WhoDoesNotCatchUpWithAChainLosesIt) {
   EXPECT_TRUE(queue.needs_keyframe());
 }
 
+// Hair of another shape: what waits was of the one before.
+TEST(SendQueue, AnotherAssetDropsWhatWaitsAndAKeyframeFollowsIt) {
+  SendQueue queue;
+  queue.start_strands();
+  const std::vector<EncodedFramePtr> chain = {keyframe(1), delta(2), delta(3)};
+  ASSERT_EQ(queue.offer_chain(chain), SendQueue::Offer::Queued);
+  (void)queue.take_next();
+  queue.renew_asset(frame(Opcode::Asset, 1, 0));
+  EXPECT_EQ(queue.offer_strands(delta(4)), SendQueue::Offer::Ignored);
+  queue.written();
+  EXPECT_EQ(queue.offer_strands(keyframe(4)), SendQueue::Offer::Ignored) << "the asset waits";
+  queue.renew_asset(frame(Opcode::Asset, 2, 0));
+  const auto item = queue.take_next();
+  ASSERT_TRUE(item);
+  EXPECT_EQ(std::get<EncodedFramePtr>(*item)->header.opcode, Opcode::Asset);
+  EXPECT_EQ(std::get<EncodedFramePtr>(*item)->header.sequence, 2u) << "the newest alone";
+  queue.written();
+  EXPECT_FALSE(queue.take_next().has_value()) << "nothing of the old shape";
+  EXPECT_TRUE(queue.needs_keyframe());
+  EXPECT_EQ(queue.offer_strands(keyframe(1)), SendQueue::Offer::Queued) << "of an encoder that begins anew";
+  EXPECT_EQ(queue.dropped_frames(), 2u);
+}
+
 TEST(SendQueue, AChainIsForOneThatWaitsForAKeyframe) {
   SendQueue queue;
   const std::vector<EncodedFramePtr> chain = {keyframe(1), delta(2)};

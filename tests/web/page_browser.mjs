@@ -23,6 +23,7 @@ if (missing) {
   process.exit(77);
 }
 const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-page-'));
+const SLIDERS = ['Quality', 'Length', 'Curl', 'Stiffness', 'Friction', 'Wind'];
 const SMALL = ['--set', 'groom.procedural.strand_count=400', '--set', 'groom.procedural.vertex_count=12'];
 
 class Server {
@@ -95,6 +96,37 @@ const all = {
     await tab.evaluate('document.getElementById("stage").focus()');
     for (let i = 0; i < 5; ++i) await tab.press('ArrowLeft');
     await tab.until((now) => String(now.camera) !== String(dragged.camera), 'another camera by keys');
+    await tab.close();
+  },
+  async 'what is changed first stands on top of the panel, and moves'() {
+    const tab = await browser.open(`${server.url}#mode=strands`);
+    await tab.until((now) => now.states > 3, 'states');
+    await tab.press('l');
+    const rows = () => tab.evaluate(`[...document.querySelectorAll('#controls .control')].map((row) => row.innerText.replace(/\\s+/g, ' ').trim())`);
+    await tab.until(async () => (await rows()).length === SLIDERS.length, 'sliders');
+    assert.deepEqual((await rows()).map((row) => row.split(' ')[0]), SLIDERS);
+    assert.equal(await tab.evaluate('document.querySelector("#panel .more").open'), false, 'all else is folded');
+    const fits = await tab.evaluate(`[...document.querySelectorAll('#controls .control')].every((row) => {
+      const box = row.getBoundingClientRect(); return box.top >= 0 && box.bottom <= innerHeight && box.right <= innerWidth; })`);
+    assert.ok(fits, 'in a window of 640 x 360');
+    if (shots) await tab.screenshot(path.join(shots, 'controls.png'));
+    // By keys: the wind goes up, and the server says so.
+    await tab.evaluate('document.getElementById("control-wind").focus()');
+    for (let i = 0; i < 5; ++i) await tab.press('ArrowRight');
+    await tab.until(() => /hair\.wind=1\.3/.test(server.log), 'the server hears of it');
+    assert.match((await rows()).at(-1), /Wind 1\.3/);
+    // A second page hears of it, a double click takes it back.
+    const other = await browser.open(`${server.url}#mode=pictures&view-only`);
+    await other.until((now) => now.pictures > 0, 'a picture');
+    await other.press('l');
+    await other.until(async () => /1\.3/.test(await other.evaluate('document.getElementById("controls").innerText')), 'its value there');
+    assert.equal(await other.evaluate('document.getElementById("control-wind").disabled'), true);
+    assert.match(await other.evaluate('document.getElementById("control-reason").textContent'), /no right to steer/);
+    await tab.evaluate(`document.getElementById('control-wind').dispatchEvent(new MouseEvent('dblclick', { bubbles: true }))`);
+    await tab.until(() => /hair\.wind=1(\s|$)/m.test(server.log), 'the default comes back');
+    await other.until(async () => /Wind\s+1$/.test((await other.evaluate('document.getElementById("controls").innerText')).trim()), 'and is told');
+    assert.deepEqual(tab.errors, []);
+    await other.close();
     await tab.close();
   },
   async 'of two heads the chosen one is drawn'() {

@@ -124,6 +124,7 @@ class Viewer {
     this.panel = new Panel(at('panel'), {
       set: (path, value) => this.set(path, value),
       askScene: () => this.askScene(),
+      askControls: () => this.toNet({ kind: 'controls' }),
       close: () => this.togglePanel(),
     });
     this.bind();
@@ -205,9 +206,11 @@ class Viewer {
         this.frameQuality = message.quality;
         return;
       case 'notice':
-        return warnings.say(message.text, message.isError);
+        return this.notice(message.text, message.isError);
       case 'sceneText':
         return this.panel.showScene(message.text);
+      case 'parameters':
+        return this.panel.showControls(message.parameters);
       case 'picture':
         return this.showPicture(message.picture, message.width, message.height);
       case 'figures':
@@ -216,6 +219,10 @@ class Viewer {
     }
   }
 
+  private notice(text: string, isError: boolean): void {
+    // A slider says itself what it has done.
+    if (isError || !/^(hair\.|quality=|Left out: a newer)/.test(text)) warnings.say(text, isError);
+  }
   private begin(welcome: WelcomeMessage): void {
     this.welcome = welcome;
     this.reason = welcome.mode_reason;
@@ -227,7 +234,7 @@ class Viewer {
     at('head').replaceChildren(...welcome.heads.map((name) => new Option(name)));
     at<HTMLSelectElement>('head').value = welcome.scene_name;
     this.showHeads();
-    if (this.panel.isOpen) this.askScene();
+    if (this.panel.isOpen) this.panel.ask();
     this.sentCamera = '';
     this.lookFrom(this.camera);
     const isFull = welcome.look?.methods && Object.values(welcome.look.methods).some((name) => name && name !== 'main');

@@ -2,7 +2,9 @@
 // (session.ts), one its socket (socket.ts), one the drawing
 // (drawer.ts). States go straight from the connection to the drawing, pictures to
 // the page; at most one of each is on its way, and the newest waits.
-import type { CameraMessage, FrameQualityMessage, LookMessage, StatusMessage, StreamQualityMessage, WelcomeMessage } from './wire';
+import type {
+  CameraMessage, FrameQualityMessage, LookMessage, ParameterMessage, StatusMessage, StreamQualityMessage, WelcomeMessage,
+} from './wire';
 
 export type Vec3 = [number, number, number];
 export interface Camera {
@@ -34,6 +36,7 @@ export type ToNet =
   | { kind: 'command'; command: number }
   | { kind: 'set'; assignment: string }
   | { kind: 'scene' }
+  | { kind: 'controls' } // values of what is on top of the panel, and what changes of them
   | { kind: 'drawn'; drawMs: number; shownHz: number; device: number }
   | { kind: 'pictureShown' };
 
@@ -68,6 +71,7 @@ export type FromNet =
   | { kind: 'frameQuality'; quality: FrameQualityMessage }
   | { kind: 'notice'; isError: boolean; text: string }
   | { kind: 'sceneText'; text: string }
+  | { kind: 'parameters'; parameters: readonly ParameterMessage[] }
   | { kind: 'picture'; picture: VideoFrame | ImageBitmap; width: number; height: number }
   | { kind: 'figures'; figures: NetFigures };
 

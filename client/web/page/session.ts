@@ -177,6 +177,8 @@ class Net {
         return connection?.send({ set_parameter: { assignment: message.assignment } });
       case 'scene':
         return connection?.send({ scene_request: {} });
+      case 'controls':
+        return connection?.send({ parameter_request: { prefix: 'quality,hair.', is_watching: true } });
       case 'drawn':
         this.drawn = message;
         if (message.shownHz > 0 && connection?.showsStrands && !this.asked.codec) void this.learnSteps();
@@ -338,6 +340,7 @@ class Connection {
     }
     if (message.look_change) post({ kind: 'look', look: message.look_change.look, camera: message.look_change.camera });
     if (message.camera) post({ kind: 'moved', camera: message.camera.camera });
+    if (message.parameter_list) post({ kind: 'parameters', parameters: message.parameter_list.parameters });
     if (message.scene_text) post({ kind: 'sceneText', text: message.scene_text.text });
   }
 

@@ -165,6 +165,7 @@ export type WelcomeMessage = Message<typeof Welcome>;
 export type StatusMessage = Message<typeof ServerStatus>;
 export type StreamQualityMessage = Message<typeof StreamQuality>;
 export type FrameQualityMessage = Message<typeof FrameQuality>;
+export type ParameterMessage = Message<typeof ParameterInfo>;
 export type HelloMessage = Partly<typeof Hello>;
 
 export const Role = { viewer: 0, controller: 1, source: 2, admin: 3 } as const;

@@ -1,20 +1,17 @@
-// Look and parameters: a slider for each field with its range and unit, and hair colours by name.
+// Look and parameters: on top what a newcomer changes first (controls.ts), below More a slider for each field with its range
+// and unit, and hair colours by name.
 import { Field, hairColors, lookSections, Section, simulationSections } from '../fields';
 import { readScene, solverParameters } from '../scene_text';
-import type { LookMessage } from '../wire';
+import type { LookMessage, ParameterMessage } from '../wire';
+import { Controls } from './controls';
+import { element } from './element';
 
 export interface PanelActions {
   /** "path=value" for the server, or for this window alone. */
   set(path: string, value: string): void;
   askScene(): void;
+  askControls(): void;
   close(): void;
-}
-
-function element<K extends keyof HTMLElementTagNameMap>(name: K, text = '', className = ''): HTMLElementTagNameMap[K] {
-  const made = document.createElement(name);
-  if (text) made.textContent = text;
-  if (className) made.className = className;
-  return made;
 }
 
 /** So many digits that a step of the slider is seen. */
@@ -94,7 +91,7 @@ export class Panel {
   private readonly colors = new Map<string, HTMLButtonElement>();
   private readonly note = element('p', '', 'note');
   private readonly simulation = element('div');
-  private readonly qualities = new Map<string, HTMLButtonElement>(); // by name
+  private readonly controls: Controls;
   private readonly solver = element('div');
   private solverKeys = '';
   isOpen = false;
@@ -116,27 +113,17 @@ export class Panel {
       this.colors.set(name, button);
       swatches.append(button);
     }
-    place.append(header, this.note, swatches);
-    for (const section of lookSections) place.append(this.section(section, section.title === 'Colour'));
-    this.simulation.append(this.qualityRow());
+    place.append(header);
+    this.controls = new Controls(place, (path, value) => actions.set(path, value));
+    const more = element('details', '', 'more');
+    more.append(element('summary', 'More'), this.note, swatches);
+    place.append(more);
+    for (const section of lookSections) more.append(this.section(section, section.title === 'Colour'));
     for (const section of simulationSections) this.simulation.append(this.section(section, false));
     const own = element('details');
     own.append(element('summary', 'Strand model'), this.solver);
     this.simulation.append(own);
-    place.append(this.simulation);
-  }
-  /** How much the server simulates; none is pressed where the scene has a quality of its own. */
-  private qualityRow(): HTMLElement {
-    const row = element('div', '', 'swatches');
-    row.setAttribute('role', 'group');
-    row.setAttribute('aria-label', 'Quality of the simulation');
-    for (const [name, title] of [['auto', 'auto'], ['full', 'full quality'], ['fast', 'fast']] as const) {
-      const button = element('button', title);
-      button.addEventListener('click', () => this.actions.set('quality', name));
-      this.qualities.set(name, button);
-      row.append(button);
-    }
-    return row;
+    more.append(this.simulation);
   }
   private section(section: Section, isOpen: boolean): HTMLElement {
     const details = element('details');
@@ -153,10 +140,16 @@ export class Panel {
   toggle(): void {
     this.isOpen = !this.isOpen;
     this.place.hidden = !this.isOpen;
-    if (this.isOpen) this.actions.askScene();
+    if (this.isOpen) this.ask();
+  }
+  /** What it shows, of a session that has begun. */
+  ask(): void {
+    this.actions.askScene();
+    this.actions.askControls();
   }
   setRole(isController: boolean, isStrands: boolean): void {
     this.simulation.hidden = !isController;
+    this.controls.allow(isController ? '' : 'Who watches cannot move these: the server gave this page no right to steer.');
     this.note.textContent = isController
       ? 'You may steer: what you change here, everybody who watches sees.'
       : isStrands
@@ -170,12 +163,13 @@ export class Panel {
     for (const path of ['look.eumelanin', 'look.pheomelanin']) if (!isMelanin) this.sliders.get(path)!.show(undefined);
     for (const [name, button] of this.colors) button.setAttribute('aria-pressed', String(look.hair_color === name));
   }
+  showControls(parameters: readonly ParameterMessage[]): void {
+    this.controls.show(parameters);
+  }
   showScene(text: string): void {
     const numbers = readScene(text);
     for (const section of simulationSections)
       for (const field of section.fields) this.sliders.get(field.path)!.show(numbers.get(field.path));
-    const quality = /(?:^|\s)quality: "(\w+)"/.exec(text)?.[1];
-    for (const [name, button] of this.qualities) button.setAttribute('aria-pressed', String(name === quality));
     this.showSolver(solverParameters(text));
   }
   /** Parameters whose ranges only the server knows: it refuses what does not fit, and says why. */
