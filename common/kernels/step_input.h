@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "common/kernels/body_input.h"
+#include "common/math/bust.h"
 #include "common/math/sphere_collider.h"
 
 namespace strandcast {
@@ -26,6 +27,14 @@ struct GustWave {
   bool operator==(const GustWave&) const = default;
 };
 inline constexpr uint32_t kMaxGustWaves = 8;
+
+/// The bust during a substep. Colliders are where it has them; what slides on its skin goes along with it.
+struct BustInput {
+  BustRig rig;
+  BustTurn turn{0.0}, turn_before{0.0};  // at the substep's end and beginning
+
+  bool operator==(const BustInput&) const = default;
+};
 
 /// No angle of a root is larger.
 inline constexpr double kFreeFollicleRad = std::numbers::pi;
@@ -46,6 +55,7 @@ struct StepInput {
   bool begins_step = true;                // the first substep of a step: what is computed once a step is
   std::vector<SphereCollider> colliders;  // centres in head-relative world axes, at the end of the substep
   BodyInput body;                         // head space
+  BustInput bust;                         // head space
 };
 
 /// Whether roots are held in this substep; no number, and no angle, is no limit.
