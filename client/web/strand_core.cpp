@@ -27,6 +27,7 @@ namespace {
 StrandCoreState state_of(const Snapshot& snapshot) {
   const glm::dvec3& position_m = snapshot.world_from_head.position_m;
   const glm::dquat& rotation = snapshot.world_from_head.rotation;
+  const BustTurn bust = bust_turn(snapshot.bust, rotation);
   return {snapshot.tick,
           snapshot.sim_time_ns,
           snapshot.motion_time_ns,
@@ -35,7 +36,8 @@ StrandCoreState state_of(const Snapshot& snapshot) {
           snapshot.strand_count,
           snapshot.vertex_count,
           static_cast<uint32_t>(3 * snapshot.plane_size()),
-          snapshot.quantum_m};
+          snapshot.quantum_m,
+          {bust.x, bust.y, bust.z}};
 }
 
 Status set_asset(StrandCoreDecoder& core, std::span<const std::byte> payload) {

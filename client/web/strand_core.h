@@ -20,8 +20,9 @@ struct StrandCoreState {
   uint32_t vertex_count;      // 84
   uint32_t position_floats;   // 88: of strand_core_positions()
   float quantum_m;            // 92: of the lattice
+  double bust[3];             // 96: how neck and chest are turned against the head: x y z of a quaternion
 };
-static_assert(sizeof(StrandCoreState) == 96 && offsetof(StrandCoreState, strand_count) == 80);
+static_assert(sizeof(StrandCoreState) == 120 && offsetof(StrandCoreState, strand_count) == 80);
 
 extern "C" {
 

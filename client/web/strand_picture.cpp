@@ -10,6 +10,7 @@
 
 #include "client/web/core_export.h"
 #include "common/base/worker_pool.h"
+#include "common/groom/bust_skin.h"
 #include "common/render/gl_tiles/tile_block.h"
 #include "common/render/rest_facts.h"
 #include "common/render/scalp_cover.h"
@@ -90,6 +91,7 @@ struct StrandPicture {
         position_m(asset.rest_position_m),
         expansion(asset, rest.mean_length_m),
         lattice(describe_lattice(asset, rest, describe_light(asset, look, rest), kLightCells)),
+        skin(asset.head),
         cover(scalp_cover(asset, rest.extent_m * kCoverReach)),
         half_depth(make_half_depths()),
         srgb(make_srgb_table()) {
@@ -121,6 +123,7 @@ struct StrandPicture {
   StrandExpansion expansion;
   StrandPoints points;
   LightLattice lattice;
+  BustSkin skin;
   std::vector<float> cover;
   StrandPictureHead head{};
   StrandPictureParts parts{};
@@ -158,6 +161,7 @@ constexpr simd::InstructionSet kSet = simd::InstructionSet::Plain;
 struct Turn {
   View view;
   glm::dquat rotation;
+  BustTurn bust{0.0};
 };
 
 Result<Turn> turn_of(const StrandPictureView& wish) {
@@ -169,6 +173,7 @@ Result<Turn> turn_of(const StrandPictureView& wish) {
   Turn turn;
   turn.rotation = glm::dquat(static_cast<double>(r[0]), static_cast<double>(r[1]), static_cast<double>(r[2]),
                              static_cast<double>(r[3]));
+  turn.bust = BustTurn(wish.bust[0], wish.bust[1], wish.bust[2]);
   const glm::uvec2 size(static_cast<uint32_t>(std::clamp(wish.width_px, 1.0f, 8192.0f)),
                         static_cast<uint32_t>(std::clamp(wish.height_px, 1.0f, 8192.0f)));
   ASSIGN_OR_RETURN(turn.view, make_view(camera, turn.rotation, size));
@@ -197,6 +202,8 @@ void expand_and_light(StrandPicture& p, const Turn& turn, float strand_share, bo
   p.lights = light_directions(p.look, turn.rotation, turn.view.up);
   const LatticeFrame frame = fit_lattice(p.lattice.desc(), p.lights, p.position_m,
                                          style_room_m(style_numbers(p.look, p.facts.mean_length_m)));
+  if (p.skin.pose(turn.bust, p.asset.head)) ++p.parts.head_number;
+  p.lattice.set_bust(turn.bust);
   p.lattice.build(frame, p.points, {p.width_m, p.look.tip_scale, p.look.style.tip_fade}, p.lights, p.workers);
 }
 

@@ -34,8 +34,9 @@ struct StrandPictureView {
   float offset_m[3], target_m[3], fov_y_rad;  // of the camera
   float head_rotation[4];                     // w x y z
   float strand_share;                         // of those that a picture of this size shows
+  float bust[3];                              // of the newest state
 };
-static_assert(sizeof(StrandPictureView) == 14 * sizeof(float));
+static_assert(sizeof(StrandPictureView) == 17 * sizeof(float));
 
 /// Where scripts find what was made; pointers are offsets in the module's memory.
 struct StrandPictureParts {
@@ -56,8 +57,9 @@ struct StrandPictureParts {
   uint32_t light_number;     // 72: another one where the depths are others
   uint32_t rgba;             // 76: (height x width x 4) of strand_picture_draw_tiles(), top row first
   uint32_t tile_count;       // 80: of the picture begun
+  uint32_t head_number;      // 84: another one where the head's positions and normals are others
 };
-static_assert(sizeof(StrandPictureParts) == 84);
+static_assert(sizeof(StrandPictureParts) == 88);
 
 /// Of the head that is drawn under the hair.
 struct StrandPictureHead {

@@ -32,7 +32,8 @@ Part capsule(Blend blend, float softness, const glm::vec3& from, float from_radi
 }
 
 // Proportions of an adult: eyes at half of the head's height, nose down to half of the rest, mouth at a third
-// of that; the sternum a third of a head's height below the chin, shoulders twice as wide as the head.
+// of that; the sternum a third of a head's height below the chin, shoulders twice as wide as the head. The
+// face is a mannequin's, without eyes: nobody misses brows and lashes there.
 const std::array kBust = {
     capsule(Blend::Add, 0.00f, {0.20f, -1.75f, -0.50f}, 0.30f, {1.25f, -2.55f, -0.48f},
             0.30f),                                                                // nape to shoulder
@@ -52,24 +53,17 @@ const std::array kHead = {
     ellipsoid(Blend::Add, 0.20f, {0.00f, -1.23f, 0.76f}, {0.17f, 0.15f, 0.17f}),               // chin
     ellipsoid(Blend::Add, 0.24f, {0.50f, -0.38f, 0.60f}, {0.20f, 0.13f, 0.22f}),               // cheekbone
     ellipsoid(Blend::Add, 0.18f, {0.00f, -0.84f, 0.70f}, {0.37f, 0.27f, 0.26f}),  // round the mouth
-    ellipsoid(Blend::Cut, 0.16f, {0.35f, -0.19f, 1.02f}, {0.23f, 0.13f, 0.22f}),  // eye socket
-    capsule(Blend::Add, 0.16f, {0.08f, 0.00f, 0.89f}, 0.06f, {0.46f, 0.03f, 0.75f}, 0.05f),  // brow
-    ellipsoid(Blend::Add, 0.04f, {0.345f, -0.20f, 0.705f}, {0.180f, 0.150f, 0.185f}),        // closed eye
-    capsule(Blend::Cut, 0.05f, {0.19f, -0.245f, 0.865f}, 0.016f, {0.345f, -0.275f, 0.895f},
-            0.020f),  // lashes
-    capsule(Blend::Cut, 0.05f, {0.345f, -0.275f, 0.895f}, 0.020f, {0.50f, -0.24f, 0.820f}, 0.016f),
-    capsule(Blend::Add, 0.12f, {0.00f, -0.16f, 0.86f}, 0.055f, {0.00f, -0.50f, 1.07f}, 0.080f),  // nose
-    ellipsoid(Blend::Add, 0.08f, {0.00f, -0.555f, 1.09f}, {0.100f, 0.085f, 0.11f}),              // its tip
-    ellipsoid(Blend::Add, 0.06f, {0.12f, -0.585f, 0.98f}, {0.070f, 0.068f, 0.11f}),              // its wing
-    ellipsoid(Blend::Cut, 0.03f, {0.06f, -0.65f, 1.03f}, {0.030f, 0.022f, 0.05f}),               // nostril
-    capsule(Blend::Cut, 0.07f, {0.00f, -0.69f, 1.005f}, 0.02f, {0.00f, -0.77f, 1.01f}, 0.02f),   // philtrum
-    capsule(Blend::Add, 0.08f, {0.060f, -0.825f, 0.945f}, 0.046f, {0.24f, -0.885f, 0.850f},
-            0.030f),  // upper lip
-    capsule(Blend::Add, 0.08f, {0.06f, -0.955f, 0.930f}, 0.060f, {0.23f, -0.908f, 0.850f},
-            0.030f),  // lower lip
-    capsule(Blend::Cut, 0.07f, {0.00f, -0.888f, 1.010f}, 0.024f, {0.25f, -0.896f, 0.925f}, 0.012f),  // mouth
-    ellipsoid(Blend::Cut, 0.12f, {0.00f, -1.07f, 0.97f}, {0.15f, 0.04f, 0.07f}),      // below the lips
-    ellipsoid(Blend::Add, 0.05f, {0.970f, -0.24f, 0.00f}, {0.075f, 0.27f, 0.155f}),   // ear
+    ellipsoid(Blend::Cut, 0.26f, {0.36f, -0.20f, 1.06f}, {0.26f, 0.15f, 0.22f}),  // eye socket
+    capsule(Blend::Add, 0.22f, {0.08f, 0.02f, 0.88f}, 0.05f, {0.46f, 0.04f, 0.74f}, 0.04f),      // brow
+    capsule(Blend::Add, 0.14f, {0.00f, -0.12f, 0.86f}, 0.055f, {0.00f, -0.52f, 1.06f}, 0.080f),  // nose
+    ellipsoid(Blend::Add, 0.10f, {0.00f, -0.565f, 1.06f}, {0.105f, 0.080f, 0.11f}),              // its tip
+    ellipsoid(Blend::Add, 0.10f, {0.10f, -0.585f, 0.98f}, {0.065f, 0.060f, 0.10f}),              // its wing
+    capsule(Blend::Add, 0.14f, {0.050f, -0.835f, 0.935f}, 0.045f, {0.22f, -0.880f, 0.850f},
+            0.025f),  // upper lip
+    capsule(Blend::Add, 0.14f, {0.050f, -0.955f, 0.920f}, 0.055f, {0.20f, -0.915f, 0.850f},
+            0.025f),  // lower lip
+    capsule(Blend::Cut, 0.10f, {0.00f, -0.892f, 1.020f}, 0.018f, {0.20f, -0.896f, 0.955f}, 0.008f),  // mouth
+    ellipsoid(Blend::Add, 0.05f, {0.970f, -0.24f, 0.00f}, {0.075f, 0.27f, 0.155f}),                  // ear
     ellipsoid(Blend::Cut, 0.05f, {1.060f, -0.21f, 0.02f}, {0.050f, 0.18f, 0.090f}),   // its shell
     ellipsoid(Blend::Add, 0.04f, {0.985f, -0.30f, 0.115f}, {0.045f, 0.06f, 0.045f}),  // its flap
 };

@@ -57,6 +57,15 @@ StepBlock make_step_block(const StepInput& input, const StrandParameters& parame
     block.collider[i] = pack(limited(glm::dvec3(sphere.center_m), kMaxColliderM),
                              std::max(0.0, limited(sphere.radius_m, kMaxColliderM)));
   }
+  // While nothing of it moves the bust is head.
+  const BustInput& bust = input.bust;
+  if (bust.rig.exists() && (bust.turn != BustTurn(0.0) || bust.turn_before != BustTurn(0.0))) {
+    const auto whole = [](const BustTurn& turn) {
+      return pack(turn, std::sqrt(std::max(1.0 - glm::dot(turn, turn), 0.0)));
+    };
+    block.bust = {whole(bust.turn), whole(bust.turn_before), glm::vec4(bust.rig.pivot_m, 1.0f),
+                  bust.rig.share};
+  }
   return block;
 }
 

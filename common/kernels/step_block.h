@@ -52,9 +52,10 @@ struct StepBlock {
   std::array<glm::vec4, shader::kMaxGustWaves> gust_amplitude;
   std::array<glm::vec4, shader::kMaxGustWaves> gust_wave;
   std::array<glm::vec4, shader::kMaxSphereColliders> collider;
+  std::array<glm::vec4, 4> bust;
 };
 static_assert(sizeof(StepBlock) ==
-              16 * (3 + 3 + 7 + 3 + 1 + 2 * shader::kMaxGustWaves + shader::kMaxSphereColliders));
+              16 * (3 + 3 + 7 + 3 + 1 + 2 * shader::kMaxGustWaves + shader::kMaxSphereColliders + 4));
 static_assert(shader::kMaxGustWaves == kMaxGustWaves && shader::kMaxSphereColliders == kMaxSphereColliders);
 
 /// The block for one substep; `head` is as before it. Inputs are held to the limits of step_input.h.

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "common/kernels/body_input.h"
+#include "common/math/bust.h"
 #include "common/math/sphere_collider.h"
 
 namespace strandcast {
@@ -28,6 +29,14 @@ struct GustWave {
   bool operator==(const GustWave&) const = default;
 };
 inline constexpr uint32_t kMaxGustWaves = 8;
+
+/// The bust during a substep. Colliders are where it has them; what slides on its skin goes along with it.
+struct BustInput {
+  BustRig rig;
+  BustTurn turn{0.0}, turn_before{0.0};  // at the substep's end and beginning
+
+  bool operator==(const BustInput&) const = default;
+};
 
 /// No angle of a root is larger.
 inline constexpr double kFreeFollicleRad = std::numbers::pi;
@@ -48,6 +57,7 @@ struct StepInput {
   bool renews_volume = true;              // the volume of the hair is made anew before this substep
   std::vector<SphereCollider> colliders;  // centres in head-relative world axes, at the end of the substep
   BodyInput body;                         // head space
+  BustInput bust;                         // head space
 };
 
 /// Whether the volume is made anew before substep `index` of `count` in a step of `step_s`: before the first,

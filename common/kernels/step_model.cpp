@@ -83,12 +83,24 @@ float phase_of(const GustWave& wave, const glm::dvec3& mean_wind_mps, double tim
   return static_cast<float>(std::remainder(phase_rad, 2.0 * std::numbers::pi));
 }
 
+std::vector<SphereCollider> with_bust(const std::vector<SphereCollider>& colliders, const BustRig& rig,
+                                      const BustTurn& turn) {
+  std::vector<SphereCollider> moved = colliders;
+  if (rig.exists() && turn != BustTurn(0.0))
+    for (SphereCollider& sphere : moved)
+      sphere.center_m = glm::vec3(with_bust(rig, turn, glm::dvec3(sphere.center_m)));
+  return moved;
+}
+
 std::vector<StepInput> substeps_of(const StepScene& scene, const StepTick& tick, const Pose& from,
                                    double end_time_s) {
   const Pose begin = tick.carried_to.value_or(from);
   const auto count = static_cast<double>(scene.substeps);
   std::vector<StepInput> substeps(scene.substeps);
   Pose previous = begin;
+  const BustTurn turn =
+      scene.bust.exists() ? bust_turn(tick.bust, tick.world_from_head.rotation) : BustTurn(0.0);
+  const BustTurn turn_before = tick.bust_before.value_or(turn);
   for (size_t i = 0; i < substeps.size(); ++i) {
     const double blend = static_cast<double>(i + 1) / count;
     const bool is_last = i + 1 == substeps.size();
@@ -102,7 +114,9 @@ std::vector<StepInput> substeps_of(const StepScene& scene, const StepTick& tick,
     substep.groom_gravity_in_head_mps2 = scene.groom_gravity_in_head_mps2;
     substep.wind_mps = tick.wind_mps;
     substep.follicle_limit_rad = scene.follicle_limit_rad;
-    for (const SphereCollider& collider : scene.colliders)
+    substep.bust = {scene.bust, between(turn_before, turn, blend),
+                    between(turn_before, turn, static_cast<double>(i) / count)};
+    for (const SphereCollider& collider : with_bust(scene.colliders, scene.bust, substep.bust.turn))
       substep.colliders.push_back(
           {glm::vec3(pose.rotation * glm::dvec3(collider.center_m)), collider.radius_m});
     if (tick.has_body && tick.body_m.size() == 2 * scene.body.capsules.size())

@@ -77,7 +77,8 @@ struct StepScene {
   double follicle_limit_rad = kFreeFollicleRad;
   float follicle_cosine = -1.0f;  // of that, from whoever made this: libraries differ in them
   float follicle_sine = 0.0f;
-  std::vector<SphereCollider> colliders;  // head space
+  std::vector<SphereCollider> colliders;  // head space, at rest
+  BustRig bust;                           // that the colliders go along with
   glm::dvec3 mean_wind_mps{0.0};          // waves stand still in air that moves with it
   std::vector<GustWave> waves;            // at time 0 with the head at the origin
   /// Of a body; where its capsules are is told by ticks.
@@ -100,6 +101,9 @@ struct StepTick {
   std::vector<glm::dvec3> body_before_m;  // at its beginning; empty: as at its end
   bool has_body = false;
   bool is_body_new = false;
+  /// How the chest is turned at its end; as before it began, unless that is told.
+  BustCode bust = kRigidBust;
+  std::optional<BustTurn> bust_before = {};
 };
 /// Ticks that a trail goes back, at most: what takes longer is no step any more.
 inline constexpr size_t kMostTrailTicks = 8;
@@ -109,6 +113,10 @@ struct StepTrail {
   std::shared_ptr<const StepScene> scene;
   std::vector<StepTick> ticks;  // successive ones, the newest last, no more than kMostTrailTicks
 };
+
+/// Colliders of head space under this bust.
+std::vector<SphereCollider> with_bust(const std::vector<SphereCollider>& colliders, const BustRig& rig,
+                                      const BustTurn& turn);
 
 /// The substeps of a tick that ends at `end_time_s` of simulated time, when the head was at `from` before.
 /// Only + - * / and roots of doubles: the same bits on every machine.

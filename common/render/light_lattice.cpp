@@ -229,7 +229,8 @@ void LightLattice::find_solid(int y, int z, std::vector<float>& share) const {
   // Outside of the head's cells there is none.
   auto first = static_cast<float>(kSolidBorderCells);
   auto last = static_cast<float>(view_.size.x - 1 - kSolidBorderCells);
-  for (int a = 0; a < 3; ++a) {
+  const bool is_bust_turned = desc_.bust.exists() && bust_turn_ != BustTurn(0.0);
+  for (int a = 0; a < 3 && !is_bust_turned; ++a) {
     const float high = static_cast<float>(head.size[a]) - 0.5f;
     if (std::abs(step[a]) < 1e-6f) {
       if (!(from[a] > -0.5f && from[a] < high)) return;
@@ -247,8 +248,17 @@ void LightLattice::find_solid(int y, int z, std::vector<float>& share) const {
   if (!(first <= last)) return;
   const int end = static_cast<int>(std::floor(last)) + 1;
   for (int x = static_cast<int>(std::ceil(first)); x < end;) {
-    const float outside =
-        (distance_at(head, from + static_cast<float>(x) * step) + kSolidInset * view_.soft_m) * per_ramp;
+    glm::vec3 cell = from + static_cast<float>(x) * step;
+    if (is_bust_turned) {
+      const glm::vec3 place_m = head.origin_m + head.cell_m * cell;
+      const glm::dvec3 rest_m = without_bust(desc_.bust, bust_turn_, glm::dvec3(place_m));
+      cell = (glm::vec3(rest_m) - head.origin_m) / head.cell_m;
+    }
+    // Beyond the head's cells the way to them counts.
+    const glm::vec3 beyond =
+        is_bust_turned ? cell - glm::clamp(cell, glm::vec3(0.0f), glm::vec3(head.size - 1)) : glm::vec3(0.0f);
+    const float distance_m = distance_at(head, cell) + head.cell_m * glm::length(beyond);
+    const float outside = (distance_m + kSolidInset * view_.soft_m) * per_ramp;
     const float solid = std::clamp(0.5f - 0.5f * outside, 0.0f, 1.0f);
     const int alike =
         1 + static_cast<int>(std::max(kSure * (std::abs(outside) - 1.0f) * cells_per_ramp, 0.0f));

@@ -12,6 +12,7 @@
 
 #include "common/base/worker_pool.h"
 #include "common/groom/mesh.h"
+#include "common/math/bust.h"
 #include "common/render/head_occupancy.h"
 #include "common/render/look_lights.h"
 
@@ -29,6 +30,7 @@ struct LightLatticeDesc {
   bool has_skull = false;        // a ball under the hair that has to have room
   FittedSphere skull;
   std::shared_ptr<const HeadOccupancy> solid;  // none: nothing but hair casts shadows
+  BustRig bust = {};                           // of the head's mesh, as it is at rest in `solid`
 };
 
 /// Of the strands that are summed.
@@ -89,6 +91,8 @@ class LightLattice {
   /// `frame`: of fit_lattice(), with the same lights.
   void build(const LatticeFrame& frame, const StrandPoints& points, const LightStrands& strands,
              const LightDirections& lights, WorkerPool& workers);
+  /// How neck and chest are turned from the next build() on.
+  void set_bust(const BustTurn& turn) { bust_turn_ = turn; }
   const LightLatticeDesc& desc() const { return desc_; }
   const LightLatticeView& view() const { return view_; }
   uint64_t size_bytes() const;
@@ -103,6 +107,7 @@ class LightLattice {
   void sweep(const glm::vec3& to_light, const std::vector<float>& halved, std::vector<float>& depth) const;
 
   LightLatticeDesc desc_;
+  BustTurn bust_turn_{0.0};
   LightLatticeView view_;
   std::vector<std::vector<int32_t>> sums_;  // one lattice per worker that sums
   std::vector<const int32_t*> summed_;      // those of the last build(), at least one

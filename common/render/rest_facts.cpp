@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/groom/bust_skin.h"
 #include "common/render/passes/expand_pass.h"
 
 namespace strandcast {
@@ -113,7 +114,8 @@ LookDesc drawable(LookDesc look) {
 
 LightLatticeDesc describe_lattice(const SceneAsset& asset, const RestFacts& rest,
                                   const LightVolumeDesc& light_volume, uint32_t cells) {
-  LightLatticeDesc desc{rest.extent_m, cells, light_volume.has_skull, light_volume.skull, nullptr};
+  LightLatticeDesc desc{rest.extent_m,      cells,   light_volume.has_skull,
+                        light_volume.skull, nullptr, find_bust(asset.head)};
   std::optional<FittedSphere> skull;
   if (desc.has_skull) skull = FittedSphere{desc.skull.center_m, desc.skull.radius_m / kSkullShrink};
   desc.solid = std::make_shared<const HeadOccupancy>(make_head_occupancy(asset, skull));

@@ -105,7 +105,8 @@ PosedStrands blend(const PosedStrands& from, const PosedStrands& to, double blen
   if (blend <= 0.0) return from;
   // Without a rest shape a change to fewer strands leaves nothing to blend.
   if (blend >= 1.0 || from.position_m.size() != to.position_m.size()) return to;
-  PosedStrands between{interpolate(from.world_from_head, to.world_from_head, blend), {}};
+  PosedStrands between{interpolate(from.world_from_head, to.world_from_head, blend), {}, {}};
+  between.bust = from.bust + blend * (to.bust - from.bust);
   between.position_m.resize(from.position_m.size());
   if (between.position_m.empty()) return between;
   blend_on_line(set, {coordinates(from), coordinates(to), &between.position_m.data()->x,
@@ -123,6 +124,7 @@ PosedStrands blend(const std::array<const PosedStrands*, 4>& states, const Cubic
   between.world_from_head = interpolate({states[0]->world_from_head, states[1]->world_from_head,
                                          states[2]->world_from_head, states[3]->world_from_head},
                                         terms);
+  between.bust = states[1]->bust + terms.blend * (states[2]->bust - states[1]->bust);
   between.position_m.resize(vertex_count);
   if (vertex_count == 0) return between;
   CubicBlend work;

@@ -6,7 +6,8 @@
 namespace strandcast {
 
 PosedStrands posed_strands_of(const Snapshot& snapshot, StrandFill& fill) {
-  return PosedStrands{snapshot.world_from_head, fill.positions(snapshot)};
+  return PosedStrands{snapshot.world_from_head, fill.positions(snapshot),
+                      bust_turn(snapshot.bust, snapshot.world_from_head.rotation)};
 }
 
 void StateBlend::set_fill(StrandFill fill) {

@@ -117,7 +117,7 @@ class DeltaEncoder : public StrandEncoder {
     chain_.lattice = snapshot.lattice;
     chain_.velocity = std::move(velocity);
     chain_.residual = std::move(residual);
-    return make_encoded_frame(make_header(Opcode::StrandDelta, base_sequence, snapshot.sim_time_ns), payload);
+    return make_encoded_frame(make_header(Opcode::StrandDelta, base_sequence, snapshot), payload);
   }
 
   EncodedFramePtr encode_chain(const Snapshot& snapshot) {
@@ -132,15 +132,16 @@ class DeltaEncoder : public StrandEncoder {
     planes_.append(shape, kKeyframeLevel, payload);
     planes_.append(chain_.velocity, kKeyframeLevel, payload);
     planes_.append(chain_.residual, kKeyframeLevel, payload);
-    return make_encoded_frame(make_header(Opcode::StrandKeyframe, 0, snapshot.sim_time_ns), payload);
+    return make_encoded_frame(make_header(Opcode::StrandKeyframe, 0, snapshot), payload);
   }
 
-  FrameHeader make_header(Opcode opcode, uint32_t base_sequence, int64_t sim_time_ns) const {
+  FrameHeader make_header(Opcode opcode, uint32_t base_sequence, const SnapshotInfo& snapshot) const {
     FrameHeader header;
     header.opcode = opcode;
     header.sequence = sequence_;
     header.base_sequence = base_sequence;
-    header.sim_time_ns = sim_time_ns;
+    header.flags = bust_flags(snapshot);
+    header.sim_time_ns = snapshot.sim_time_ns;
     return header;
   }
 

@@ -39,7 +39,7 @@ inline constexpr uint32_t kMaxMediaPayloadBytes = 64u << 20;
 
 struct FrameHeader {
   Opcode opcode = Opcode::StrandDelta;
-  uint8_t flags = 0;           // reserved, 0
+  uint8_t flags = 0;           // of strands: bits of the bust (strand_payload.h); else reserved, 0
   uint16_t stream_id = 0;      // the strand class; of pictures, their class and kPictureStreamBit
   uint32_t sequence = 0;       // counts per stream, from 1
   uint32_t base_sequence = 0;  // a delta decodes only right after this one; 0 = none needed

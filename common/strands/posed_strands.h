@@ -4,6 +4,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "common/math/bust.h"
 #include "common/math/pose.h"
 
 namespace strandcast {
@@ -12,7 +13,8 @@ namespace strandcast {
 struct PosedStrands {
   Pose world_from_head;
   std::vector<glm::vec3>
-      position_m;  // (vertex_count x strand_count) vertex-major, strand fastest, head space
+      position_m;      // (vertex_count x strand_count) vertex-major, strand fastest, head space
+  BustTurn bust{0.0};  // of neck and chest against the head
 };
 
 }  // namespace strandcast

@@ -17,6 +17,7 @@ class RawEncoder : public StrandEncoder {
     ByteWriter(payload).put_bytes(std::as_bytes(std::span(snapshot.lattice)));
     FrameHeader header;
     header.opcode = Opcode::StrandKeyframe;
+    header.flags = bust_flags(snapshot);
     header.sequence = ++sequence_;
     header.sim_time_ns = snapshot.sim_time_ns;
     return make_encoded_frame(header, payload);

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "common/math/bust.h"
 #include "common/math/pose.h"
 
 namespace strandcast {
@@ -21,6 +22,7 @@ struct SnapshotInfo {
   int64_t sim_time_ns = 0;     // tick x step, from 0
   int64_t motion_time_ns = 0;  // server clock at arrival of the newest motion sample in this state, 0 = none
   Pose world_from_head;
+  BustCode bust = kRigidBust;  // how neck and chest are turned; no part of the state hash
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;  // per strand
   float quantum_m = 0.0f;     // lattice step; error of a vertex <= quantum * sqrt(3) / 2

@@ -30,7 +30,8 @@ void append_fixed_part(const SnapshotInfo& snapshot, uint64_t state_hash, uint8_
   const Pose& pose = snapshot.world_from_head;
   ByteWriter writer(payload);
   writer.put(codec_number);
-  for (int i = 0; i < 3; ++i) writer.put(uint8_t{0});
+  for (int i = 0; i < 3; ++i)
+    writer.put(static_cast<uint8_t>(snapshot.bust >> (8 * i)));  // the rest: bust_flags()
   writer.put(snapshot.quantum_m);
   writer.put(snapshot.strand_count);
   writer.put(snapshot.vertex_count);
@@ -58,7 +59,8 @@ Result<StrandMessage> read_strand_message(std::span<const std::byte> message, ui
   ByteReader reader(message.subspan(kFrameHeaderBytes));
   StrandFixedPart& fixed = result.fixed;
   const auto codec = reader.take<uint8_t>();
-  reader.take_bytes(3);
+  fixed.bust = BustCode{result.header.flags} << 24;
+  for (int i = 0; i < 3; ++i) fixed.bust |= BustCode{reader.take<uint8_t>()} << (8 * i);
   fixed.quantum_m = reader.take<float>();
   fixed.strand_count = reader.take<uint32_t>();
   fixed.vertex_count = reader.take<uint32_t>();
@@ -100,6 +102,7 @@ Snapshot make_snapshot(const StrandMessage& message) {
   snapshot.sim_time_ns = message.header.sim_time_ns;
   snapshot.motion_time_ns = message.fixed.motion_time_ns;
   snapshot.world_from_head = message.fixed.world_from_head;
+  snapshot.bust = message.fixed.bust;
   snapshot.strand_count = message.fixed.strand_count;
   snapshot.vertex_count = message.fixed.vertex_count;
   snapshot.quantum_m = message.fixed.quantum_m;

@@ -18,6 +18,7 @@ struct StrandFixedPart {
   uint64_t tick = 0;
   int64_t motion_time_ns = 0;
   Pose world_from_head;
+  BustCode bust = kRigidBust;
   float quantum_m = 0.0f;
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
@@ -34,6 +35,11 @@ struct StrandMessage {
 /// Appends the fixed part of a snapshot with this hash for the codec with this wire number.
 void append_fixed_part(const SnapshotInfo& snapshot, uint64_t state_hash, uint8_t codec_number,
                        std::vector<std::byte>& payload);
+
+/// The flags of the header in front of it.
+constexpr uint8_t bust_flags(const SnapshotInfo& snapshot) {
+  return static_cast<uint8_t>(snapshot.bust >> 24);
+}
 
 /// Checks header, codec, counts and finite numbers of an untrusted strand message.
 Result<StrandMessage> read_strand_message(std::span<const std::byte> message, uint8_t codec_number,

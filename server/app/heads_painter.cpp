@@ -55,7 +55,8 @@ struct DrawnHead {
 
   void take(const StatePtr& state) {
     if (drawn == state) return;
-    strands = {state->world_from_head, positions_in_head(*state)};
+    strands = {state->world_from_head, positions_in_head(*state),
+               bust_turn(state->bust, state->world_from_head.rotation)};
     drawn = state;
   }
 };

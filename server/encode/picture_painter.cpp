@@ -20,7 +20,8 @@ class DevicePicturePainter : public PicturePainter {
   Result<Image> paint(const std::shared_ptr<const Snapshot>& snapshot, const PictureView& view) override {
     // Several views of one snapshot share its positions.
     if (painted_ != snapshot) {
-      strands_ = {snapshot->world_from_head, positions_in_head(*snapshot)};
+      strands_ = {snapshot->world_from_head, positions_in_head(*snapshot),
+                  bust_turn(snapshot->bust, snapshot->world_from_head.rotation)};
       painted_ = snapshot;
     }
     RETURN_IF_ERROR(renderer_->draw(strands_, view.camera, view.size));

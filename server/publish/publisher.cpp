@@ -104,6 +104,7 @@ std::shared_ptr<const Snapshot> Publisher::quantise(const PublishInput& input) {
   snapshot->sim_time_ns = input.sim_time_ns;
   snapshot->motion_time_ns = input.motion_time_ns;
   snapshot->world_from_head = input.world_from_head;
+  snapshot->bust = input.bust;
   snapshot->strand_count = strand_count_;
   snapshot->vertex_count = vertex_count_;
   snapshot->quantum_m = quantum_m_;

@@ -41,6 +41,7 @@ struct PublishInput {
   int64_t sim_time_ns = 0;
   int64_t motion_time_ns = 0;         // server clock at arrival of the newest motion sample, 0 = none
   Pose world_from_head;               // pose at the end of the step
+  BustCode bust = kRigidBust;         // likewise
   glm::dvec3 head_velocity_mps{0.0};  // of the head joint, world: what a strand at rest moves with
   std::shared_ptr<const StepTrail> trail = {};  // for Snapshot
 };

@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "common/groom/bust_skin.h"
 #include "common/groom/groom_file.h"
 #include "common/groom/head_fit.h"
 #include "common/groom/head_measure.h"
@@ -174,6 +175,7 @@ Result<SceneContent> load_scene_content(const SceneDesc& scene) {
     content.notes.push_back(to_sentence(measure_inside(*field, content.groom), *field));
     content.head_field = std::make_shared<const DistanceField>(std::move(field).value());
   }
+  content.bust = find_bust(head);
   content.colliders = colliders_of(scene, content.head_colliders);
   if (scene.head.is_visible) content.head = std::move(head);
   return content;

@@ -9,6 +9,7 @@
 #include "common/groom/distance_field.h"
 #include "common/groom/groom.h"
 #include "common/groom/mesh.h"
+#include "common/math/bust.h"
 #include "common/scene/scene_desc.h"
 
 namespace strandcast {
@@ -19,6 +20,7 @@ struct SceneContent {
   // Head space: the head as spheres, visible or not; empty where it collides as a field.
   std::vector<SphereCollider> head_colliders;
   std::vector<SphereCollider> colliders;            // head space: the scene's own, or those of the head
+  BustRig bust;                                     // of the head; none without shoulders
   std::vector<std::string> notes;                   // a sentence for each thing that was guessed or fitted
   std::shared_ptr<const Groom> volume_target;       // head space; where the scene names one
   std::shared_ptr<const DistanceField> head_field;  // head space; where the scene asks for one

@@ -110,7 +110,7 @@ void StepBuilder::add_gusts() {
 
 void StepBuilder::add_colliders() {
   for (StepInput& substep : step_.substeps)
-    for (const SphereCollider& collider : colliders_)
+    for (const SphereCollider& collider : with_bust(colliders_, substep.bust.rig, substep.bust.turn))
       substep.colliders.push_back(
           {glm::vec3(substep.world_from_head_rotation * glm::dvec3(collider.center_m)), collider.radius_m});
 }
@@ -217,8 +217,25 @@ void StepBuilder::begin(const InputFrame& input, double end_time_s, double input
     head_position_m_[i] = pose.position_m;
     previous = pose;
   }
+  if (has_jumped) bust_follower_.carry(world_from_head_.rotation, target.rotation, input.joints);
   world_from_head_ = target;
   step_.world_from_head = target;
+  move_bust(input, has_jumped);
+}
+
+/// Neck and chest of the step, before what collides is placed.
+void StepBuilder::move_bust(const InputFrame& input, bool is_carried) {
+  for (StepInput& substep : step_.substeps) substep.bust = {};
+  if (!has_bust()) return;
+  if (!is_carried) bust_follower_.follow(world_from_head_.rotation, input.joints, 1.0 / scene_.step_rate_hz);
+  const BustTurn before = std::exchange(bust_turn_, BustTurn(0.0));
+  bust_ = bust_code(bust_follower_.world_from_chest());
+  bust_turn_ = bust_turn(bust_, world_from_head_.rotation);
+  const BustTurn from = is_carried ? bust_turn_ : before;
+  const auto count = static_cast<double>(step_.substeps.size());
+  for (size_t i = 0; i < step_.substeps.size(); ++i)
+    step_.substeps[i].bust = {bust_rig_, between(from, bust_turn_, static_cast<double>(i + 1) / count),
+                              between(from, bust_turn_, static_cast<double>(i) / count)};
 }
 
 StepScene StepBuilder::step_scene(const SceneFeatures& features) const {
@@ -231,6 +248,7 @@ StepScene StepBuilder::step_scene(const SceneFeatures& features) const {
   scene.follicle_cosine = static_cast<float>(std::cos(scene.follicle_limit_rad));
   scene.follicle_sine = static_cast<float>(std::sin(scene.follicle_limit_rad));
   if (features.has_colliders) scene.colliders = colliders_;
+  if (has_bust()) scene.bust = bust_rig_;
   scene.mean_wind_mps = scene_.wind.mean_mps;
   if (features.has_turbulence) scene.waves = waves_;
   if (features.has_body && !step_.substeps.empty()) {
@@ -246,6 +264,7 @@ StepTick StepBuilder::step_tick(uint64_t tick) const {
   StepTick result;
   result.tick = tick;
   result.world_from_head = world_from_head_;
+  result.bust = bust();
   if (step_.substeps.empty()) return result;
   glm::dvec3 shift_m(0.0);
   for (const StepInput& substep : step_.substeps) shift_m += substep.head_shift_m;

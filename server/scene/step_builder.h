@@ -10,6 +10,7 @@
 #include "common/scene/features.h"
 #include "common/scene/scene_desc.h"
 #include "server/input/input_frame.h"
+#include "server/scene/bust_follower.h"
 #include "server/sim/solver.h"
 
 namespace strandcast {
@@ -37,6 +38,10 @@ class StepBuilder {
   /// Changed scene values; the head stays where it is.
   void change(const SceneDesc& scene, std::vector<SphereCollider> colliders);
 
+  /// The neck that the head's colliders have; without one neck and chest are as the head is. Those that a
+  /// scene lists itself go along with the head alone, and so does the bust then.
+  void set_bust(const BustRig& rig) { bust_rig_ = rig; }
+
   /// The step that ends at `end_time_s` of simulated time: how the head moves, without wind and colliders.
   /// `input_rate`: time of the inputs since the last step per simulated time (InputClock).
   void begin(const InputFrame& input, double end_time_s, double input_rate = 1.0);
@@ -62,12 +67,17 @@ class StepBuilder {
   const std::vector<BodyCapsule>& body_capsules() const { return capsules_; }
 
   const Pose& world_from_head() const { return world_from_head_; }
+  /// Of the chest at the end of the newest step.
+  BustCode bust() const { return has_bust() ? bust_ : kRigidBust; }
   /// Of the head joint during the last substep of the newest step, world.
   glm::dvec3 head_velocity_mps() const;
   /// Gravity that the groom has its shape under, head space.
   const glm::dvec3& groom_gravity_in_head_mps2() const { return groom_gravity_in_head_mps2_; }
 
  private:
+  bool has_bust() const { return bust_rig_.exists() && scene_.colliders.empty(); }
+  void move_bust(const InputFrame& input, bool is_carried);
+
   SceneDesc scene_;
   // The groom is made for an upright head under the gravity that the scene begins with; later changes act on
   // it.
@@ -76,6 +86,10 @@ class StepBuilder {
   std::optional<GustGenerator> gust_generator_;
   std::vector<GustWave> waves_;  // at time 0 with the head at the origin
   Pose world_from_head_;
+  BustRig bust_rig_;
+  BustFollower bust_follower_;
+  BustCode bust_ = kRigidBust;
+  BustTurn bust_turn_{0.0};
   bool has_motion_ = false;
   std::vector<BodyCapsule> capsules_;  // as of the newest step
   std::vector<std::string> missing_joints_;

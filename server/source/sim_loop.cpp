@@ -79,6 +79,7 @@ Status SimLoop::begin() {
   ASSIGN_OR_RETURN(executor_, open_executor(config_.device));
   log_info("sim", "simulating on {}", executor_->info().name);
   builder_.emplace(config_.scene, config_.content->colliders);
+  builder_->set_bust(config_.content->bust);
   detail_.change(config_.scene.detail);
   const StreamDesc& stream = config_.scene.stream;
   ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(stream.codec, stream.bound_m));

@@ -156,6 +156,7 @@ Status SimLoop::reshape(const SceneDesc& scene, const SceneFeatures& features,
 /// What the next solver is loaded with.
 void SimLoop::take_content(std::shared_ptr<const SceneContent> content) {
   config_.content = std::move(content);
+  builder_->set_bust(config_.content->bust);
   solver_.reset();
   is_behind_ = false;
   carried_.reset();

@@ -129,6 +129,7 @@ PublishInput SimLoop::publish_input() const {
   // On demand, inputs have simulated times, which say nothing of delays.
   input.motion_time_ns = config_.is_lockstep ? 0 : input_.motion_time_ns;
   input.world_from_head = builder_->world_from_head();
+  input.bust = builder_->bust();
   return input;
 }
 
@@ -140,6 +141,7 @@ void SimLoop::publish_carried() {
   snapshot->sim_time_ns = input.sim_time_ns;
   snapshot->motion_time_ns = input.motion_time_ns;
   snapshot->world_from_head = input.world_from_head;
+  snapshot->bust = input.bust;
   snapshot->trail = nullptr;
   if (config_.on_publish) config_.on_publish(snapshot);
   sink_.put(std::move(snapshot));

@@ -2,6 +2,7 @@
 // invocation per line of cells. Leaves what lies in each cell where its sum was: strands' optical depth and the share that
 // is head, as halves.
 #include "render/tile_frame.glsl"
+#include "sim/bust.glsl"
 
 layout(local_size_x = 32, local_size_y = 2) in;
 
@@ -19,6 +20,7 @@ uniform float u_solid_reach_m;     // that 1 of it stands for
 uniform int u_solid_border;        // cells along the lattice's sides that are none of it
 uniform vec3 u_solid_origin_m;     // corner of its first cell, head space
 uniform vec3 u_solid_from_m;       // 1 / (cells x cell size); 0: there is no head
+uniform mat4 u_bust;               // turn of the chest; pivot, w = 1: it is turned; share of the rig (sim/bust.glsl)
 
 void main() {
   ivec3 size = u_frame.lattice_size.xyz;
@@ -37,9 +39,16 @@ void main() {
   int cell = line.y * size.x + line.x;
   for (int z = 0; z < size.z; ++z) {
     float here = float(b_sums.cell[cell]) * u_sum_unit;
+    vec3 at_rest = solid;
+    if (u_bust[1].w > 0.0) {
+      vec3 here_m = place + (cell_m * float(z)) * u_frame.lattice_axis[2].xyz;
+      float part = bust_part_at(here_m, u_bust[0], u_bust[1].xyz, u_bust[2]);
+      vec3 rest_m = u_bust[1].xyz + turned_by_part(here_m - u_bust[1].xyz, part, -u_bust[0].xyz, u_bust[0].w);
+      at_rest = (rest_m - u_solid_origin_m) * u_solid_from_m;
+    }
     // Outside of the head's box there is none.
-    bool is_inside = is_line && z >= u_solid_border && z < size.z - u_solid_border && all(greaterThan(solid, vec3(0.0))) && all(lessThan(solid, vec3(1.0)));
-    float outside_m = u_solid_reach_m * textureLod(u_solid, solid, 0.0).r + u_solid_inset_m;
+    bool is_inside = is_line && z >= u_solid_border && z < size.z - u_solid_border && all(greaterThan(at_rest, vec3(0.0))) && all(lessThan(at_rest, vec3(1.0)));
+    float outside_m = u_solid_reach_m * textureLod(u_solid, at_rest, 0.0).r + u_solid_inset_m;
     float share = is_inside ? clamp(0.5 - outside_m * (0.5 / u_solid_ramp_m), 0.0, 1.0) : 0.0;
     b_sums.cell[cell] = int(packHalf2x16(vec2(here, share)));
     most_solid = max(most_solid, share);

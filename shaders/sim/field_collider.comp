@@ -3,9 +3,9 @@
 // length, until it is not; two rounds or more for the end, then one for the middle, and both once more where that
 // one was large. The clearance is half a millimetre, or what the groom itself has there: strands of real grooms
 // begin inside, and nothing pops. Friction holds the end against sliding over the skin. What hangs on it follows
-// the leader to where the model put it. Seen from the head throughout, so the skin moves with it; what a vertex is
-// moved by counts as an impulse, once in its velocity. One invocation per strand; what touches nothing is not
-// written, not by a rounding either.
+// the leader to where the model put it. Seen from the head throughout, so the skin moves with it, and the bust's with
+// the chest (sim/bust.glsl); what a vertex is moved by counts as an impulse, once in its velocity. One invocation per
+// strand; what touches nothing is not written, not by a rounding either.
 #include "sim/carried.glsl"
 #include "sim/turned_segment.glsl"
 
@@ -37,8 +37,8 @@ const float kResidue = 5e-5;
 // An end that the middle's turn moved by more than twice this may have met something else.
 const float kLookAgain = 2e-4;
 
-// xyz = gradient, w = distance: trilinear between nodes.
-vec4 sample_field(vec3 point) {
+// xyz = gradient, w = distance: trilinear between nodes, of the skin at rest.
+vec4 sample_at_rest(vec3 point) {
   const vec3 at = (point - vec3(u_origin_x, u_origin_y, u_origin_z)) * u_cells_per_m;
   const vec3 cell = vec3(floor(clamp(at.x, 0.0, u_last_x)), floor(clamp(at.y, 0.0, u_last_y)),
                          floor(clamp(at.z, 0.0, u_last_z)));
@@ -59,7 +59,22 @@ vec4 sample_field(vec3 point) {
               near + f.y * (far - near));
 }
 
-float clearance_at(vec3 groomed) { return min(kClearance, sample_field(groomed).w - kSlack); }
+// The same of the skin as it is: where the place would be at rest, and the gradient turned back.
+vec4 sample_field(vec3 point) {
+  vec4 found = vec4(0.0);
+  if (u_step.bust[2].w > 0.0) {
+    const vec3 pivot = u_step.bust[2].xyz;
+    const vec4 turn = u_step.bust[0];
+    const float part = bust_part_at(point, turn, pivot, u_step.bust[3]);
+    found = sample_at_rest(pivot + turned_by_part(point - pivot, part, -turn.xyz, turn.w));
+    found = vec4(turned_by_part(found.xyz, part, turn.xyz, turn.w), found.w);
+  } else {
+    found = sample_at_rest(point);
+  }
+  return found;
+}
+
+float clearance_at(vec3 groomed) { return min(kClearance, sample_at_rest(groomed).w - kSlack); }
 
 vec3 normal_of(vec4 found) { return found.xyz * inversesqrt(max(dot(found.xyz, found.xyz), kTinySquared)); }
 
@@ -104,6 +119,7 @@ void main() {
         const float clearance = clearance_at(texelFetch(u_rest, int(at)).xyz);
         vec3 before = texelFetch(u_before, int(at)).xyz;
         before = select(is_broken(before), end, before);
+        if (u_step.bust[2].w > 0.0) before = moved_with_bust(before);
         for (int round = 0; round < kMostRounds; ++round) {
           if (round > 0) found = sample_field(end);
           is_deep = is_deep && found.w < (round < 2 ? clearance : clearance - kResidue);

@@ -88,14 +88,14 @@ Vertex predict_from(uint at, vec3 stored, vec3 stored_velocity) {
   return predicted_from(vertex_from(at, stored, texelFetch(u_position, int(at)).w, stored_velocity));
 }
 
-// Coulomb friction in displacements: sliding over the collider, which turns rigidly with the head, is undone
+// Coulomb friction in displacements: sliding over the collider, which turns with the head or the bust, is undone
 // up to the friction coefficient times the depth that the collider has to push back.
 vec3 held_by_friction(vec3 old, vec3 end, vec4 sphere) {
   const vec3 outward = end - sphere.xyz;
   const float squared = max(dot(outward, outward), kTinySquared);
   const float inverse = inversesqrt(squared);
   const vec3 normal = outward * inverse;
-  const vec3 slip = end - carried_by_head(old);
+  const vec3 slip = end - carried_by_skin(old);
   const vec3 sliding = slip - normal * dot(slip, normal);
   const float most = u_step.contact.x * (sphere.w - squared * inverse);
   return end - sliding * min(1.0, most * inversesqrt(max(dot(sliding, sliding), kTinySquared)));
@@ -123,7 +123,7 @@ vec3 placed(vec3 start, vec3 start_target, Vertex vertex, vec3 anchor, float rea
     vec4 deepest = deepest_collider(end);
     lane_bool is_inside = deepest.w > 0.0;
     if (!is_any(is_inside)) break;
-    deepest = around_groomed(deepest, vertex.groomed);
+    deepest = around_groomed(deepest, groomed_on_bust(vertex.groomed));
     const vec3 outward = end - deepest.xyz;
     is_inside = is_inside && dot(outward, outward) < deepest.w * deepest.w;
 #else

@@ -4,6 +4,7 @@
 #include "shared/limits.h"
 #include "shared/bindings.h"
 #include "lib/select.glsl"
+#include "sim/bust.glsl"
 
 layout(std140, binding = kBindingStep) uniform StepBlock {
   vec4 world_from_head[3];  // columns; w unused
@@ -22,6 +23,7 @@ layout(std140, binding = kBindingStep) uniform StepBlock {
   vec4 gust_amplitude[kMaxGustWaves];  // m/s; w = phase, rad
   vec4 gust_wave[kMaxGustWaves];       // rad/m
   vec4 collider[kMaxSphereColliders];    // centre, m; w = radius (0 = none)
+  vec4 bust[4];             // turn of the chest, and before the substep; pivot, w = 1: it moves; share (sim/bust.glsl); head space
 } u_step;
 
 // Buffer textures: on llvmpipe a texel fetch costs half of a storage-block load or less. They show the
@@ -60,6 +62,35 @@ vec3 in_head(vec3 point) {
 
 vec3 carried_by_head(vec3 point) {
   return u_step.carry[0].xyz * point.x + u_step.carry[1].xyz * point.y + u_step.carry[2].xyz * point.z;
+}
+
+// A place of the skin, in head space, where it was before the substep and is now; chest and neck have their own way.
+vec3 moved_with_bust(vec3 before) {
+  const vec3 pivot = u_step.bust[2].xyz;
+  const vec4 turn = u_step.bust[0];
+  const vec4 turn_before = u_step.bust[1];
+  const float part = bust_part_at(before, turn_before, pivot, u_step.bust[3]);
+  const vec3 rest = turned_by_part(before - pivot, part, -turn_before.xyz, turn_before.w);
+  return pivot + turned_by_part(rest, part, turn.xyz, turn.w);
+}
+
+// What lies on the skin and goes along with it.
+vec3 carried_by_skin(vec3 point) {
+  vec3 carried = carried_by_head(point);
+  if (u_step.bust[2].w > 0.0) carried = turned_with_head(moved_with_bust(in_head(carried)));
+  return carried;
+}
+
+// A groomed place that goes along with the bust, turned with the head.
+vec3 groomed_on_bust(vec3 groomed) {
+  vec3 place = groomed;
+  if (u_step.bust[2].w > 0.0) {
+    const vec3 rest = in_head(groomed);
+    const vec3 pivot = u_step.bust[2].xyz;
+    const vec4 turn = u_step.bust[0];
+    place = turned_with_head(pivot + turned_by_part(rest - pivot, bust_share(rest, u_step.bust[3]), turn.xyz, turn.w));
+  }
+  return place;
 }
 
 // The velocity, no longer than the speed limit.

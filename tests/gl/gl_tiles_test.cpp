@@ -43,8 +43,9 @@ class GlTiles : public GlTest {
     return made ? std::move(*made) : nullptr;
   }
   static Image draw(Renderer& renderer, const SceneAsset& asset, const CameraDesc& camera = {},
-                    RenderSize size = kSize, const DrawTerms& terms = {}) {
-    PosedStrands strands{{}, asset.rest_position_m};
+                    RenderSize size = kSize, const DrawTerms& terms = {},
+                    const BustTurn& bust = BustTurn(0.0)) {
+    PosedStrands strands{{}, asset.rest_position_m, bust};
     strands.world_from_head.rotation = glm::angleAxis(0.3, glm::dvec3(0.0, 1.0, 0.0));
     const Status status = renderer.draw(strands, camera, size, terms);
     EXPECT_TRUE(status) << status.error().to_string();
@@ -81,6 +82,25 @@ TEST_F(GlTiles, DrawThePixelsOfTheProcessor) {
     EXPECT_EQ(gl->profile().drawn_strands, (*processor)->profile().drawn_strands) << name;
     EXPECT_GT(gl->profile().drawn_segments, 0u) << name;
   }
+}
+
+TEST_F(GlTiles, ABustIsTurnedAndShadedAsOnTheProcessor) {
+  const SceneAsset asset = grown_hair();
+  const auto gl = make(asset);
+  auto processor = make_tile_renderer(asset, {}, {own_workers(2), simd::widest_set()});
+  ASSERT_TRUE(gl && processor);
+  CameraDesc camera;
+  camera.offset_m *= 1.6f;
+  const BustTurn turned(0.0, std::sin(glm::radians(25.0)), 0.0);
+  const PictureMask all(size_t{kSize.width} * kSize.height, 1);
+  const Image rest = draw(*gl, asset, camera);
+  const Image seen = draw(*gl, asset, camera, kSize, {}, turned);
+  const Image truth = draw(**processor, asset, camera, kSize, {}, turned);
+  const auto error = picture_error(seen, truth, all), moved = picture_error(rest, truth, all);
+  ASSERT_TRUE(error && moved);
+  EXPECT_GE(error->psnr_db, 50.0);
+  EXPECT_LT(moved->psnr_db, 35.0) << "a bust that stays where it was";
+  EXPECT_TRUE(draw(*gl, asset, camera) == rest) << "nothing is left behind";
 }
 
 TEST_F(GlTiles, TenPicturesAreOne) {

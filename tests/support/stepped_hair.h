@@ -99,6 +99,7 @@ class SteppedHair {
     input.tick = tick_;
     input.sim_time_ns = std::llround(static_cast<double>(tick_) / scene_.step_rate_hz * 1e9);
     input.world_from_head = pose;
+    input.bust = builder_.bust();
     input.strand_count = strand_count();
     input.vertex_count = vertex_count();
     input.quantum_m = lattice_step_m("step", kBoundM).value();
@@ -123,6 +124,10 @@ class SteppedHair {
     EXPECT_TRUE(hand_over(*before, *solver_, content_.groom, rotation));
     log_.set_model(solver_->step_model());
   }
+  /// Neck and chest have a pose of their own from the next step on.
+  void move_bust() { builder_.set_bust(content_.bust); }
+  const SceneContent& content() const { return content_; }
+  const StepBuilder& builder() const { return builder_; }
   /// What a solver without a kernel says.
   void forget_model() { log_.set_model(nullptr); }
   void tell_model() { log_.set_model(solver_->step_model()); }

@@ -47,6 +47,44 @@ TEST(TileRenderer, TenPicturesAreOne) {
   }
 }
 
+TEST(TileRenderer, ABustThatTurnsIsLitAsItWas) {
+  const SceneAsset asset = grown_hair();
+  auto renderer = make_tile_renderer(asset, {}, {own_workers(2), simd::widest_set()});
+  ASSERT_TRUE(renderer);
+  const RenderSize size{160, 160};
+  CameraDesc camera;
+  camera.offset_m = {0.0f, 0.0f, 1.1f};
+  camera.target_m = {0.0f, -0.12f, 0.0f};
+  const auto picture = [&](const BustTurn& turn) {
+    EXPECT_TRUE((*renderer)->draw({{}, asset.rest_position_m, turn}, camera, size));
+    return (*renderer)->read_image();
+  };
+  // Skin is red before all else; of the bust the lower half of the picture shows nothing else.
+  const auto brightness = [&](const Image& image, uint32_t from_y, uint32_t to_y) {
+    double sum = 0.0, count = 0.0;
+    for (uint32_t y = from_y; y < to_y; ++y)
+      for (uint32_t x = 0; x < size.width; ++x) {
+        const uint8_t* const pixel = &image.rgba[4 * (size_t{y} * size.width + x)];
+        if (pixel[0] <= pixel[2] + 20) continue;
+        sum += pixel[0];
+        count += 1.0;
+      }
+    return sum / count;
+  };
+  const Image rest = picture(BustTurn(0.0));
+  const double before = brightness(rest, 100, 160);
+  for (const double turned_deg : {25.0, -25.0, 50.0}) {
+    const Image turned = picture({0.0, std::sin(glm::radians(0.5 * turned_deg)), 0.0});
+    EXPECT_NE(turned.rgba, rest.rgba);
+    EXPECT_TRUE(
+        std::equal(rest.rgba.begin(), rest.rgba.begin() + 4 * size_t{size.width} * 40, turned.rgba.begin()))
+        << "the crown is where it was";
+    // In the shade that shoulders had at rest it would be a half darker.
+    EXPECT_GT(brightness(turned, 100, 160), 0.85 * before) << turned_deg;
+  }
+  EXPECT_EQ(picture(BustTurn(0.0)).rgba, rest.rgba) << "nothing is left behind";
+}
+
 /// Every value of every colour somewhere.
 Image some_picture(RenderSize size) {
   Image image{size.width, size.height, {}};

@@ -87,16 +87,18 @@ export class StrandDecoder {
   motionTimeNs(): number {
     return Number(this.core.view().getBigInt64(this.core.call.strand_core_state(this.decoder) + 16, true));
   }
-  /** Copies of what is drawn: positions of all strands in head space, and how the head is turned. */
-  state(): { positions: Float32Array; rotation: [number, number, number, number] } {
+  /** Copies of what is drawn: positions of all strands in head space, how the head is turned, and the bust against it. */
+  state(): { positions: Float32Array; rotation: [number, number, number, number]; bust: [number, number, number] } {
     const positionsAt = this.core.call.strand_core_all_positions(this.decoder);
     const state = this.core.call.strand_core_state(this.decoder);
     const view = this.core.view();
     const rotation = [48, 56, 64, 72].map((offset) => view.getFloat64(state + offset, true));
+    const bust = [96, 104, 112].map((offset) => view.getFloat64(state + offset, true));
     const floats = this.core.call.strand_core_position_floats(this.decoder);
     return {
       positions: new Float32Array(this.core.call.memory.buffer, positionsAt, floats).slice(),
       rotation: rotation as [number, number, number, number],
+      bust: bust as [number, number, number],
     };
   }
 }

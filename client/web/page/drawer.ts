@@ -190,7 +190,7 @@ class Drawer {
       return this.askNext();
     }
     if (!this.picture) return;
-    this.picture.setState(state.positions, state.rotation);
+    this.picture.setState(state.positions, state.rotation, state.bust);
     this.hasState = true;
     this.moved();
   }

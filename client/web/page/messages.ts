@@ -78,7 +78,7 @@ export type FromNet =
 /** From the connection to the drawing, by their own port; the drawing asks for each with 'next'. */
 export type State =
   | { kind: 'asset'; payload: ArrayBuffer }
-  | { kind: 'strands'; positions: Float32Array; rotation: [number, number, number, number] };
+  | { kind: 'strands'; positions: Float32Array; rotation: [number, number, number, number]; bust: [number, number, number] };
 
 export type ToDraw =
   | { kind: 'start'; canvas: OffscreenCanvas; wish: string; samples: number }

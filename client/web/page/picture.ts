@@ -21,6 +21,7 @@ export interface PictureParts {
   lightNumber: number;
   rgba: number;
   tileCount: number;
+  headNumber: number;
 }
 
 export interface PictureHead {
@@ -31,7 +32,7 @@ export interface PictureHead {
 }
 
 const LOOK_FLOATS = 57;
-const VIEW_FLOATS = 14;
+const VIEW_FLOATS = 17;
 const PARTS = 8; // of a picture that may be left
 
 const rgb = (c?: { r: number; g: number; b: number }): number[] => [c?.r ?? 0, c?.g ?? 0, c?.b ?? 0];
@@ -60,6 +61,7 @@ export class StrandPicture {
   private readonly picture: number;
   private viewAt: number;
   private rotation: readonly number[] = [1, 0, 0, 0];
+  private bust: readonly number[] = [0, 0, 0];
   background: number[] = [0, 0, 0];
 
   constructor(private readonly core: Core, asset: Uint8Array) {
@@ -92,10 +94,11 @@ export class StrandPicture {
       this.core.lend(new TextEncoder().encode(look.hair_color), (name, size) =>
         this.core.call.strand_picture_set_look(this.picture, at, name, size)));
   }
-  setState(positions: Float32Array, rotation: readonly number[]): void {
+  setState(positions: Float32Array, rotation: readonly number[], bust: readonly number[]): void {
     const at = this.core.call.strand_picture_positions(this.picture);
     if (at) this.floats(at, positions.length).set(positions);
     this.rotation = rotation;
+    this.bust = bust;
     this.core.call.strand_picture_changed(this.picture);
   }
   head(): PictureHead {
@@ -109,16 +112,16 @@ export class StrandPicture {
 
   private lookFrom(camera: Camera, size: { width: number; height: number }, share: number): void {
     this.floats(this.viewAt, VIEW_FLOATS).set([
-      size.width, size.height, ...camera.offset, ...camera.target, camera.fov, ...this.rotation, share,
+      size.width, size.height, ...camera.offset, ...camera.target, camera.fov, ...this.rotation, share, ...this.bust,
     ]);
   }
   private parts(at: number): PictureParts {
     if (!at) throw new Error(this.core.error());
-    const n = Array.from(this.uints(at, 21));
+    const n = Array.from(this.uints(at, 22));
     return {
       block: n[0]!, blockBytes: n[1]!, pointCount: n[2]!, points: n[3]!, strands: n[4]!, strandCount: n[5]!,
       strandOf: n[6]!, layoutNumber: n[7]!, cornerCount: n[8]!, corners: n[9]!, keyDepth: n[10]!, otherDepth: n[11]!,
-      latticeSize: [n[12]!, n[13]!, n[14]!], halfSize: [n[15]!, n[16]!, n[17]!], lightNumber: n[18]!, rgba: n[19]!, tileCount: n[20]!,
+      latticeSize: [n[12]!, n[13]!, n[14]!], halfSize: [n[15]!, n[16]!, n[17]!], lightNumber: n[18]!, rgba: n[19]!, tileCount: n[20]!, headNumber: n[21]!,
     };
   }
   /** For a graphics card. */

@@ -2,6 +2,9 @@
 
 #include <epoxy/gl.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "shaders/shared/bindings.h"
 #include "shaders/shared/limits.h"
 #include "shaders/shared/tiles.h"
@@ -54,6 +57,14 @@ Status GpuLattice::prepare(const gl::ShaderLibrary& shaders, const HeadOccupancy
   return {};
 }
 
+void GpuLattice::set_bust(const BustRig& rig, const BustTurn& turn) {
+  bust_ = glm::mat4(0.0f);
+  if (!rig.exists() || turn == BustTurn(0.0)) return;
+  bust_[0] = glm::vec4(glm::dvec4(turn, std::sqrt(std::max(1.0 - glm::dot(turn, turn), 0.0))));
+  bust_[1] = glm::vec4(rig.pivot_m, 1.0f);
+  bust_[2] = rig.share;
+}
+
 uint64_t GpuLattice::size_bytes() const {
   return sums_.size_bytes() + halved_.size_bytes() + swept_.size_bytes() + key_depth_.size_bytes() +
          rim_depth_.size_bytes() + sky_depth_.size_bytes() + solid_.size_bytes();
@@ -92,6 +103,7 @@ void GpuLattice::build(const LatticeFrame& frame, const LightDirections& lights,
   key_.set("u_solid_reach_m", solid_reach_m_);
   key_.set("u_solid_origin_m", solid_origin_m_);
   key_.set("u_solid_from_m", solid_from_m_);
+  key_.set("u_bust", bust_);
   if (solid_from_m_.x > 0.0f) solid_.bind(shader::kUnitTileSolid);
   bind_depth_image(key_depth_);
   dispatch_cells(frame.size.x, frame.size.y, 1);

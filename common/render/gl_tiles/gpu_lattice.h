@@ -14,6 +14,8 @@ class GpuLattice final : public gl::Resource {
  public:
   GpuLattice() : Resource("light lattice") {}
   Status prepare(const gl::ShaderLibrary& shaders, const HeadOccupancy& solid);
+  /// How neck and chest are turned from the next build() on.
+  void set_bust(const BustRig& rig, const BustTurn& turn);
   /// Reads the points and strands that are bound to kUnitTilePoints and kUnitTileStrands.
   void build(const LatticeFrame& frame, const LightDirections& lights, uint32_t strand_count, float width_m);
   /// Depths to the units that shaders/render/tile_light.glsl reads.
@@ -34,6 +36,7 @@ class GpuLattice final : public gl::Resource {
   glm::vec3 solid_origin_m_{0.0f};  // corner of its first cell
   glm::vec3 solid_from_m_{0.0f};
   float solid_reach_m_ = 0.0f;
+  glm::mat4 bust_{0.0f};  // turn; pivot, w = 1: it is turned; share of the rig
   glm::ivec3 size_{0};
 };
 

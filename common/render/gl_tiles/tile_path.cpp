@@ -155,8 +155,9 @@ class TileLightPass final : public RenderPass {
   Status prepare(const RenderSetup& setup) override {
     return lattice_.prepare(setup.shaders, *frame_.lattice_desc.solid);
   }
-  Status run(RenderTurn&) override {
+  Status run(RenderTurn& turn) override {
     points_.bind();
+    lattice_.set_bust(frame_.lattice_desc.bust, turn.strands.bust);
     lattice_.build(frame_.lattice, frame_.lights, frame_.detail.strand_count, frame_.block.strand.x);
     return {};
   }
@@ -254,6 +255,7 @@ class TileHeadPass final : public RenderPass {
     scene_.scene.begin();
     program_.use();
     program_.set("u_clip_from_head", turn.view.clip_from_head);
+    mesh_.pose(turn.strands.bust);
     mesh_.draw();
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     return {};

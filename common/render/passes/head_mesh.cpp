@@ -18,7 +18,9 @@ void attach(const gl::VertexArray& array, uint32_t slot, const gl::Buffer& value
 }  // namespace
 
 HeadMesh::HeadMesh(const SceneAsset& asset, const RenderScene& scene)
-    : vertex_array_("head"),
+    : mesh_(asset.head),
+      skin_(mesh_),
+      vertex_array_("head"),
       position_(gl::Buffer::of("head position", asset.head.position_m)),
       normal_(gl::Buffer::of("head normal", asset.head.normal)),
       cover_(gl::Buffer::of("head cover", scalp_cover(asset, scene.rest.extent_m * kCoverReach))),
@@ -28,6 +30,12 @@ HeadMesh::HeadMesh(const SceneAsset& asset, const RenderScene& scene)
   attach(vertex_array_, 1, normal_, 3);
   attach(vertex_array_, 2, cover_, 1);
   glVertexArrayElementBuffer(vertex_array_.name(), index_.name());
+}
+
+void HeadMesh::pose(const BustTurn& turn) {
+  if (!skin_.pose(turn, mesh_)) return;
+  position_.write(mesh_.position_m);
+  normal_.write(mesh_.normal);
 }
 
 void HeadMesh::draw() const {

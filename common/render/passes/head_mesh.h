@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "common/gl/objects.h"
+#include "common/groom/bust_skin.h"
 #include "common/render/render_scene.h"
 #include "common/strands/scene_asset.h"
 
@@ -14,12 +15,16 @@ class HeadMesh {
  public:
   HeadMesh() = default;
   HeadMesh(const SceneAsset& asset, const RenderScene& scene);
+  /// Neck and chest are turned so from the next draw() on.
+  void pose(const BustTurn& turn);
   /// With the program that is in use, which has the vertex stage render/head.vert.
   void draw() const;
   /// What one of this scene takes.
   static uint64_t size_bytes(const RenderScene& scene);
 
  private:
+  Mesh mesh_;
+  BustSkin skin_;
   gl::VertexArray vertex_array_;
   gl::Buffer position_;
   gl::Buffer normal_;

@@ -42,6 +42,7 @@ class HeadPass final : public RenderPass {
     program_.set("u_skin_color", scene_.look.skin_color);
     program_.set("u_root_color", colors_of(scene_.look).root);
     program_.set("u_shadow_lift_m", kShadowLiftCells * scene_.light_volume.cell_m);
+    mesh_.pose(turn.strands.bust);
     mesh_.draw();
     return {};
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/groom/bust_skin.h"
 #include "common/render/light_lattice.h"
 #include "common/render/render_scene.h"
 #include "common/render/scalp_cover.h"
@@ -50,6 +51,7 @@ struct TileState {
         expansion(asset, facts.rest.mean_length_m),
         lattice(describe_lattice(asset, facts, options.light_cells)),
         mesh(asset.head),
+        skin(asset.head),
         cover(scalp_cover(asset, facts.rest.extent_m * kCoverReach)),
         scratch(workers.size()),
         srgb(make_srgb_table()) {
@@ -70,6 +72,7 @@ struct TileState {
   StrandPoints points;
   LightLattice lattice;
   Mesh mesh;
+  BustSkin skin;
   std::vector<float> cover;
   HeadPicture head;
   TileBins bins;
@@ -116,6 +119,7 @@ Status light(TileState& state, RenderTurn& turn) {
   const StyleNumbers style = style_numbers(state.look, state.detail_facts.mean_length_m);
   const LatticeFrame frame =
       fit_lattice(state.lattice.desc(), state.shade.lights, turn.strands.position_m, style_room_m(style));
+  state.lattice.set_bust(turn.strands.bust);
   state.lattice.build(frame, state.points, {state.shade.width_m, state.shade.tip_scale, state.shade.tip_fade},
                       state.shade.lights, state.workers);
   return {};
@@ -137,6 +141,7 @@ Status bin(TileState& state, RenderTurn& turn) {
   turn.left_out_strands += state.counts.left_out;
   turn.unusable_segments = state.counts.not_finite;
   if (state.head.mesh != nullptr) {
+    state.skin.pose(turn.strands.bust, state.mesh);
     state.head.shadow_lift_m = kShadowLift * state.lattice.view().soft_m;
     place_head(turn.view, state.workers, state.head);
   }

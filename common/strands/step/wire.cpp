@@ -24,6 +24,8 @@ constexpr uint8_t kVolume = 0x80;  // beside a kernel's number
 constexpr uint8_t kPasses = 0x40;
 constexpr uint8_t kBend = 1, kDrag = 2, kMeetsBody = 4, kField = 8;  // of the passes
 constexpr uint8_t kSceneBody = 0x80;                                 // beside the substeps
+constexpr uint8_t kSceneBust = 0x80;                                 // beside the count of colliders
+constexpr double kMostBustShare = 1e4;
 constexpr double kMostCellM = 1.0;
 constexpr double kBodyStepM = 1.0 / 65536.0;
 constexpr auto kMostBodySteps = static_cast<int32_t>(kMaxColliderM / kBodyStepM);
@@ -44,7 +46,8 @@ constexpr uint8_t kCarried = 2;
 constexpr uint8_t kCarriedElsewhere = 4;  // not to where the tick ends
 constexpr uint8_t kTickBody = 8;
 constexpr uint8_t kTickNewBody = 16;
-constexpr uint8_t kTickFlags = kWaves | kCarried | kCarriedElsewhere | kTickBody | kTickNewBody;
+constexpr uint8_t kTickBust = 32;
+constexpr uint8_t kTickFlags = kWaves | kCarried | kCarriedElsewhere | kTickBody | kTickNewBody | kTickBust;
 
 void put_varint(uint32_t value, std::vector<std::byte>& bytes) {
   for (; value >= 0x80; value >>= 7) bytes.push_back(static_cast<std::byte>(value | 0x80u));
@@ -526,10 +529,15 @@ void write_scene(const StepScene& scene, std::vector<std::byte>& bytes) {
   to.put(scene.follicle_limit_rad);
   to.put(scene.follicle_cosine);
   to.put(scene.follicle_sine);
-  to.put(static_cast<uint8_t>(scene.colliders.size()));
+  to.put(static_cast<uint8_t>(scene.colliders.size() | (scene.bust.exists() ? kSceneBust : 0)));
   for (const SphereCollider& sphere : scene.colliders) {
     put_vector(sphere.center_m, to);
     to.put(sphere.radius_m);
+  }
+  if (scene.bust.exists()) {
+    put_vector(scene.bust.pivot_m, to);
+    put_vector(scene.bust.share, to);
+    to.put(scene.bust.share.w);
   }
   put_vector(scene.mean_wind_mps, to);
   to.put(static_cast<uint8_t>(scene.waves.size()));
@@ -555,13 +563,19 @@ Result<StepScene> read_scene(ByteReader& bytes) {
   scene.follicle_limit_rad = from.take<double>(kFreeFollicleRad);
   scene.follicle_cosine = from.take<float>(1.0);
   scene.follicle_sine = from.take<float>(1.0);
-  const auto collider_count = bytes.take<uint8_t>();
+  const auto colliders = bytes.take<uint8_t>();
+  const auto collider_count = static_cast<uint8_t>(colliders & ~kSceneBust);
   if (collider_count > kMaxSphereColliders)
     return make_error(ErrorCode::LimitExceeded, "a step has {} colliders, most are {}", collider_count,
                       kMaxSphereColliders);
   for (size_t i = 0; i < collider_count; ++i) {
     const auto center_m = from.vector<float, glm::vec3>(kMaxColliderM);
     scene.colliders.push_back({center_m, from.take<float>(kMaxColliderM)});
+  }
+  if ((colliders & kSceneBust) != 0) {
+    scene.bust.pivot_m = from.vector<float, glm::vec3>(kMaxColliderM);
+    const auto share = from.vector<float, glm::vec3>(kMostBustShare);
+    scene.bust.share = glm::vec4(share, from.take<float>(kMostBustShare));
   }
   scene.mean_wind_mps = from.vector<double, glm::dvec3>(kMaxWindMps);
   const auto wave_count = bytes.take<uint8_t>();
@@ -608,6 +622,7 @@ void write_ticks(std::span<const StepTick> ticks, const StepScene& scene, TickBa
     if (tick.carried_to && *tick.carried_to != tick.world_from_head) flags |= kCarriedElsewhere;
     if (tells_body(tick, scene)) flags |= kTickBody;
     if (tick.is_body_new) flags |= kTickNewBody;
+    if (scene.bust.exists() && tick.bust != kRigidBust) flags |= kTickBust;
     to.put(flags);
     const WindSteps now = wind_steps(tick.wind_mps);
     put_beside(now, base.wind);
@@ -622,6 +637,7 @@ void write_ticks(std::span<const StepTick> ticks, const StepScene& scene, TickBa
     } else {
       base.body.clear();
     }
+    if ((flags & kTickBust) != 0) to.put(tick.bust);
     if (&tick != &ticks.back()) put_near(tick.world_from_head, last, to);
     if ((flags & kCarriedElsewhere) != 0) put_near(*tick.carried_to, last, to);
   }
@@ -660,11 +676,15 @@ Result<std::vector<StepTick>> read_ticks(ByteReader& bytes, const FrameTick& las
     } else {
       base.body.clear();
     }
+    if ((flags & kTickBust) != 0) tick.bust = bytes.take<BustCode>();
     tick.world_from_head = i + 1 < count ? take_near(last.world_from_head, from) : last.world_from_head;
     if ((flags & kCarriedElsewhere) != 0)
       tick.carried_to = take_near(last.world_from_head, from);
     else if ((flags & kCarried) != 0)
       tick.carried_to = tick.world_from_head;
+    // What was carried along takes its bust with it.
+    if (!tick.carried_to) tick.bust_before = base.bust;
+    base.bust = bust_turn(tick.bust, tick.world_from_head.rotation);
   }
   RETURN_IF_ERROR(from.status("a tick"));
   return ticks;

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -44,6 +45,7 @@ using PointSteps = std::array<int32_t, 3>;
 struct TickBase {
   WindSteps wind{};
   std::vector<PointSteps> body;  // empty: not known
+  std::optional<BustTurn> bust = {};
 };
 
 /// Ticks up to a frame, under this scene; `base` becomes that of the last one, whose pose is the frame's.

@@ -310,10 +310,10 @@ class Encoder final : public StrandEncoder {
     return make_frame(header, state, body);
   }
 
-  EncodedFramePtr make_frame(const FrameHeader& header, const State& state,
-                             std::span<const std::byte> body) const {
+  EncodedFramePtr make_frame(FrameHeader header, const State& state, std::span<const std::byte> body) const {
     std::vector<std::byte> payload;
     payload.reserve(kStrandFixedBytes + body.size());
+    header.flags = bust_flags(state.info);
     append_fixed_part(state.info, state.hash, number_, payload);
     ByteWriter(payload).put_bytes(body);
     return make_encoded_frame(header, payload);

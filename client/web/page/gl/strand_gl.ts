@@ -54,6 +54,8 @@ export class StrandGl {
   private readonly strandTexture: WebGLTexture;
   private layoutNumber = -1;
   private lightNumber = -1;
+  private headNumber = -1;
+  private skin: WebGLBuffer[] = []; // positions and normals of the head
   private target?: { width: number; height: number; head: WebGLFramebuffer; scene: WebGLFramebuffer; texture: WebGLTexture; free: () => void };
 
   /** Throws where this browser's WebGL2 cannot. `samples`: of a pixel, for the head's edges. */
@@ -103,7 +105,9 @@ export class StrandGl {
     const head = picture.head();
     gl.bindVertexArray(this.headArray);
     const attribute = (place: number, size: number, data: Float32Array): void => {
-      gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+      const buffer = gl.createBuffer()!;
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+      this.skin[place] = buffer;
       gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
       gl.enableVertexAttribArray(place);
       gl.vertexAttribPointer(place, size, gl.FLOAT, false, 0, 0);
@@ -115,7 +119,7 @@ export class StrandGl {
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, head.triangles, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
     this.headIndices = head.triangles.length;
-    this.layoutNumber = this.lightNumber = -1;
+    this.layoutNumber = this.lightNumber = this.headNumber = -1;
   }
 
   private resize(width: number, height: number): void {
@@ -160,6 +164,14 @@ export class StrandGl {
     gl.bindBuffer(gl.UNIFORM_BUFFER, this.frame);
     gl.bufferData(gl.UNIFORM_BUFFER, picture.bytes(parts.block, parts.blockBytes), gl.DYNAMIC_DRAW);
     gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, this.frame);
+    if (this.headNumber !== parts.headNumber && this.headIndices) {
+      this.headNumber = parts.headNumber;
+      const head = picture.head();
+      for (const [place, data] of [head.positions, head.normals].entries()) {
+        gl.bindBuffer(gl.ARRAY_BUFFER, this.skin[place]!);
+        gl.bufferSubData(gl.ARRAY_BUFFER, 0, data);
+      }
+    }
     // Element arrays are part of the array that is bound.
     gl.bindVertexArray(this.strandsArray);
     this.order.fill(picture.uints(parts.corners, parts.cornerCount));
