@@ -24,7 +24,7 @@ constexpr DeviceLimitRow kTable[] = {
     {DeviceLimit::StorageBlockBytes, "bytes in a storage block", GL_MAX_SHADER_STORAGE_BLOCK_SIZE, false,
      128 * kMiB, 0, kByScene},
     {DeviceLimit::UniformBlockBytes, "bytes in a uniform block", GL_MAX_UNIFORM_BLOCK_SIZE, false, 16'384,
-     784, "sim/step.glsl"},
+     848, "sim/step.glsl"},
     {DeviceLimit::BufferTexels, "texels in a buffer texture", GL_MAX_TEXTURE_BUFFER_SIZE, false, 65'536, 0,
      kByScene},
     {DeviceLimit::ComputeTextureUnits, "textures in the compute stage", GL_MAX_COMPUTE_TEXTURE_IMAGE_UNITS,

@@ -63,7 +63,8 @@ const std::array kHead = {
     capsule(Blend::Add, 0.14f, {0.050f, -0.955f, 0.920f}, 0.055f, {0.20f, -0.915f, 0.850f},
             0.025f),  // lower lip
     capsule(Blend::Cut, 0.10f, {0.00f, -0.892f, 1.020f}, 0.018f, {0.20f, -0.896f, 0.955f}, 0.008f),  // mouth
-    ellipsoid(Blend::Add, 0.05f, {0.970f, -0.24f, 0.00f}, {0.075f, 0.27f, 0.155f}),                  // ear
+    ellipsoid(Blend::Cut, 0.12f, {0.00f, -1.07f, 0.97f}, {0.15f, 0.04f, 0.07f}),      // below the lips
+    ellipsoid(Blend::Add, 0.05f, {0.970f, -0.24f, 0.00f}, {0.075f, 0.27f, 0.155f}),   // ear
     ellipsoid(Blend::Cut, 0.05f, {1.060f, -0.21f, 0.02f}, {0.050f, 0.18f, 0.090f}),   // its shell
     ellipsoid(Blend::Add, 0.04f, {0.985f, -0.30f, 0.115f}, {0.045f, 0.06f, 0.045f}),  // its flap
 };

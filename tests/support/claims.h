@@ -67,14 +67,14 @@ inline constexpr double kTimesFewerThanPlain = 5.7;
 
 inline constexpr uint32_t kStepStrands = 2'000;
 /// Bits per vertex of the built-in head motions with hair of full quality: idle, turning, violent.
-inline constexpr double kFullStepBits[] = {0.23, 0.18, 0.3};
+inline constexpr double kFullStepBits[] = {0.23, 0.18, 0.31};
 inline constexpr double kFullTangentBits[] = {1.2, 2.3, 6.0};
 /// Bits per vertex of the built-in head motions.
-inline constexpr double kStepIdleBits = 0.15;
+inline constexpr double kStepIdleBits = 0.18;
 inline constexpr double kStepActiveBits = 0.17;
-inline constexpr double kStepViolentBits = 0.34;
+inline constexpr double kStepViolentBits = 0.36;
 /// Of the median half second of the walk kStreamClip.
 inline constexpr double kStepClipBits = 0.29;
-inline constexpr double kStepTimesFewerThanTemporal = 32.0;
+inline constexpr double kStepTimesFewerThanTemporal = 35.0;
 
 }  // namespace strandcast::claims

@@ -160,7 +160,9 @@ const all = {
     const second = await browser.open(`${server.url}#mode=strands`);
     await second.until((now) => now.states > 3, 'states in the second tab');
     await first.until((now) => now.isConnected, 'the first one stays');
-    assert.doesNotMatch(server.log.slice(begin), /refused/);
+    // A browser opens connections ahead and asks nothing on some: those end after 5 s.
+    const refused = server.log.slice(begin).split('\n').filter((line) => /refused/.test(line) && !/no request answered/.test(line));
+    assert.deepEqual(refused, []);
     await first.close();
     await second.close();
   },
