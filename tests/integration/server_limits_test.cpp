@@ -1,5 +1,5 @@
-// Limits of the server on sockets, at the limit and one over. SECURITY.md and docs/internals/limits.md list which test is for which
-// limit.
+// Limits of the server on sockets, at the limit and one over. SECURITY.md and docs/internals/limits.md list
+// which test is for which limit.
 #include "tests/support/proxy_header.h"
 #include "tests/support/server_net_fixture.h"
 

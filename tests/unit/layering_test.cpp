@@ -77,7 +77,8 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"server", with({"server/app", "server/net", "server/record", "server/relay", "common/client"}, kAll)},
       {"client/net", with({"common/client", "common/net"}, kWire)},
       // No protobuf, no network, no OpenGL: the page has its own.
-      {"client/web", with({"common/groom", "common/replay", "common/simd", "common/render", "common/scene"}, kStrands)},
+      {"client/web",
+       with({"common/groom", "common/replay", "common/simd", "common/render", "common/scene"}, kStrands)},
       {"client/window", kAll},
       {"client/export", with({"common/replay", "common/log"}, kStrands)},
       {"client/app", with({"client/net", "client/window", "client/export", "common/chaos", "common/client",
