@@ -14,7 +14,7 @@ namespace strandcast::recorded_playout_test {
 namespace {
 
 constexpr StreamSize kSize = {200, 16};
-constexpr double kSeconds = 1.0;
+constexpr double kSeconds = 2.0;
 constexpr float kQuantumM = 1e-6f;  // what is lost by rounding is no part of this
 
 /// Root mean squares, of the line and of the cubic.
