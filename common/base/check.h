@@ -3,7 +3,7 @@
 
 namespace strandcast {
 
-/// Prints the failed condition with its place and aborts.
+/// Prints the failed condition with its file and line, then aborts the process.
 [[noreturn]] void check_failed(const char* condition, const char* file, int line);
 
 }  // namespace strandcast

@@ -12,13 +12,14 @@
 
 namespace strandcast {
 
-/// Reads a regular file of at most `limit_bytes`. NotFound, LimitExceeded or BadInput name the file.
+/// Reads a regular file of at most `limit_bytes`. The errors NotFound, LimitExceeded and BadInput name the
+/// file.
 Result<std::vector<std::byte>> load_file(const std::filesystem::path& path, uint64_t limit_bytes);
 
-/// As load_file, as text (no encoding is assumed).
+/// Reads a file like load_file() and returns it as text; no encoding is assumed.
 Result<std::string> load_text(const std::filesystem::path& path, uint64_t limit_bytes);
 
-/// Writes the file through a temporary beside it, so that a reader never sees half of it.
+/// Writes a temporary file beside the target and renames it, so that a reader never sees half a file.
 Status save_file(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
 }  // namespace strandcast

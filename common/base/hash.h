@@ -1,5 +1,5 @@
-// Integer hashes: hash_bytes for state hashes on the wire, mix_u32 for per-strand randomness. The same
-// mix_u32 is written in shaders/lib/hash.glsl; a test compares the two.
+// Integer hashes: hash_bytes for state hashes on the wire, mix_u32 for per-strand randomness.
+// shaders/lib/hash.glsl implements mix_u32 too; a test compares the two.
 #pragma once
 
 #include <cstddef>
@@ -8,17 +8,17 @@
 
 namespace strandcast {
 
-/// 64-bit FNV-1a over 8-byte words (then the tail byte by byte); `seed` chains several buffers. Not for
-/// security.
+/// Computes 64-bit FNV-1a over 8-byte words (then the tail byte by byte); `seed` chains several buffers. Not
+/// for security.
 uint64_t hash_bytes(std::span<const std::byte> bytes, uint64_t seed = 0xcbf29ce484222325ull);
 
-/// What hash_bytes does with one word.
+/// One round of hash_bytes(): mixes an 8-byte word into the hash.
 constexpr uint64_t hash_word(uint64_t word, uint64_t hash) {
   hash = (hash ^ word) * 0x100000001b3ull;
   return hash ^ (hash >> 32);  // FNV over words alone leaves the low bits of high bytes unmixed
 }
 
-/// Well-mixed 32-bit hash of one integer (the lowbias32 finaliser by Chris Wellons, public domain).
+/// Mixes one integer into a 32-bit hash (the lowbias32 finaliser by Chris Wellons, public domain).
 constexpr uint32_t mix_u32(uint32_t x) {
   x ^= x >> 16;
   x *= 0x7feb352du;
@@ -28,7 +28,7 @@ constexpr uint32_t mix_u32(uint32_t x) {
   return x;
 }
 
-/// Uniform number in [0, 1) from a hash, exact in float (24 bits).
+/// Converts a hash to a uniform number in [0, 1), exact in float (24 bits).
 constexpr float unit_float(uint32_t hash) {
   return static_cast<float>(hash >> 8) * (1.0f / 16777216.0f);
 }

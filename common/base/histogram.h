@@ -1,5 +1,4 @@
-// Histogram: how many durations were how long, since start. A value; not thread-safe, copied out by its
-// owner.
+// Histogram: counts durations by length since start. A value; not thread-safe, copied out by its owner.
 #pragma once
 
 #include <algorithm>
@@ -11,16 +10,16 @@ namespace strandcast {
 
 class Histogram {
  public:
-  /// Upper ends of the buckets, each included; one more bucket has what is longer.
+  /// Upper ends of the buckets in milliseconds, inclusive. One further bucket counts longer durations.
   static constexpr std::array<double, 12> kBoundsMs = {0.5, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1'024};
 
-  /// A duration in milliseconds, finite.
+  /// Counts one duration in milliseconds; it must be finite.
   void add_ms(double value_ms) {
     const auto bucket = std::lower_bound(kBoundsMs.begin(), kBoundsMs.end(), value_ms);
     ++counts_[static_cast<size_t>(bucket - kBoundsMs.begin())];
     sum_ms_ += value_ms;
   }
-  /// Of the bucket alone; index kBoundsMs.size() is the last one.
+  /// Number of durations in this bucket alone (not cumulative); index kBoundsMs.size() is the last bucket.
   uint64_t count(size_t bucket) const { return counts_[bucket]; }
   double sum_ms() const { return sum_ms_; }
 

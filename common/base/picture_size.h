@@ -1,5 +1,5 @@
-// The size of a rendered picture in pixels: what may be asked for, drawn, sent and decoded. Here and nowhere
-// else.
+// The size of a rendered picture in pixels and its limits. Requests, drawing, encoding and decoding all use
+// these.
 #pragma once
 
 #include <cstdint>

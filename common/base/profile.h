@@ -1,5 +1,5 @@
-// Stage timing: StageTimer keeps the last kStageWindow durations of one stage and gives median and p99.
-// Not thread-safe; one per owner thread, values are copied out.
+// StageTimer keeps the last kStageWindow durations of one stage and returns their median and p99. Not
+// thread-safe: each timer belongs to one thread, which copies values out.
 #pragma once
 
 #include <chrono>
@@ -10,7 +10,7 @@ namespace strandcast {
 
 inline constexpr int kStageWindow = 512;
 
-/// Monotonic clock in nanoseconds (CLOCK_MONOTONIC), comparable between processes of one machine.
+/// Returns the monotonic clock in nanoseconds (CLOCK_MONOTONIC), comparable between processes of one machine.
 inline int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
              std::chrono::steady_clock::now().time_since_epoch())
@@ -22,7 +22,7 @@ class StageTimer {
   /// Adds one duration in milliseconds.
   void add_ms(double value_ms);
   uint64_t count() const { return count_; }
-  /// Quantile (0..1) over the window, in milliseconds; 0 when empty.
+  /// Returns the quantile (0..1) over the window in milliseconds; 0 if it is empty.
   double quantile_ms(double quantile) const;
   double median_ms() const { return quantile_ms(0.5); }
 

@@ -1,4 +1,4 @@
-// quantile: one value out of many by its rank.
+// quantile: picks one value out of many by its rank.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,8 @@
 
 namespace strandcast {
 
-/// The value of the nearest rank; `share` 0..1, 0.5 = median. 0 without values. Takes O(values).
+/// Returns the value of nearest rank; `share` is 0 (least) to 1 (greatest), 0.5 the median. Returns 0 for no
+/// values. Linear time.
 template <class T>
 T quantile(std::vector<T> values, double share) {
   if (values.empty()) return T{};

@@ -21,7 +21,7 @@ enum class ErrorCode {
   Internal,  // ours: please report
 };
 
-/// Name of an error code as printed, for example "bad input".
+/// Returns the printed name of an error code, for example "bad input".
 const char* to_string(ErrorCode code);
 
 struct Error {
@@ -38,7 +38,7 @@ struct Error {
   Error& operator=(Error&&) noexcept;
   ~Error();
 
-  /// "place: message", or the message alone when there is no place.
+  /// Formats the error as "place: message", or as the message alone if there is no place.
   std::string to_string() const;
 };
 
@@ -48,7 +48,7 @@ Error make_error(ErrorCode code, fmt::format_string<Args...> format, Args&&... a
   return Error{code, fmt::format(format, std::forward<Args>(args)...), {}};
 }
 
-/// The same error with `place` put in front of the place it already names.
+/// Returns the error with `place` put in front of the place that it already names.
 Error at(std::string place, Error error);
 
 template <class T>
@@ -94,13 +94,14 @@ using Status = Result<void>;
 #define STRANDCAST_CONCAT_(a, b) a##b
 #define STRANDCAST_CONCAT(a, b) STRANDCAST_CONCAT_(a, b)
 
-/// Returns the error of `expression` from the enclosing function, if it has one.
+/// Returns from the enclosing function with the error of `expression`, if it has one.
 #define RETURN_IF_ERROR(expression)                                                               \
   do {                                                                                            \
     if (auto return_if_error_ = (expression); !return_if_error_) return return_if_error_.error(); \
   } while (false)
 
-/// Declares `declaration` from the value of `expression`, or returns its error.
+/// Initialises `declaration` with the value of `expression`, or returns its error from the enclosing
+/// function.
 #define ASSIGN_OR_RETURN(declaration, expression) \
   ASSIGN_OR_RETURN_(STRANDCAST_CONCAT(assign_or_return_, __LINE__), declaration, expression)
 #define ASSIGN_OR_RETURN_(temporary, declaration, expression) \

@@ -1,4 +1,4 @@
-// Text from outside, made fit for messages, logs and terminals. Text is UTF-8. Pure functions, any thread.
+// Checks and cleans untrusted UTF-8 text for messages, logs and terminals. Pure functions, any thread.
 #pragma once
 
 #include <cstddef>
@@ -7,24 +7,24 @@
 
 namespace strandcast {
 
-/// Bytes of the UTF-8 character that begins at `index`, 0 when none does: overlong forms, surrogates and
-/// numbers beyond Unicode are none. `index` is below text.size().
+/// Number of bytes of the UTF-8 character that begins at `index` (below text.size()). Returns 0 if none
+/// begins there: overlong forms, surrogates and code points beyond Unicode are invalid.
 size_t utf8_length(std::string_view text, size_t index);
 
-/// UTF-8 without control characters (C0 and DEL): what texts on the wire and in scenes have to be.
+/// Returns true for valid UTF-8 without control characters (C0 and DEL). Texts on the wire and in scenes must
+/// be printable.
 bool is_printable(std::string_view text);
 
-/// Makes such text, of at most `limit` characters: control characters become spaces, what is no UTF-8 '?'.
+/// Makes printable text of at most `limit` characters: control characters become spaces, invalid bytes '?'.
 std::string printable(std::string_view text, size_t limit);
 
-/// For a line of a log or terminal: as printable(), with '?' also for characters that steer a terminal, break
-/// the line, or reorder or hide what stands beside them (C1 controls, separators of lines, format
-/// characters).
+/// Makes text safe for a line of a log or terminal. Cleans it like printable(), and also replaces C1
+/// controls, line separators and format characters (which reorder or hide text) with '?'.
 std::string one_line(std::string_view text, size_t limit);
-/// Likewise, with "..." behind it when there is more: what an error quotes.
+/// Cleans text like one_line() and appends "..." if it was cut; errors quote input in this form.
 std::string excerpt(std::string_view text, size_t limit);
 
-/// Without the blanks and tabs around it.
+/// Returns the text without leading and trailing blanks and tabs.
 std::string_view trimmed(std::string_view text);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// Names of threads, as top -H, gdb and tests/bench/idle.sh show them.
+// Sets thread names, which top -H, gdb and tests/bench/idle.sh show.
 #pragma once
 
 #ifdef __linux__
@@ -7,7 +7,7 @@
 
 namespace strandcast {
 
-/// Of the calling thread; at most 15 characters.
+/// Names the calling thread; at most 15 characters.
 inline void name_thread([[maybe_unused]] const char* name) {
 #ifdef __linux__
   pthread_setname_np(pthread_self(), name);

@@ -1,10 +1,9 @@
-// Version of this build: what programs print for --version and what a server tells in its Welcome. Any
-// thread.
+// Version of this build, as programs print it for --version and the server sends it in Welcome. Any thread.
 #pragma once
 
 namespace strandcast {
 
-/// That of project() in CMakeLists.txt, for example "0.2.0".
+/// Returns the version that project() in CMakeLists.txt states, for example "0.2.0".
 const char* version();
 
 }  // namespace strandcast

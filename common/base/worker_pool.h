@@ -1,6 +1,6 @@
-// WorkerPool: threads that share the work of whoever asks, the most urgent first. shared_workers() is the
-// pool of the process: simulation, strand codecs, drawing and loading all take from it, so they never run on
-// more threads than there are processors beside their own. Any number of threads may call at the same time.
+// WorkerPool: threads that share the work of their callers, the most urgent call first. shared_workers() is
+// the pool of the process. Simulation, strand codecs, drawing and loading all use it, so they never run on
+// more threads than there are processors. Any number of threads may call at the same time.
 #pragma once
 
 #include <algorithm>
@@ -15,19 +15,21 @@
 
 namespace strandcast {
 
-/// Of work, the most urgent first: free threads go there, and leave what is less urgent for it.
+/// Urgency of a call, the most urgent first. Pool threads leave less urgent work when more urgent work
+/// arrives.
 enum class Priority : uint32_t { Simulation, Encoding, Drawing, Background };
 
-/// Threads of a pool at most, the caller among them.
+/// Largest number of threads of a pool, including the calling thread.
 inline constexpr uint32_t kMaxWorkers = 64;
-/// How much a pool's threads stand back behind other programs (added to their nice level), where the system
-/// lets them.
+/// Nice value added to that of the pool's threads, where the system permits it; other programs then run
+/// first.
 inline constexpr int kWorkerNiceness = 2;
 
 class WorkerPool {
  public:
-  /// The caller of for_ranges() is one of `threads`, 1 to kMaxWorkers. The others begin here, a little nicer
-  /// than the thread that makes the pool, and sleep while there is nothing to do.
+  /// Starts `threads` - 1 threads (`threads` is 1 to kMaxWorkers), since the caller of for_ranges() works
+  /// too. Their nice value is kWorkerNiceness above that of the constructing thread. They sleep while there
+  /// is no work.
   explicit WorkerPool(uint32_t threads);
   ~WorkerPool();
   WorkerPool(const WorkerPool&) = delete;
@@ -35,10 +37,10 @@ class WorkerPool {
 
   uint32_t size() const { return size_; }
 
-  /// A call as urgent as this, by `most_workers` threads at most.
+  /// Returns a handle for calls of this priority that use at most `most_workers` threads.
   class Terms;
   Terms at(Priority priority, uint32_t most_workers = kMaxWorkers);
-  /// at(Priority::Simulation).for_ranges(...).
+  /// Same as at(Priority::Simulation).for_ranges(...).
   template <class Work>
   void for_ranges(size_t count, size_t grain, const Work& work);
 
@@ -79,13 +81,13 @@ class WorkerPool {
 
 class WorkerPool::Terms {
  public:
-  /// work(begin, end) or work(begin, end, worker) for ranges of `grain` >= 1 (the last one less) that
-  /// together are [0, count): each once, in any order, on any thread. `worker` is below size() and
-  /// `most_workers`, and no two ranges of this call that run at the same time have the same; the caller's is
-  /// 0. Returns when all is done. The caller takes ranges like everybody and waits for those only that
-  /// somebody has begun. A thread that is wanted elsewhere ends the range it is at, so that a range should
-  /// take less than a millisecond. `work` may call for_ranges() itself; it must not throw, nor wait for
-  /// another range.
+  /// Splits [0, count) into ranges of `grain` >= 1 and calls work(begin, end) or work(begin, end, worker)
+  /// once for each.
+  /// Ranges run in any order on any thread; the last range may be shorter. `worker` is below size() and
+  /// `most_workers`, differs between ranges that run at the same time, and is 0 for the caller. Returns when
+  /// all ranges are done. The caller takes ranges too and waits only for ranges that other threads have
+  /// begun. A thread changes to more urgent work only between ranges, so a range should take less than a
+  /// millisecond. `work` may call for_ranges() itself; it must not throw or wait for another range.
   template <class Work>
   void for_ranges(size_t count, size_t grain, const Work& work) const {
     const Ranges ranges = [](const void* context, size_t begin, size_t end, uint32_t worker) {
@@ -102,7 +104,7 @@ class WorkerPool::Terms {
     else
       pool_.take_ranges(call, 0, Patience::ToTheEnd);
   }
-  /// Threads that take part at most.
+  /// Largest number of threads that take part.
   uint32_t workers() const { return std::min(pool_.size(), most_workers_); }
 
  private:
@@ -123,8 +125,9 @@ void WorkerPool::for_ranges(size_t count, size_t grain, const Work& work) {
   at(Priority::Simulation).for_ranges(count, grain, work);
 }
 
-/// The pool of the process: as many threads as there are processors, at most kMaxWorkers, made by the first
-/// call. That is for a thread as nice as the program; a nicer one's workers could never be made less so.
+/// Returns the pool of the process, which the first call makes with one thread per processor (at most
+/// kMaxWorkers). Call it first from a thread with the process's default nice value: workers inherit it, and
+/// an unprivileged process cannot lower it again.
 WorkerPool& shared_workers();
 
 }  // namespace strandcast

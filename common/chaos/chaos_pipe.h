@@ -1,5 +1,5 @@
-// ChaosPipe: one direction of one relayed connection: bytes in, the same bytes out later. Plain logic on
-// given times, no sockets and no clock, so that tests can check it exactly.
+// ChaosPipe: one direction of a relayed connection, which delays bytes and keeps their order. Works on given
+// times without sockets or clock, so that tests can check it exactly.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace strandcast::chaos {
 
-/// Bytes that cross a link of limited rate together; about one Ethernet frame.
+/// Bytes that cross a rate-limited link as one piece; about one Ethernet frame.
 inline constexpr size_t kSegmentBytes = 1'448;
 
 class ChaosPipe {
@@ -23,15 +23,15 @@ class ChaosPipe {
   void set_plan(const LinkPlan& plan) { plan_ = plan; }
   const LinkPlan& plan() const { return plan_; }
 
-  /// How many bytes may be put in now, 0 while the queue is full.
+  /// Returns how many bytes push() accepts now; 0 while the queue is full.
   size_t room(int64_t time_us) const;
-  /// Takes bytes read at `time_us`. No more than room() is expected.
+  /// Queues bytes read at `time_us`, at most room() of them.
   void push(std::span<const std::byte> bytes, int64_t time_us);
-  /// The piece to write next, empty when none is due. Stays until pop().
+  /// Returns the next piece to write, empty if none is due. It stays in front until pop().
   std::span<const std::byte> front(int64_t time_us) const;
-  /// The first `byte_count` bytes of front() are written.
+  /// Removes the first `byte_count` bytes of front() after they were written.
   void pop(size_t byte_count);
-  /// When to look again: the next piece or the end of a freeze; -1 = nothing waits.
+  /// Returns the time of the next piece or of the end of a freeze; -1 if nothing waits.
   int64_t next_due_us(int64_t time_us) const;
   bool is_frozen(int64_t time_us) const;
   bool is_empty() const { return pieces_.empty(); }

@@ -1,7 +1,7 @@
-// ChaosRelay: a TCP relay in user space that makes a link bad on purpose: delay, jitter, a rate with a
-// bounded queue, freezes, resets, half-open connections, corruption, and writes cut or glued together. Needs
-// no rights and no kernel module. One own thread; the functions may be called from any thread. It knows
-// nothing of what it carries.
+// ChaosRelay: a TCP relay in user space that degrades a link on purpose. It adds delay, jitter, a rate with a
+// bounded queue, freezes, resets, half-open connections, corruption, and split or merged writes. Needs no
+// privileges and no kernel module. Runs on its own thread; the functions may be called from any thread. It
+// does not interpret the bytes.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace strandcast::chaos {
 
-/// How bytes leave the relay.
+/// How the relay splits the bytes that it writes.
 enum class Writes {
   AsRead,   // as they came
   OneByte,  // every byte in a write of its own
@@ -24,7 +24,7 @@ enum class Writes {
 inline constexpr size_t kMaxSplitBytes = 61;
 inline constexpr int64_t kMergeWindowUs = 20'000;
 
-/// What happens to one direction of every connection.
+/// Faults of one direction of every connection.
 struct LinkPlan {
   int64_t delay_us = 0;
   int64_t jitter_us = 0;            // added to the delay, uniform in 0..jitter; order is kept, as in TCP
@@ -61,29 +61,29 @@ struct RelayCounters {
   uint64_t most_queued_bytes = 0;             // of one direction of one connection
 };
 
-/// Address space of what one direction of one connection may hold, delay line included.
+/// Upper limit of the bytes held for one direction of one connection, including delayed ones.
 inline constexpr size_t kMaxHeldBytes = 8u << 20;
 
 class ChaosRelay {
  public:
-  /// Unavailable when the port is taken, BadInput for a host that is none.
+  /// Starts the relay. Unavailable if the port is taken, BadInput for an invalid host.
   static Result<std::unique_ptr<ChaosRelay>> start(const RelayConfig& config);
-  /// Closes everything and ends the thread.
+  /// Closes all connections and ends the thread.
   ~ChaosRelay();
   ChaosRelay(const ChaosRelay&) = delete;
   ChaosRelay& operator=(const ChaosRelay&) = delete;
 
   uint16_t port() const;
-  /// From now on, for connections that exist and for new ones; what is queued keeps its time.
+  /// Applies a plan to existing and new connections; bytes already queued keep their times.
   void set_plan(Direction direction, const LinkPlan& plan);
-  /// While frozen nothing passes in either direction and nothing is read.
+  /// Freezes or releases the relay: while frozen, it neither reads nor writes in either direction.
   void set_frozen(bool is_frozen);
-  /// While silent everything is swallowed and no end is passed on; new connections are accepted and led
-  /// nowhere.
+  /// Makes the relay a black hole: while silent, it discards all bytes and passes on no close. It accepts new
+  /// connections but connects them to nothing.
   void set_silent(bool is_silent);
-  /// Connections that exist now get a TCP reset at both ends.
+  /// Resets all current connections (TCP RST) at both ends.
   void reset_all();
-  /// New connections go to this port from now on.
+  /// Sets the port that new connections are forwarded to.
   void set_to_port(uint16_t port);
   RelayCounters counters() const;
 

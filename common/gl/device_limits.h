@@ -1,7 +1,7 @@
-// What our shaders and buffers take of a device, beside what OpenGL 4.5 guarantees: one table, checked when a
-// context is made, and where a size follows from the scene, when its buffers are. shaders/README.md lists
-// it; a test compares it with what linked programs use. Reading needs a current context, the rest is plain
-// logic for any thread.
+// Limits of an OpenGL device that our shaders and buffers need beyond those guaranteed by OpenGL 4.5, in one
+// table. Checked when a context is made and, where a size follows from the scene, when buffers are allocated.
+// shaders/README.md lists them; a test compares them with what linked programs use. Reading needs a current
+// context; the rest is plain logic for any thread.
 #pragma once
 
 #include <array>
@@ -45,24 +45,25 @@ struct DeviceLimitRow {
   const char* user;     // who needs the most, or who checks where the scene decides
 };
 
-/// In the order of DeviceLimit.
+/// Returns the limits in the order of DeviceLimit.
 std::span<const DeviceLimitRow> device_limit_table();
 
-/// What a device offers, by DeviceLimit.
+/// Values that a device offers, by DeviceLimit.
 struct DeviceLimits {
   std::array<uint64_t, kDeviceLimitCount> values{};
 
   uint64_t of(DeviceLimit limit) const { return values[static_cast<size_t>(limit)]; }
 };
 
-/// Of the current context.
+/// Reads the limits of the current context.
 DeviceLimits read_device_limits();
 
-/// What is needed whatever the scene. Unsupported names the first limit that is too low, what is needed and
-/// what is given.
+/// Checks the limits that every scene needs. Unsupported names the first one that is too low, with the needed
+/// and the given value.
 Status check_device_limits(const DeviceLimits& limits);
 
-/// `user` needs so much of one limit: for sizes that follow from the scene. LimitExceeded in the same words.
+/// Checks one limit for a size that follows from the scene; `user` names what needs it. LimitExceeded states
+/// the needed and the given value.
 Status check_device_limit(const DeviceLimits& limits, DeviceLimit limit, uint64_t needed,
                           const std::string& user);
 

@@ -11,7 +11,7 @@
 
 namespace strandcast::gl {
 
-/// Facts about the current context.
+/// Facts about the current OpenGL context.
 struct DeviceInfo {
   std::string renderer;
   std::string vendor;
@@ -21,22 +21,22 @@ struct DeviceInfo {
   DeviceLimits limits;
 };
 
-/// Software renderers draw with threads that all contexts of a display share; they run at the priority of the
-/// thread that came first. Own keeps apart from the contexts made with Shared, so that neither waits in the
-/// other's queue; contexts made with Own share one such set. No difference on hardware.
+/// Which driver threads a software renderer uses; no difference on hardware. Its threads are shared by all
+/// contexts of a display and run at the priority of the first context's thread. Contexts made with Own share
+/// a second set of threads, so that they and the Shared ones never queue behind each other.
 enum class DriverThreads { Shared, Own };
 
 class EglContext {
  public:
-  /// `device`: "auto", "software", "hardware" or a device number. Makes the context current on the calling
-  /// thread. Unavailable lists what was tried.
+  /// Makes a context and makes it current on the calling thread. `device`: "auto", "software", "hardware" or
+  /// a device number. Unavailable lists what was tried.
   static Result<std::unique_ptr<EglContext>> make(const std::string& device,
                                                   DriverThreads threads = DriverThreads::Shared);
   ~EglContext();
   EglContext(const EglContext&) = delete;
   EglContext& operator=(const EglContext&) = delete;
 
-  /// Binds to the calling thread; release() first where it is current.
+  /// Binds the context to the calling thread; the thread on which it is current must call release() first.
   Status make_current();
   void release();
   const DeviceInfo& info() const { return info_; }
@@ -48,11 +48,11 @@ class EglContext {
   DeviceInfo info_;
 };
 
-/// Reads DeviceInfo from whatever context is current (also a window's). Unsupported below GL 4.5 core, and
-/// where a limit is lower than our shaders need.
+/// Reads facts about the current context, also one of a window. Unsupported below GL 4.5 core, and if a limit
+/// is lower than our shaders need.
 Result<DeviceInfo> read_device_info();
 
-/// Turns GL debug messages of medium and high severity into log lines; call with a current context.
+/// Logs GL debug messages of medium and high severity; call it with a current context.
 void enable_debug_log();
 
 }  // namespace strandcast::gl

@@ -1,4 +1,4 @@
-// The shader files inside the binary; the table is generated from shaders/ when building. Any thread.
+// Shader files embedded in the binary; the build generates their table from shaders/. Any thread.
 #pragma once
 
 #include <span>
@@ -11,7 +11,7 @@ struct EmbeddedShader {
   std::string_view text;
 };
 
-/// In the order of shaders/CMakeLists.txt.
+/// Returns the files in the order of shaders/CMakeLists.txt.
 std::span<const EmbeddedShader> embedded_shaders();
 
 }  // namespace strandcast::gl

@@ -1,5 +1,5 @@
-// Move-only GL objects, direct state access only, labelled for debuggers. All calls need a current context;
-// the destructor needs the same one. Global are only the counts of what there is.
+// Move-only owners of GL objects, using direct state access only and labelled for debuggers. All calls need a
+// current context; the destructor needs the same one. Only the counts of objects are global.
 #pragma once
 
 #include <array>
@@ -16,10 +16,10 @@ namespace strandcast::gl {
 
 enum class ObjectKind : uint8_t { Buffer, Texture, Framebuffer, Program, VertexArray, Query };
 inline constexpr size_t kObjectKindCount = 6;
-/// As printed and in metrics: "buffer", "vertex_array".
+/// Returns the name of a kind for printing and metrics, for example "buffer" or "vertex_array".
 const char* to_string(ObjectKind kind);
 
-/// What this process holds of GL, in all contexts.
+/// GL objects and bytes that this process holds in all contexts.
 struct ObjectCounts {
   std::array<uint64_t, kObjectKindCount> objects{};  // by kind
   uint64_t contexts = 0;
@@ -29,9 +29,9 @@ struct ObjectCounts {
   uint64_t of(ObjectKind kind) const { return objects[static_cast<size_t>(kind)]; }
   bool operator==(const ObjectCounts&) const = default;
 };
-/// Any thread, no context.
+/// Returns the current counts; any thread, no context needed.
 ObjectCounts object_counts();
-/// For those who make objects, contexts and programs: one more, or one less.
+/// Change the counts when an object, context or program is made (+1) or destroyed (-1).
 void count_object(ObjectKind kind, int64_t difference, int64_t size_bytes);
 void count_context(int64_t difference);
 void count_compiled_program();
@@ -56,12 +56,12 @@ inline constexpr ObjectKind kKindOf<delete_vertex_array> = ObjectKind::VertexArr
 template <>
 inline constexpr ObjectKind kKindOf<delete_query> = ObjectKind::Query;
 
-/// Owns one GL name and deletes it with Delete.
+/// Owns one GL name and deletes it with the function Delete.
 template <void (*Delete)(uint32_t)>
 class Handle {
  public:
   Handle() = default;
-  /// `size_bytes`: of the storage behind the name, for the counts.
+  /// Takes over `name`; `size_bytes` is the size of its storage, for the counts.
   explicit Handle(uint32_t name, uint64_t size_bytes = 0) : name_(name), size_bytes_(size_bytes) {
     if (name_ != 0) count_object(kKindOf<Delete>, 1, static_cast<int64_t>(size_bytes_));
   }
@@ -86,7 +86,7 @@ class Handle {
   uint64_t size_bytes_ = 0;
 };
 
-/// Immutable-size storage; contents may be rewritten. A size of 0 makes an empty handle.
+/// Buffer whose size is fixed and whose contents may be rewritten. A size of 0 makes an empty handle.
 class Buffer {
  public:
   Buffer() = default;
@@ -103,7 +103,7 @@ class Buffer {
   void write(const std::vector<T>& values) {
     write(0, std::as_bytes(std::span(values)));
   }
-  /// Blocks until the GPU has written it.
+  /// Copies bytes from the buffer; blocks until the GPU has written them.
   void read(size_t offset_bytes, std::span<std::byte> bytes) const;
   template <class T>
   std::vector<T> read_all() const {
@@ -122,16 +122,17 @@ class Buffer {
   size_t size_bytes_ = 0;
 };
 
-/// 2-D colour or depth texture without mipmaps, nearest filter; or 3-D, linear. Clamped to its edge.
+/// 2-D colour or depth texture without mipmaps and with nearest filtering, or 3-D texture with linear
+/// filtering. Clamped to its edges.
 class Texture {
  public:
   Texture() = default;
-  /// `samples` > 1 makes a multisample texture.
+  /// Makes a 2-D texture; `samples` > 1 makes it multisampled.
   Texture(const std::string& label, uint32_t internal_format, uint32_t width, uint32_t height,
           uint32_t samples);
   static Texture volume(const std::string& label, uint32_t internal_format, uint32_t width, uint32_t height,
                         uint32_t depth);
-  /// A buffer as a texture: `internal_format` is of one texel. The buffer has to outlive it.
+  /// Makes a texture that views a buffer, with texels of `internal_format`. The buffer must outlive it.
   static Texture view_of(const std::string& label, uint32_t internal_format, const Buffer& buffer);
   void bind(uint32_t unit) const;
   uint32_t name() const { return handle_.name(); }
@@ -145,18 +146,19 @@ class Texture {
   uint32_t height_ = 0;
 };
 
-/// Framebuffer over textures it does not own.
+/// Framebuffer over textures that it does not own.
 class Framebuffer {
  public:
   Framebuffer() = default;
-  /// For textures that are known to be there; make() for sizes that somebody else chose.
+  /// Makes a framebuffer over textures that are known to be usable; use make() for sizes chosen from outside.
   Framebuffer(const std::string& label, std::span<const Texture* const> colors, const Texture* depth);
-  /// LimitExceeded when the driver cannot draw into the textures, which may be too large for it.
+  /// Makes a framebuffer; LimitExceeded if the driver cannot draw into the textures, which may be too large
+  /// for it.
   static Result<Framebuffer> make(const std::string& label, std::span<const Texture* const> colors,
                                   const Texture* depth);
-  /// Without storage, 1 x 1: what to bind for transform feedback with the rasteriser off, since a context
-  /// without a surface has no framebuffer of its own and refuses every draw. Larger ones are for draws that
-  /// write into buffers.
+  /// Makes a framebuffer without attachments, by default of 1 x 1 pixels. A context without a surface has no
+  /// default framebuffer and refuses every draw, even transform feedback with the rasteriser off. Larger
+  /// sizes serve draws that write into buffers.
   static Framebuffer without_attachments(const std::string& label, uint32_t width = 1, uint32_t height = 1);
   void bind() const;
   uint32_t name() const { return handle_.name(); }

@@ -1,5 +1,5 @@
-// PassList: passes as objects. A list keeps those that somebody wants something of, prepares and runs them in
-// order and times each; what it prints is what it runs. One thread per list. Holds no GL itself.
+// PassList: passes as objects. A list keeps the passes whose output is wanted, prepares and runs them in
+// order, and times each; its report shows what it runs. One thread per list. Holds no GL itself.
 #pragma once
 
 #include <algorithm>
@@ -17,10 +17,10 @@
 
 namespace strandcast::gl {
 
-/// What a pass is timed with: the clock of this thread, or the device's, which waits for the work.
+/// Clock that times a pass: that of this thread, or that of the device, which waits until its work is done.
 enum class PassClock { Host, Device };
 
-/// One line of what is printed about passes. A value, to be handed to other threads.
+/// One line of the report on passes. A value that may be passed to other threads.
 struct PassReport {
   std::string name;
   PassFate fate = PassFate::Kept;
@@ -32,10 +32,10 @@ struct PassReport {
   bool operator==(const PassReport&) const = default;
 };
 using PassReports = std::vector<PassReport>;
-/// A line for work that is no pass of a list: on a thread of its own, whenever something comes.
+/// Makes a report line for work outside of any list, which runs on its own thread when input comes.
 PassReport make_report(std::string name, PassFate fate, std::string reason, const StageTimer& timer);
 
-/// What all passes have, whatever they run on: a declaration and a time.
+/// Common part of all passes: a declaration and a timer.
 class PassEntry {
  public:
   explicit PassEntry(PassDeclaration declaration, PassClock clock = PassClock::Device)
@@ -46,9 +46,10 @@ class PassEntry {
 
   const PassDeclaration& declaration() const { return declaration_; }
   PassClock clock() const { return clock_; }
-  /// Bytes that it keeps for itself when it runs, beside what it writes.
+  /// Returns the bytes that a running pass keeps for itself, besides its outputs.
   virtual uint64_t size_bytes() const { return 0; }
-  /// Passes in a row that are batched are run together, again and again, while their turn has more batches.
+  /// Returns whether the pass runs in batches. Successive batched passes run together, repeatedly, until the
+  /// turn has no more batches.
   virtual bool is_batched() const { return false; }
   StageTimer& timer() { return timer_; }
   const StageTimer& timer() const { return timer_; }
@@ -59,7 +60,7 @@ class PassEntry {
   StageTimer timer_;
 };
 
-/// What passes are given in one run of their list. Types with contents derive from it and name a `Setup`.
+/// Arguments of the passes in one run of their list. Derived types add contents and name a type `Setup`.
 struct PassTurn {
   uint32_t batch_index = 0;       // counted by the list
   bool has_more_batches = false;  // set by a batched pass in each run but the last
@@ -69,26 +70,27 @@ template <class Turn>
 class Pass : public PassEntry {
  public:
   using PassEntry::PassEntry;
-  /// Once, before the first run, and only when it is to run: compiles and allocates what it needs and writes.
+  /// Prepares a pass that will run, once before its first run: compiles and allocates what it needs and
+  /// writes.
   virtual Status prepare(const typename Turn::Setup&) { return {}; }
   virtual Status run(Turn& turn) = 0;
 };
 
-/// The part of a list that does not depend on what its passes are given.
+/// Part of a list that does not depend on the arguments of its passes.
 class PassListBase {
  public:
-  /// Decides anew what runs, for these outputs. An error leaves the old decision.
+  /// Decides which passes run, for the wanted outputs. After an error the previous decision stays.
   Status plan(const Resources& external, const Resources& wanted);
   const PassPlan& plan() const { return plan_; }
   bool runs(std::string_view pass) const { return plan_.runs(pass); }
-  /// All passes in their order, also those that do not run.
+  /// Returns a line for every pass in order, including those that do not run.
   PassReports report() const;
-  /// What one pass took in the last run, all batches together; 0 if it did not run.
+  /// Returns the duration of one pass in the last run, all batches together; 0 if it did not run.
   double last_ms(std::string_view pass) const;
-  /// Sum over all passes of the last run.
+  /// Returns the duration of all passes in the last run.
   double last_total_ms() const;
-  /// Bytes of the live resources and of what the passes that run keep; or of all the others. As of now:
-  /// targets get their size with the first run.
+  /// Bytes of the live resources and of running passes, and bytes saved by the others. Targets count from
+  /// their first run on, when they get their size.
   uint64_t live_bytes() const;
   uint64_t saved_bytes() const;
 
@@ -99,7 +101,7 @@ class PassListBase {
     bool is_prepared = false;
     double last_ms = 0.0;
   };
-  /// Times one run of `work`; GPU work of `slot` with `device`.
+  /// Times one run of `work`; `device` times the GPU work of `slot`.
   template <class Work>
   Status run_timed(Slot& slot, GpuTimer* device, Work&& work);
   void begin_run();
@@ -122,14 +124,14 @@ class PassList : public PassListBase {
     slots_.push_back({pass.get()});
     passes_.push_back(std::move(pass));
   }
-  /// Keeps a resource as long as the passes that share it.
+  /// Keeps a resource for as long as the passes that share it.
   template <class T>
   T& keep(std::unique_ptr<T> resource) {
     T& kept = *resource;
     resources_.push_back(std::move(resource));
     return kept;
   }
-  /// Prepares those that run and are not prepared yet.
+  /// Prepares the passes that run and are not prepared yet.
   Status prepare(const Setup& setup) {
     for (size_t i = 0; i < slots_.size(); ++i) {
       if (!slots_[i].is_kept || slots_[i].is_prepared) continue;
@@ -138,8 +140,8 @@ class PassList : public PassListBase {
     }
     return {};
   }
-  /// Runs what is kept, in order; `device` may be null when no kept pass is timed with it. The first error
-  /// ends the run.
+  /// Runs the kept passes in order; the first error ends the run. `device` may be null if no kept pass is
+  /// timed by the device.
   Status run(Turn& turn, GpuTimer* device) {
     begin_run();
     for (size_t begin = 0; begin < slots_.size();) {

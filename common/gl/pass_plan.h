@@ -12,8 +12,8 @@
 
 namespace strandcast::gl {
 
-/// What one pass hands to another. Which one is meant is told by the object, its name is for people; types
-/// with contents derive from it.
+/// Data that one pass passes to another. Resources are compared by object; the name is for people. Derived
+/// types add contents.
 class Resource {
  public:
   explicit Resource(std::string name, uint64_t size_bytes = 0)
@@ -22,7 +22,8 @@ class Resource {
   Resource(const Resource&) = delete;
   Resource& operator=(const Resource&) = delete;
   const std::string& name() const { return name_; }
-  /// Bytes it takes when it is live, whether or not it is there yet; an upper bound for what is coded.
+  /// Returns the bytes of the resource when it is live, even before it is allocated; for coded data an upper
+  /// bound.
   virtual uint64_t size_bytes() const { return size_bytes_; }
 
  private:
@@ -42,7 +43,7 @@ struct PassDeclaration {
 
 enum class PassFate { Kept, NotRequested, Unread };  // runs | its fact is off | nothing wants what it writes
 
-/// As printed: "kept", "not requested", "unread".
+/// Returns "kept", "not requested" or "unread".
 const char* to_string(PassFate fate);
 
 struct PassDecision {
@@ -61,8 +62,9 @@ struct PassPlan {
   bool is_live(const Resource& resource) const;
 };
 
-/// Walks back from the wanted outputs. BadInput when a pass that runs reads what no running pass before it
-/// writes and what is not external, and when two passes or two resources have one name.
+/// Decides what runs by walking back from the wanted outputs. BadInput if a running pass reads a resource
+/// that is neither external nor written by an earlier running pass. BadInput also if two passes or two
+/// resources have the same name.
 Result<PassPlan> make_pass_plan(const std::vector<PassDeclaration>& passes, const Resources& external,
                                 const Resources& wanted);
 

@@ -1,5 +1,5 @@
-// Times GPU work: timer queries on hardware, glFinish and a wall clock on software renderers (whose queries
-// lie).
+// Times GPU work: with timer queries on hardware, with glFinish and a wall clock on software renderers, whose
+// queries are wrong.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ class GpuTimer {
  public:
   explicit GpuTimer(const DeviceInfo& info);
   void begin();
-  /// Waits for the work and returns milliseconds since begin().
+  /// Waits for the work and returns the milliseconds since begin().
   double end_ms();
 
  private:

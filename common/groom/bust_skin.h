@@ -1,5 +1,6 @@
-// BustSkin: the mesh under the hair with its bust in a pose of its own (common/math/bust.h). Where the neck
-// is follows from the mesh alone, so whoever has the mesh finds the same. Deterministic; any thread.
+// BustSkin: moves the mesh under the hair so that its bust has a pose of its own (common/math/bust.h). The
+// location of the neck follows from the mesh alone, so server and viewers agree on it. Deterministic; any
+// thread.
 #pragma once
 
 #include <vector>
@@ -9,8 +10,8 @@
 
 namespace strandcast {
 
-/// The neck of a head with shoulders, upright and with its face at +Z; none where a mesh has no shoulders, or
-/// no chin above a neck.
+/// Finds the neck of a mesh that is upright with its face at +Z. Returns an empty rig if the mesh has no
+/// shoulders, or no chin above a neck.
 BustRig find_bust(const Mesh& mesh);
 
 class BustSkin {
@@ -19,12 +20,12 @@ class BustSkin {
   explicit BustSkin(const Mesh& rest);
 
   const BustRig& rig() const { return rig_; }
-  /// Moves the neck and bust of this mesh, which is the one at rest or what pose() made of it. False where it
-  /// is so already.
+  /// Moves neck and bust of `mesh`, which is the mesh at rest or one that pose() has moved. Returns false if
+  /// it already has this pose.
   bool pose(const BustTurn& turn, Mesh& mesh);
 
  private:
-  /// A vertex below the head.
+  /// A vertex below the head, which the bust moves.
   struct Moved {
     uint32_t vertex = 0;
     glm::vec3 position_m{0.0f}, normal{0.0f};  // at rest

@@ -1,5 +1,5 @@
-// ByteView: little-endian numbers and arrays out of a file's bytes. Offsets and counts come from the file and
-// are untrusted: has() is asked before get(). Any thread.
+// ByteView: reads little-endian numbers and arrays from a file's bytes. Offsets and counts come from the file
+// and are untrusted, so call has() before get(). Any thread.
 #pragma once
 
 #include <bit>
@@ -19,13 +19,13 @@ class ByteView {
   explicit ByteView(std::span<const std::byte> bytes) : bytes_(bytes) {}
   uint64_t size_bytes() const { return bytes_.size(); }
 
-  /// True when `count` items of `item_bytes` starting at `offset` lie inside the file.
+  /// Returns whether `count` items of `item_bytes`, starting at `offset`, lie inside the file.
   bool has(uint64_t offset, uint64_t count, uint64_t item_bytes) const {
     if (offset > bytes_.size()) return false;
     return count <= (bytes_.size() - offset) / item_bytes;
   }
 
-  /// The number at `offset`, unaligned; has(offset, 1, sizeof(T)) holds.
+  /// Reads the number at `offset`, unaligned; has(offset, 1, sizeof(T)) must be true.
   template <class T>
   T get(uint64_t offset) const {
     CHECK(has(offset, 1, sizeof(T)));

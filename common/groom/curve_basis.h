@@ -1,4 +1,4 @@
-// Cubic curves as USD has them: points on them, evenly in their parameter. Pure functions, any thread.
+// Evaluates USD's cubic curves at points evenly spaced in the curve parameter. Pure functions, any thread.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -15,7 +15,7 @@ enum class CurveEnds {
   Pinned,  // it begins at the first point and ends at the last
 };
 
-/// As many points on the curve as it has control points, the first and the last at its ends. BadInput where
+/// Returns as many points on the curve as it has control points; the first and last are its ends. BadInput if
 /// their number does not fit the basis.
 Result<std::vector<glm::vec3>> points_on_curve(std::span<const glm::vec3> control, CurveBasis basis,
                                                CurveEnds ends);

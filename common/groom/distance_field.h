@@ -1,6 +1,6 @@
-// DistanceField: how far points are outside of a closed mesh, on a grid that strands look it up in
-// (shaders/sim/field_collider.comp). Immutable data; making one is a pure function of any thread, the same
-// bits for the same triangles in any order and on any number of threads.
+// DistanceField: signed distance from a closed mesh on a grid, which strands look up
+// (shaders/sim/field_collider.comp). Immutable. It is made by a pure function on any thread. The bits do not
+// depend on the order of triangles or the number of threads.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,12 @@
 
 namespace strandcast {
 
-/// Cells along the longest side of the mesh.
+/// Limits of the number of cells along the longest side of the mesh.
 inline constexpr uint32_t kMinFieldResolution = 16;
 inline constexpr uint32_t kMaxFieldResolution = 128;
 inline constexpr uint32_t kDefaultFieldResolution = 64;
-/// What a field may take: one of the largest resolution with a margin, for a mesh as wide as high.
+/// Memory limit of a field. It suffices for the finest resolution with a margin, for a mesh that is as wide
+/// as high.
 inline constexpr uint64_t kMaxFieldBytes = 64ull << 20;
 
 struct DistanceField {
@@ -34,22 +35,23 @@ struct DistanceField {
     double distance_m = 0.0;  // negative inside
     glm::dvec3 gradient{0.0};
   };
-  /// Trilinear between nodes; outside of the grid that of the nearest point in it.
+  /// Interpolates trilinearly between nodes; a point outside the grid gets the sample of the nearest point
+  /// inside.
   Sample sample(const glm::dvec3& point_m) const;
   uint64_t size_bytes() const { return quad.size() * sizeof(glm::vec4); }
 };
 
-/// Exact distances where the surface is near, and from there outwards and inwards the first-order solution of
-/// the eikonal equation. What is inside is what triangles wind around more than half (generalised winding
-/// number: Jacobson and others 2013, with the tree of Barill and others 2018, dipoles only), so small holes
-/// count as closed, overlapping parts as one, and a mesh that is inside out as well. Triangles without area
-/// do not count. BadInput in a sentence for a mesh without triangles or with numbers that are none, and for
-/// one that has no inside to speak of: too open, or with parts inside out; LimitExceeded beyond
-/// kMaxFieldBytes. `resolution` is in the range above.
+/// Computes the field. Distances are exact near the surface; farther away, first-order eikonal steps extend
+/// them. `resolution` must be within the limits above.
+/// A point is inside where the generalised winding number exceeds one half (Jacobson and others 2013). It is
+/// evaluated with the tree of Barill and others 2018, with dipoles only. So small holes count as closed and
+/// overlapping parts as one; a mesh may be inside out. Triangles without area are ignored.
+/// BadInput: no triangles, non-finite numbers, or no clear inside (too open, or partly inside out).
+/// LimitExceeded: beyond kMaxFieldBytes.
 Result<DistanceField> make_distance_field(const Mesh& mesh, uint32_t resolution,
                                           WorkerPool& workers = shared_workers());
 
-/// Distance of a point from a triangle.
+/// Distance of a point from the triangle a, b, c, in metres.
 double distance_to_triangle_m(const glm::dvec3& point_m, const glm::dvec3& a, const glm::dvec3& b,
                               const glm::dvec3& c);
 

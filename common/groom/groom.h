@@ -1,5 +1,6 @@
-// A groom: strands at rest in head space, structure of arrays. Plain data, immutable after loading. Loaders
-// are in groom_file.h, tfx_loader.h and hair_loader.h, growth in procedural.h, resampling in resample.h.
+// Groom: strands at rest in head space, as a structure of arrays. Plain data, immutable after loading.
+// Loaders are in groom_file.h, tfx_loader.h and hair_loader.h, growth in procedural.h, resampling in
+// resample.h.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +19,7 @@ namespace strandcast {
 inline constexpr uint32_t kMaxSourceVertexCount = 4'096;  // per strand in a file, before resampling
 inline constexpr uint64_t kMaxGroomFileBytes = 512ull << 20;
 
-/// Which vertices follow the head exactly; the rest is simulated.
+/// Which vertices of a strand follow the head exactly; all others are simulated.
 enum class Pinning { Root, RootPair, BothEnds };  // vertex 0 | vertices 0 and 1 | 0, 1 and the last two
 
 struct Groom {
@@ -33,27 +34,28 @@ struct Groom {
   uint32_t vertex_count(uint32_t strand_index) const {
     return offset[strand_index + 1] - offset[strand_index];
   }
-  /// Vertices per strand when all strands have the same number, else 0. The simulation needs a uniform groom.
+  /// Returns the number of vertices per strand if all strands have the same, else 0. The simulation needs a
+  /// uniform groom.
   uint32_t uniform_vertex_count() const;
-  /// Arc length of one strand, m.
+  /// Returns the arc length of one strand in metres.
   float length_m(uint32_t strand_index) const;
 };
 
-/// Checks sizes, limits, coordinates within kMaxGroomExtentM, that every strand has >= 2 vertices and that
-/// vertex 0 of every strand is pinned. BadInput or LimitExceeded name the strand and vertex.
+/// Checks sizes, limits, and coordinates within kMaxGroomExtentM. Every strand must have at least 2 vertices,
+/// of which vertex 0 is pinned. BadInput and LimitExceeded name the strand and vertex.
 Status validate(const Groom& groom);
 
-/// Triangles of neighbouring roots (at most about 2 per strand), deterministic, across partings as well.
-/// Strands without a triangle are still drawn as themselves.
+/// Returns triangles of neighbouring roots, at most about 2 per strand, also across partings. Deterministic.
+/// Strands in no triangle are still drawn themselves.
 std::vector<RootTriangle> make_root_triangles(const Groom& groom);
 
-/// Order of strands such that every prefix covers the head evenly, so that a prefix is a valid subset.
+/// Returns an order of strands such that every prefix covers the head evenly and is a valid subset.
 std::vector<uint32_t> make_prefix_order(const Groom& groom);
 
-/// The groom with the given vertices of every strand pinned and all others free.
+/// Returns the groom with exactly the given vertices of every strand pinned.
 Groom with_pinning(Groom groom, Pinning pinning);
 
-/// The groom with its strands in the given order; `order` is a permutation of 0..strand_count-1.
+/// Returns the groom with its strands in `order`, which is a permutation of 0..strand_count-1.
 Groom reorder(const Groom& groom, const std::vector<uint32_t>& order);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// What of a groom and a head a viewer needs. Pure function, any thread.
+// Makes the asset that viewers need from a groom and a head. Pure function, any thread.
 #pragma once
 
 #include "common/groom/groom.h"
@@ -6,7 +6,7 @@
 
 namespace strandcast {
 
-/// From a uniform groom and a head mesh with one normal per vertex.
+/// Makes the asset; the groom must be uniform and the head mesh have one normal per vertex.
 SceneAsset make_scene_asset(const Groom& groom, Mesh head);
 
 }  // namespace strandcast

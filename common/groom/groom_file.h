@@ -1,5 +1,5 @@
-// load_groom: groom files of any known kind into head space: loader by extension, axes, origin, unit,
-// resampling, pinning, validation. Any thread.
+// Loads groom files of any known format into head space: loader by extension, axes, origin, unit, resampling,
+// pinning and validation. Any thread.
 #pragma once
 
 #include <cstdint>
@@ -37,15 +37,15 @@ struct PlacedGroom {
       notes;  // a sentence for each thing that the file says or that was guessed, and why
 };
 
-/// The value of guess_unit().
+/// Returns the value of guess_unit(): metres per file unit.
 float guess_unit_m(const Groom& groom);
 
-/// Loads, joins, turns, moves, scales and checks a groom; the result is uniform. With vertex_count 0 a ragged
-/// groom, or one outside of 2..kMaxVertexCount, is resampled to its largest vertex count clamped into these
-/// limits. Errors name the file and the offending value.
+/// Loads, joins, rotates, moves, scales and checks a groom; the result is uniform. If `vertex_count` is 0, a
+/// non-uniform groom is resampled to its largest vertex count within 2..kMaxVertexCount. So is one outside
+/// that range. Errors name the file and the offending value.
 Result<PlacedGroom> load_placed_groom(const GroomFileOptions& options);
 
-/// The groom alone.
+/// Loads a groom and returns it without its placement.
 Result<Groom> load_groom(const GroomFileOptions& options);
 
 }  // namespace strandcast

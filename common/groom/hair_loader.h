@@ -14,7 +14,7 @@ namespace strandcast {
 /// size and skipped. Errors name the file and the offending header field, strand or vertex.
 Result<Groom> load_hair(const std::filesystem::path& path);
 
-/// As load_hair, from bytes in memory; errors carry no file name.
+/// Loads like load_hair() from bytes in memory; errors carry no file name.
 Result<Groom> read_hair(const ByteView& file);
 
 }  // namespace strandcast

@@ -6,13 +6,14 @@
 
 namespace strandcast {
 
-/// About the distance to the surface of head and bust, negative inside. Closed.
+/// Returns the approximate signed distance to the surface of head and bust, negative inside. The surface is
+/// closed.
 float head_distance(const glm::vec3& point);
 
-/// Unit normal of the surface through `point`, outwards.
+/// Returns the outward unit normal of the surface through `point`.
 glm::vec3 head_normal(const glm::vec3& point);
 
-/// The same of neck and bust alone.
+/// Distance and normal of neck and bust alone.
 float bust_distance(const glm::vec3& point);
 glm::vec3 bust_normal(const glm::vec3& point);
 

@@ -1,4 +1,4 @@
-// Where the head is under a groom that does not say it. Pure functions, any thread.
+// Finds the head under a groom that does not state it. Pure functions, any thread.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -9,15 +9,15 @@
 
 namespace strandcast {
 
-/// First vertex of every strand, in the groom's units.
+/// Returns the first vertex of every strand, in the groom's units.
 std::vector<glm::vec3> roots_of(const Groom& groom);
 
-/// The sphere under the hair of the head. A mane that goes on down the neck and the back does not wrap its
-/// fitted sphere; then only its upper roots count. Falls back to all roots. +Y is up.
+/// Fits a sphere to the roots; +Y is up. If hair continues down neck and back, so that it does not wrap the
+/// sphere, only the upper roots count. Falls back to all roots.
 FittedSphere fit_head_sphere(const Groom& groom);
 
-/// The head of a groom in metres, whatever the groom: the sphere under the hair where that has the size of a
-/// person's, else one of the usual size, which the roots stand on the way they grow.
+/// Finds the head of a groom in metres. Uses the sphere through the roots if it has the size of a person's
+/// head. Otherwise it places a head of usual size so that the roots stand on it in the direction of growth.
 FittedSphere fit_head(const Groom& groom);
 
 }  // namespace strandcast

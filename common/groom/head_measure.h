@@ -1,4 +1,4 @@
-// How well a drawn head, what collides and the hair agree. Pure function, any thread.
+// Measures how well the drawn head, its colliders and the hair agree. Pure functions, any thread.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace strandcast {
 
-/// Skin is under hair when a vertex of the groom as loaded is so near.
+/// Skin closer than this to a vertex of the groom as loaded counts as under hair.
 inline constexpr float kUnderHairM = 0.02f;
 
 struct HeadMeasure {
@@ -21,25 +21,26 @@ struct HeadMeasure {
   double deepest_vertex_m = 0.0;  // of the groom inside the spheres; 0 when none is
 };
 
-/// `spheres` are those of `head` (head_spheres.h).
+/// Measures a head; `spheres` are its collision spheres (head_spheres.h).
 HeadMeasure measure_head(const Mesh& head, const std::vector<FittedSphere>& spheres, const Groom& groom);
 
-/// "half of the roots lie within 1.2 mm of the skin ..."
+/// Describes the measure: "half of the roots lie within 1.2 mm of the skin ..."
 std::string to_sentence(const HeadMeasure& measure, size_t sphere_count);
 
-/// What of a groom as loaded lies inside of a head that collides as a field: it stays there.
+/// Vertices of a groom as loaded that lie inside a head with a distance field; the field leaves them there.
 struct HairInside {
   size_t vertex_count = 0;  // free ones
   size_t strand_count = 0;  // that have such
   double deepest_m = 0.0;
 };
 HairInside measure_inside(const DistanceField& field, const Groom& groom);
-/// Likewise of a body, at the end of the substep.
+/// Counts vertices inside a body's shapes at the end of the substep.
 HairInside measure_inside(const BodyInput& body, const Groom& groom);
-/// "the body has 6 capsules; no free vertex of the hair as loaded lies inside of them"
+/// Describes the count: "the body has 6 capsules; no free vertex of the hair as loaded lies inside of them"
 std::string to_sentence(const HairInside& inside, size_t capsule_count);
 
-/// "the head collides as a distance field of 55 x 69 x 37 nodes, 7.2 mm apart; 12 free vertices ..."
+/// Describes field and count: "the head collides as a distance field of 55 x 69 x 37 nodes, 7.2 mm apart; 12
+/// free vertices ..."
 std::string to_sentence(const HairInside& inside, const DistanceField& field);
 
 }  // namespace strandcast

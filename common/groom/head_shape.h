@@ -1,6 +1,6 @@
-// HeadShape: the built-in head made to fit under a groom: stretched to an ellipsoid through the roots, then
-// pulled to them and away from the hair, direction by direction; the shoulders sink and, like the neck, get
-// narrower instead. Immutable; any thread; the same groom gives the same shape.
+// HeadShape: the built-in head, fitted under a groom. It is stretched to an ellipsoid through the roots, then
+// pulled to the roots and away from other hair, direction by direction. Shoulders sink instead, and shoulders
+// and neck become narrower. Immutable; any thread. The same groom gives the same shape.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -18,13 +18,14 @@ enum class HeadFit {
 
 class HeadShape {
  public:
-  /// `about`: where the head is and how large; for HeadFit::Whole a start, which is the sphere through the
-  /// roots, else the size that make_head() takes. `groom` upright, face at +Z, in metres.
+  /// Fits the head to `groom`, which is upright in metres with its face at +Z. `about` is position and size
+  /// of the head: for HeadFit::Whole a first guess (the sphere through the roots), otherwise the size passed
+  /// to make_head().
   HeadShape(const Groom& groom, const FittedSphere& about, HeadFit fit);
 
-  /// The head as it is drawn, with normals.
+  /// Returns the head's mesh, with normals.
   Mesh mesh() const;
-  /// About how far a point is outside of the surface, m; negative inside.
+  /// Returns the approximate signed distance of a point from the surface in metres; negative inside.
   double distance_m(const glm::dvec3& point_m) const;
 
  private:

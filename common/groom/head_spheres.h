@@ -1,4 +1,5 @@
-// HeadSpheres: a drawn head as few spheres, which is what strands collide with. Pure functions, any thread.
+// HeadSpheres: approximates a drawn head by a few spheres, with which strands collide. Pure functions, any
+// thread.
 #pragma once
 
 #include <cstddef>
@@ -9,28 +10,28 @@
 
 namespace strandcast {
 
-/// Spheres of a head: as many as strands can be tested against.
+/// Number of spheres of a head: the most that strands can be tested against.
 inline constexpr size_t kHeadSpheres = 16;
-/// No pinned vertex of a groom as loaded lies deeper inside of the spheres that are fitted under it. Free
-/// ones do not lie inside at all: they would be pushed out of their style.
+/// Greatest depth (m) at which a pinned vertex of the loaded groom may lie inside the fitted spheres. Free
+/// vertices must lie outside, because spheres would push them out of their style.
 inline constexpr float kSwallowedM = 0.002f;
 
-/// At most `count` spheres inside of a mesh that together come as near to its surface as greedy choice finds:
-/// balls that touch the surface at two points (Ma, Bae and Choi 2012, "3D medial axis point approximation
-/// using nearest neighbors and the normal field"). Parts of the surface that face another part nearby, such
-/// as the inside of a mouth or the back of an eye, do not count, nor does what no strand of the groom is long
-/// enough to reach; what is far from all of its hair counts little. Empty for a mesh without area;
-/// deterministic.
+/// Fits at most `count` spheres inside a mesh so that they approximate its surface. Candidates are balls that
+/// touch the surface at two points (Ma, Bae and Choi 2012, "3D medial axis point approximation using nearest
+/// neighbors and the normal field"); the choice is greedy. Surface that faces another part nearby, as inside
+/// a mouth, is ignored. So is surface that no strand is long enough to reach; surface far from all hair
+/// counts little. Empty for a mesh without area; deterministic.
 std::vector<FittedSphere> fit_spheres(const Mesh& mesh, size_t count, const Groom& groom);
-/// The same without hair: all of the surface counts alike.
+/// Fits spheres without hair; the whole surface counts equally.
 std::vector<FittedSphere> fit_spheres(const Mesh& mesh, size_t count);
 
-/// The spheres, each as much larger as makes up for what lies between them, and smaller until no free vertex
-/// of the groom lies inside of it and no pinned one deeper than kSwallowedM; those of which nothing is left
-/// are gone.
+/// Adjusts spheres to a groom. Each sphere first grows to make up for the gaps between spheres. It then
+/// shrinks until it contains no free vertex and no pinned one deeper than kSwallowedM. Vanished spheres are
+/// removed.
 std::vector<FittedSphere> shrink_under(std::vector<FittedSphere> spheres, const Groom& groom);
 
-/// How far a point lies outside of all spheres, m; negative inside of one. Huge without spheres.
+/// Returns the distance of a point from the nearest sphere in metres; negative inside one, huge without
+/// spheres.
 double distance_to_spheres_m(const std::vector<FittedSphere>& spheres, const glm::dvec3& point_m);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// Which way up a groom's file is, where its face is and how long its unit: guessed from the hair itself when
-// nobody states it, each guess with its reason. Pure functions, any thread.
+// Guesses a groom file's up axis, facing direction and unit from the hair itself when nobody states them.
+// Each guess comes with its reason. Pure functions, any thread.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -9,7 +9,7 @@
 
 namespace strandcast {
 
-/// How a point of a file comes into head space.
+/// Transformation of a file's points into head space.
 struct GroomPlacement {
   bool is_z_up = false;     // +Z up and -Y forward in the file; turned to +Y up and +Z forward
   float yaw_deg = 0.0f;     // then turned about +Y, counter-clockwise seen from above
@@ -31,15 +31,16 @@ struct Guess {
   std::string reason;  // "the hairline is highest there"; empty: nothing to go by, the value is the default
 };
 
-/// Whether +Z is up: when hair covers and hangs from the +Z side clearly more than the +Y side. Any units.
+/// Guesses whether +Z is up: true if hair covers, and hangs from, the +Z side clearly more than the +Y side.
+/// Any units.
 Guess<bool> guess_z_up(const Groom& groom);
 
-/// The turn about +Y, a multiple of 90 degrees, that brings the face to +Z: to where the lowest roots stand
-/// highest. `groom` is upright (+Y), in any unit.
+/// Guesses the rotation about +Y, a multiple of 90 degrees, that turns the face to +Z. The face is where the
+/// lowest roots are highest. `groom` is upright (+Y), in any unit.
 Guess<float> guess_yaw_deg(const Groom& groom);
 
-/// The first of metre, centimetre, millimetre and inch in which the sphere through the roots has the size of
-/// a human head, else whatever makes it one. `groom` is in file units, +Y up.
+/// Guesses the unit: the first of metre, centimetre, millimetre and inch that gives the sphere through the
+/// roots the size of a human head. Otherwise returns the factor that does. `groom` is in file units, +Y up.
 Guess<float> guess_unit(const Groom& groom);
 
 }  // namespace strandcast

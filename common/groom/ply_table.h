@@ -1,5 +1,5 @@
-// PlyTable: the rows of a `.ply` file, element by element, text or binary of either byte order. Knows nothing
-// of strands. Untrusted input. Private to the loader; one thread.
+// PlyTable: reads the rows of a `.ply` file, element by element, text or binary of either byte order. Knows
+// nothing of strands. Untrusted input. Private to the loader; one thread.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +28,8 @@ struct PlyElement {
   uint64_t row_count = 0;
   std::vector<PlyProperty> property;
 
-  /// Index of the property that is called one of these and is (or is no) list; empty when there is none.
+  /// Returns the index of the property with one of these names that is (or is not) a list, as `is_list` says.
+  /// Empty if there is none.
   std::optional<size_t> find(std::initializer_list<std::string_view> names, bool is_list) const;
 };
 
@@ -42,20 +43,20 @@ struct PlyHeader {
 /// Reads and checks the header. BadInput or LimitExceeded name the line.
 Result<PlyHeader> read_ply_header(std::string_view file);
 
-/// Walks through the rows of a body in the order of the file.
+/// Reads the rows of a body in file order.
 class PlyRows {
  public:
   PlyRows(std::string_view file, const PlyHeader& header)
       : text_(file), at_(header.body_at), format_(header.format) {}
 
-  /// Reads the next row of `element`: the values of all its properties, lists one value after another.
-  /// Element, row and property stand in the error's place. The spans hold until the next call.
+  /// Reads the next row of `element`: the values of all properties, lists flattened. Errors name element, row
+  /// and property. The spans stay valid until the next call.
   Status read(const PlyElement& element, uint64_t row);
   double value(size_t property) const { return value_[begin_[property]]; }
   std::span<const double> list(size_t property) const {
     return std::span(value_).subspan(begin_[property], begin_[property + 1] - begin_[property]);
   }
-  /// What is left behind the last row: bytes, or text that is no space.
+  /// Returns the number of unread bytes after the last row; white space does not count in text files.
   size_t left_bytes() const;
 
  private:

@@ -25,10 +25,10 @@ struct ProceduralGroomOptions {
   bool has_bust = false;  // hair that is long enough lies on the built-in head's shoulders
 };
 
-/// Exactly strand_count strands, roots spread evenly over the scalp by area but closer along the parting, all
-/// segments of a strand equally long, the first two vertices pinned. Strands leave along the interpolated
-/// normals, bend over a sphere fitted to the scalp without entering it and leave the face (+Z) free. Strands
-/// come in an order whose prefixes cover the scalp alike. BadInput names the option or the fault of the mesh.
+/// Grows exactly strand_count strands. Roots are spread evenly by area, but closer along the parting. All
+/// segments of a strand have equal length; the first two vertices are pinned. Strands leave along
+/// interpolated normals, bend around a sphere fitted to the scalp, and leave the face (+Z) free. Every prefix
+/// of the strands covers the scalp evenly. BadInput names the option or the mesh's fault.
 Result<Groom> grow_groom(const Mesh& scalp, const ProceduralGroomOptions& options);
 
 }  // namespace strandcast

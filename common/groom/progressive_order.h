@@ -8,10 +8,10 @@
 
 namespace strandcast {
 
-/// The first `limit` indices of an order in which every prefix is spread evenly over the points: a point is
-/// taken only when it is farther than a radius from all taken before it, and the radius shrinks in steps
-/// until enough are taken. Points are tried in a hashed order, which `seed` changes. About n log n.
-/// Coincident points come last.
+/// Returns the first `limit` indices of an order in which every prefix is spread evenly over the points. A
+/// point is taken only if it is farther than a radius from all taken points; the radius shrinks until enough
+/// are taken. Points are tried in a hashed order that depends on `seed`. Takes about n log n. Coincident
+/// points come last.
 std::vector<uint32_t> make_progressive_order(std::span<const glm::vec3> points, uint32_t limit,
                                              uint32_t seed);
 

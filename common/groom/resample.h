@@ -7,9 +7,9 @@
 
 namespace strandcast {
 
-/// The groom with `vertex_count` (2..kMaxVertexCount) vertices per strand at equal arc lengths of the old
-/// polyline. Both ends stay bit for bit; a strand of length zero keeps all vertices on its root. As many
-/// vertices as were pinned at the root and at the tip stay pinned there; pins in between are dropped.
+/// Returns the groom with `vertex_count` (2..kMaxVertexCount) vertices per strand at equal arc lengths along
+/// the old polyline. End points keep their bits; a strand of length zero keeps all vertices at its root.
+/// Vertices pinned at the root and tip keep their number; pins in between are dropped.
 Groom resample(const Groom& groom, uint32_t vertex_count);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// Roots spread evenly over a scalp mesh. Any thread; deterministic.
+// Spreads roots evenly over a scalp mesh. Any thread; deterministic.
 #pragma once
 
 #include <cstdint>
@@ -16,17 +16,17 @@ struct ScalpRoot {
   glm::vec3 normal{0.0f, 1.0f, 0.0f};  // unit
 };
 
-/// Where roots stand closer than elsewhere.
+/// Density of roots over the scalp.
 struct RootSpread {
-  /// Where a point of the scalp is moved to, m, for roots to be even there; empty: they are even on the
-  /// scalp.
+  /// Maps a scalp point (m) to the point at which roots are to be evenly spread; empty: they are even on the
+  /// scalp itself.
   std::function<glm::vec3(const glm::vec3& point_m)> moved;
-  /// It stretches no area by more than this factor.
+  /// Largest factor by which the map stretches an area.
   float most_times = 1.0f;
 };
 
-/// `count` roots on the triangles of the scalp, no two much nearer than the others, in progressive order.
-/// BadInput for a mesh without area, with indices out of range or with coordinates that are not finite.
+/// Spreads `count` roots over the scalp at about equal distances, in progressive order. BadInput for a mesh
+/// without area, with invalid indices or non-finite coordinates.
 Result<std::vector<ScalpRoot>> spread_roots(const Mesh& scalp, uint32_t count, uint32_t seed,
                                             const RootSpread& spread = {});
 

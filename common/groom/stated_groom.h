@@ -1,4 +1,4 @@
-// StatedGroom: what a groom file gives, and what it says of its own units and axes. Plain data.
+// StatedGroom: strands of a groom file with the units and axes that the file states. Plain data.
 #pragma once
 
 #include <optional>

@@ -1,6 +1,6 @@
-// TextScan: lines and words of a text file with LF, CRLF, CR or mixed line ends, and number parsing that does
-// not depend on the locale. Used by the text loaders of this folder. Any thread; views into the text, which
-// must outlive it.
+// TextScan: reads lines and words of text with LF, CRLF, CR or mixed line ends, and parses numbers
+// independently of the locale. Used by the text loaders of this folder. Any thread; holds views into the
+// text, which must outlive it.
 #pragma once
 
 #include <fmt/format.h>
@@ -21,7 +21,7 @@ class TextScan {
  public:
   explicit TextScan(std::string_view text) : text_(text) {}
 
-  /// Moves to the next line; false at the end of the text.
+  /// Moves to the next line; returns false at the end of the text.
   bool next_line() {
     if (begin_ >= text_.size()) return false;
     size_t end = text_.find_first_of("\r\n", begin_);
@@ -33,7 +33,7 @@ class TextScan {
     return true;
   }
 
-  /// Moves to the next line that has a word on it.
+  /// Moves to the next line that contains a word.
   bool next_filled_line() {
     while (next_line()) {
       skip_space();
@@ -42,7 +42,7 @@ class TextScan {
     return false;
   }
 
-  /// The next word of the line; empty at its end. Blanks, tabs and commas separate words.
+  /// Returns the next word of the line, empty at its end. Blanks, tabs and commas separate words.
   std::string_view next_word() {
     skip_space();
     size_t end = rest_.find_first_of(kSpace);
@@ -63,7 +63,7 @@ class TextScan {
   uint32_t line_ = 0;
 };
 
-/// The whole word as a number; empty when it is not one or does not fit. Infinities and NaN are numbers here.
+/// Parses the whole word as a number; empty if it is none or does not fit. Accepts infinities and NaN.
 template <class T>
 std::optional<T> parse_number(std::string_view word) {
   if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
@@ -73,13 +73,13 @@ std::optional<T> parse_number(std::string_view word) {
   return value;
 }
 
-/// A word from a file for an error message: its first 40 characters, fit for one line.
+/// Quotes a word from a file for an error message: its first 40 characters, cleaned for one line.
 inline std::string quoted(std::string_view word) {
   constexpr size_t kMaxQuotedChars = 40;
   return fmt::format("'{}'", excerpt(word, kMaxQuotedChars));
 }
 
-/// An error with the number of the line that the scan is at.
+/// Makes an error that names the current line of the scan.
 template <class... Args>
 Error line_error(const TextScan& scan, ErrorCode code, fmt::format_string<Args...> format, Args&&... args) {
   return at(fmt::format("line {}", scan.line()), make_error(code, format, std::forward<Args>(args)...));

@@ -11,15 +11,15 @@
 
 namespace strandcast {
 
-/// Loads a `.tfx` file in file units. Version 4 says which vertices are pinned; versions 3 and 2 pin the
-/// first two, and the last two when their "both ends" flag is set. Vertex 0 is pinned always. Follower
-/// settings and the scale, rotation and translation of version 2 are notes of the exporter about the
-/// coordinates and are not applied. Errors name the file and the offending field, strand, vertex or line.
+/// Loads a `.tfx` file in file units. Version 4 states which vertices are pinned. Versions 3 and 2 pin the
+/// first two vertices, and the last two if their "both ends" flag is set. Vertex 0 is always pinned. Follower
+/// settings and version 2's scale, rotation and translation are exporter notes and are not applied. Errors
+/// name the file and the offending field, strand, vertex or line.
 Result<Groom> load_tfx(const std::filesystem::path& path);
 
-/// The binary versions from bytes in memory; errors carry no file name.
+/// Reads the binary versions from bytes in memory; errors carry no file name.
 Result<Groom> read_tfx_binary(const ByteView& file);
-/// The text version from text in memory; errors carry the line only.
+/// Reads the text version from text in memory; errors carry the line only.
 Result<Groom> read_tfx_text(std::string_view text);
 
 }  // namespace strandcast

@@ -1,6 +1,6 @@
-// UsdaScan: words, numbers, strings and arrays of USD's text form, and whatever value nobody asks for, in one
-// step. Strict: what is no USD is an error with its line. Views into the text, which must outlive it.
-// Private to the loader; one thread.
+// UsdaScan: reads words, numbers, strings and arrays of USD text, and skips values of any type. Strict:
+// malformed text is an error with its line. Views into the text, which must outlive it. Private to the
+// loader; one thread.
 #pragma once
 
 #include <cstddef>
@@ -20,24 +20,24 @@ class UsdaScan {
  public:
   explicit UsdaScan(std::string_view text) : text_(text) {}
 
-  /// Past spaces, line ends, semicolons and comments.
+  /// Skips spaces, line ends, semicolons and comments.
   void skip_space();
-  /// After spaces: the next character, 0 at the end.
+  /// Skips space and returns the next character without consuming it; 0 at the end.
   char peek();
   bool is_at_end() { return peek() == 0; }
-  /// Takes the character when it is the next one after spaces.
+  /// Skips space and consumes the next character if it is `c`; returns whether it was.
   bool take(char c);
   Status expect(char c);
 
-  /// The next name or number: letters, digits and "_:.+-!". Empty when there is none.
+  /// Reads the next name or number: letters, digits and "_:.+-!". Empty if there is none.
   std::string_view word();
-  /// A whole string in any of USD's quotes, escapes as they stand; BadInput when there is none.
+  /// Reads a string in any of USD's quotes; escapes are not resolved. BadInput if there is none.
   Result<std::string_view> string();
   Result<double> number();
-  /// "1.5 :", what stands before a time sample.
+  /// Reads the time before a time sample, as in "1.5 :".
   Result<double> time_code();
 
-  /// Numbers of a value in the order of the text, through all brackets: of a scalar, tuple or matrix; at most
+  /// Reads all numbers of a value (scalar, tuple or matrix) in text order, through all brackets; at most
   /// `limit`. Empty for "None".
   Result<std::vector<double>> numbers(size_t limit);
   Result<std::vector<glm::vec3>> points(size_t limit);
@@ -45,17 +45,17 @@ class UsdaScan {
   Result<std::vector<uint32_t>> counts(size_t limit);
   Result<std::vector<std::string_view>> strings(size_t limit);
 
-  /// Past a value of any type.
+  /// Skips a value of any type.
   Status skip_value();
-  /// From the inside of brackets past the one that closes them.
+  /// Skips from inside brackets past the matching closing one.
   Status skip_rest(char closing);
 
-  /// With the line that the scan has come to.
+  /// Makes an error that names the current line.
   template <class... Args>
   Error error(ErrorCode code, fmt::format_string<Args...> format, Args&&... args) const {
     return at(fmt::format("line {}", line()), make_error(code, format, std::forward<Args>(args)...));
   }
-  /// What stands next, for an error.
+  /// Quotes the next characters for an error message.
   std::string found();
 
  private:

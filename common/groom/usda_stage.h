@@ -1,6 +1,6 @@
-// UsdaStage: of a USD text file what strands need: its unit and up axis, the tree of prims with their
-// transforms, and the curves. No composition: what a file refers to is counted and not read. Untrusted input.
-// Private to the loader; one thread.
+// UsdaStage: the parts of a USD text file that strands need: unit, up axis, the tree of prims with
+// transforms, and curves. No composition: references are counted and not followed. Untrusted input. Private
+// to the loader; one thread.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@ namespace strandcast {
 inline constexpr size_t kMaxUsdaPrims = 100'000;
 inline constexpr size_t kMaxUsdaXformOps = 32;  // of one prim
 
-/// A BasisCurves prim as written.
+/// A BasisCurves prim as the file states it.
 struct UsdaCurves {
   std::vector<glm::vec3> points;
   std::vector<uint32_t> vertex_counts;
@@ -51,13 +51,13 @@ struct UsdaStage {
   size_t other_curve_count = 0;  // NurbsCurves, HermiteCurves
 };
 
-/// BadInput or LimitExceeded name the line.
+/// Reads a stage; BadInput and LimitExceeded name the line.
 Result<UsdaStage> read_usda_stage(std::string_view text);
 
-/// Whether this prim or one that it is in is left out.
+/// Returns whether this prim or one of its ancestors is left out.
 bool is_left_out(const UsdaStage& stage, size_t prim);
 
-/// How points of this prim come into those of the file. BadInput for an op that is not known.
+/// Returns the transform from a prim's points to the file's space. BadInput for an unknown transform op.
 Result<glm::dmat4> world_from_prim(const UsdaStage& stage, size_t prim);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// WindingTree: how often triangles wind around a point. Immutable; any thread.
+// WindingTree: computes the winding number of triangles about a point. Immutable; any thread.
 #pragma once
 
 #include <array>
@@ -12,12 +12,12 @@ using Triangle = std::array<glm::dvec3, 3>;  // counter-clockwise seen from outs
 
 class WindingTree {
  public:
-  /// At least one triangle; all have an area.
+  /// Builds the tree; needs at least one triangle, and every triangle must have an area.
   explicit WindingTree(const std::vector<Triangle>& triangles);
 
-  /// Generalised winding number: 1 inside of a closed mesh, 0 outside, in between where it has holes. What is
-  /// far away counts as one dipole (Barill and others 2018, "Fast winding numbers for soups and clouds",
-  /// section 4, of the first order): some hundredths off.
+  /// Returns the generalised winding number: 1 inside a closed mesh, 0 outside, in between near holes.
+  /// Distant triangles count as one dipole (Barill and others 2018, "Fast winding numbers for soups and
+  /// clouds", section 4, first order). The error is some hundredths.
   double winding_number(const glm::dvec3& point) const;
 
  private:

@@ -1,7 +1,7 @@
-// Logging: one logger per process, tags are the stage names (input, scene, sim, publish, encode, net, replay,
-// render). Any thread. Never waits for whoever reads the log, and cleans what it writes: texts of strangers
-// may stand in it. Levels: error = a person must act, warn = degraded, info = state changes, debug = for
-// developers. Never logs tokens.
+// Logging: one logger per process; tags are stage names (input, scene, sim, publish, encode, net, replay,
+// render). Any thread. Never waits for the reader of the log. Texts from outside are cleaned before they are
+// written. Levels: error = a person must act, warn = degraded, info = state changes, debug = for developers.
+// Never logs tokens.
 #pragma once
 
 #include <fmt/format.h>
@@ -14,20 +14,20 @@ namespace strandcast {
 
 enum class LogLevel { Debug, Info, Warn, Error };
 
-/// Longest message of one line; the rest is cut.
+/// Longest message of one line, in characters; longer messages are cut.
 inline constexpr size_t kMaxLogMessageChars = 2'000;
 
-/// How a line looks: for people, or one JSON object with time (UTC), level, tag and message, for programs.
+/// Format of a line: text for people, or for programs a JSON object with time (UTC), level, tag and message.
 enum class LogFormat { Text, Json };
 
-/// Sends logs to standard error at `level` ("debug", "info", "warn", "error", "off"); false if unknown. A
-/// reader of the process's output that goes away no longer ends it (SIGPIPE is ignored from here on).
+/// Sends logs to standard error at `level` ("debug", "info", "warn", "error", "off"); returns false for an
+/// unknown level. From then on SIGPIPE is ignored, so a closed standard error does not end the process.
 bool init_log(const std::string& level, LogFormat format = LogFormat::Text);
 
 bool is_logged(LogLevel level);
-/// One line; `message` is cleaned as by one_line().
+/// Logs one line; `message` is cleaned by one_line().
 void log_line(LogLevel level, const char* tag, std::string_view message);
-/// Lines that found no room on standard error, since start.
+/// Number of lines since start that were dropped because standard error could not take them.
 uint64_t dropped_log_lines();
 
 template <class... Args>

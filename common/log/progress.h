@@ -1,5 +1,4 @@
-// Progress: tells a person at the terminal which run of how many is under way and how long the rest will
-// take. One thread.
+// Progress: shows on the terminal which run is under way, of how many, and the remaining time. One thread.
 #pragma once
 
 #include <cstdint>
@@ -21,13 +20,14 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// Adds work to come, in any unit of cost in which all of it is measured.
+  /// Adds future work: a number of runs and their total cost, in any unit that is used throughout.
   void expect(uint32_t runs, double cost);
-  /// The next run begins; prints at most ten times a second, to standard error.
+  /// Marks the beginning of the next run; prints to standard error at most ten times a second.
   void begin_run(std::string_view name);
-  /// The run under way is over and had this cost.
+  /// Marks the end of the current run, which had this cost.
   void end_run(double cost);
-  /// Seconds until all that is expected is done, from the pace so far; NaN before the first end_run().
+  /// Estimates the seconds until all expected work is done from the pace so far; NaN before the first
+  /// end_run().
   double seconds_left() const;
 
  private:

@@ -1,6 +1,6 @@
-// The bust under a head: neck and chest in a pose of their own. The chest is turned about the top of the
-// neck, and the neck is bent between head and chest, by a share that grows with the way down. Pure functions,
-// any thread; + - * / and roots of doubles only, so that everybody has the same bits.
+// Bust: neck and chest under a head, with a pose of their own. The chest rotates about the top of the neck.
+// Between head and chest the neck bends by a share that grows downwards. Pure functions, any thread. They use
+// only + - * / and square roots of doubles, so results are the same bits on every machine.
 #pragma once
 
 #include <cstdint>
@@ -9,46 +9,49 @@
 
 namespace strandcast {
 
-/// Where a mesh has its neck. Head space, at rest.
+/// Location of the neck of a mesh at rest, in head space.
 struct BustRig {
   glm::vec3 pivot_m{0.0f};  // top of the neck
-  /// Of a place p the chest's share is smooth(t), t = share.w - dot(share.xyz, p): 0 head .. 1 chest.
+  /// Plane that gives the chest's share of the motion at point p: smooth(t) with t = share.w - dot(share.xyz,
+  /// p). 0 is head, 1 is chest.
   glm::vec4 share{0.0f};
 
-  /// Without it the bust is as rigid as the head.
+  /// Returns whether the mesh has a bust; without one, it moves rigidly with the head.
   bool exists() const { return glm::vec3(share) != glm::vec3(0.0f); }
   bool operator==(const BustRig&) const = default;
 };
 
-/// How the chest is turned against the head: x, y, z of a unit quaternion with w > 0, head space. Zero: not.
+/// Rotation of the chest relative to the head: x, y, z of a unit quaternion with w > 0, in head space. Zero
+/// means no rotation.
 using BustTurn = glm::dvec3;
 
-/// Tangents of half of the most that a neck turns about its own axis (75 degrees) and bends (35); beyond that
-/// the chest goes along.
+/// Limits of the neck, as tangents of half the angle: 75 degrees about its own axis, 35 degrees of bending.
+/// The chest follows rotations beyond them.
 inline constexpr double kMostTurnTangent = 0.7673;
 inline constexpr double kMostBendTangent = 0.3153;
 
-/// A chest's rotation in the world in 32 bits, as snapshots have it. From the lowest: 12 bits heading, 10
-/// bits lean forwards, 10 bits lean sideways. It is never kRigidBust.
+/// Rotation of a chest in the world, packed into 32 bits for snapshots. From the lowest bit: 12 bits heading,
+/// 10 bits leaning forwards, 10 bits leaning sideways. Never equals kRigidBust.
 using BustCode = uint32_t;
 inline constexpr BustCode kRigidBust = 0;  // the chest is turned as the head is
 BustCode bust_code(const glm::dquat& world_from_chest);
-/// What is left of a rotation after that; the identity for kRigidBust and what is no code.
+/// Decodes a packed rotation; returns the identity for kRigidBust and for invalid codes.
 glm::dquat chest_of(BustCode code);
 
-/// From one turn to the other, exact at both ends.
+/// Interpolates between two rotations by `share` (0..1), exact at both ends.
 BustTurn between(const BustTurn& from, const BustTurn& to, double share);
 
-/// The chest under this head, no further than necks turn. A turn below a tenth of a degree is none.
+/// Returns the rotation of the chest relative to this head, limited to what a neck can turn. Rotations below
+/// a tenth of a degree become zero.
 BustTurn bust_turn(BustCode code, const glm::dquat& world_from_head);
 
-/// 0 head .. 1 chest, of a place at rest.
+/// Share of the chest's motion at a point at rest (head space, m): 0 is head, 1 is chest.
 double bust_share(const BustRig& rig, const glm::dvec3& rest_m);
-/// Where the skin's place at rest is under this turn.
+/// Moves a point of the skin from its rest position (head space, m) to where this rotation takes it.
 glm::dvec3 with_bust(const BustRig& rig, const BustTurn& turn, const glm::dvec3& rest_m);
-/// The other way round, to 0.05 mm of a head's size.
+/// Inverse of with_bust(), exact to 0.05 mm within the size of a head.
 glm::dvec3 without_bust(const BustRig& rig, const BustTurn& turn, const glm::dvec3& point_m);
-/// A direction of the skin at this place at rest.
+/// Rotates a direction attached to the skin at this rest position (head space, m).
 glm::dvec3 turned_with_bust(const BustRig& rig, const BustTurn& turn, const glm::dvec3& rest_m,
                             const glm::dvec3& direction);
 

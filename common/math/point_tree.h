@@ -11,7 +11,7 @@ namespace strandcast {
 
 class PointTree {
  public:
-  /// `points` must outlive the tree.
+  /// Builds the tree; `points` must outlive it.
   explicit PointTree(std::span<const glm::vec3> points);
 
   struct Neighbour {
@@ -23,7 +23,7 @@ class PointTree {
     }
   };
 
-  /// The `count` points nearest to `center`, nearest first (fewer when there are not so many).
+  /// Returns the `count` points nearest to `center`, nearest first; fewer if the tree holds fewer.
   std::vector<Neighbour> nearest(const glm::vec3& center, uint32_t count) const;
 
  private:

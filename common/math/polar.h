@@ -1,5 +1,4 @@
-// Polar: where something is about a point, as people say it: how far, how far round and how high. Pure maths,
-// any thread.
+// Polar: position about a centre as distance, azimuth and elevation. Pure functions, any thread.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +13,7 @@ struct Polar {
   float pitch_rad = 0.0f;  // above the horizon
 };
 
-/// `offset_m` has a length.
+/// Converts an offset from the centre, which must not be zero.
 inline Polar to_polar(const glm::vec3& offset_m) {
   const float distance_m = glm::length(offset_m);
   return {distance_m, std::atan2(offset_m.x, offset_m.z),

@@ -8,7 +8,8 @@
 
 namespace strandcast {
 
-/// world_from_head as translation and unit quaternion; world_from_head * point_in_head reads right.
+/// A pose: translation and unit quaternion, used as world_from_head; world_from_head * point_in_head
+/// transforms a point.
 struct Pose {
   glm::dvec3 position_m{0.0};
   glm::dquat rotation{1.0, 0.0, 0.0, 0.0};  // (w, x, y, z), unit length
@@ -17,13 +18,13 @@ struct Pose {
   bool operator==(const Pose&) const = default;
 };
 
-/// True when every component is finite.
+/// Returns true if every component is finite.
 bool is_finite(const Pose& pose);
 
-/// Straight line for the position, shortest arc for the rotation; blend 0 gives a, 1 gives b.
+/// Interpolates position on a straight line and rotation on the shortest arc; `blend` 0 gives a, 1 gives b.
 Pose interpolate(const Pose& a, const Pose& b, double blend);
 
-/// Angle in radians of the rotation from a to b, 0..pi.
+/// Returns the angle of the rotation from a to b in radians, 0..pi.
 double angle_between_rad(const glm::dquat& a, const glm::dquat& b);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// SphereCollider: what strands do not pass. Plain data, any thread.
+// SphereCollider: a sphere that strands do not penetrate. Plain data, any thread.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
-// Head motion out of BVH motion capture files: the whole hierarchy is parsed, only the path from the root to
-// the head is evaluated, in double. Input is untrusted: every limit is checked before anything is allocated.
-// Any thread.
+// Reads head motion from BVH motion capture files. The whole hierarchy is parsed, but only the path from the
+// root to the head is evaluated, in double. Input is untrusted: limits are checked before anything is
+// allocated. Any thread.
 #pragma once
 
 #include <filesystem>
@@ -19,25 +19,26 @@ inline constexpr uint32_t kMaxBvhDepth = 128;
 inline constexpr uint32_t kMaxBvhFrames = 1'000'000;
 inline constexpr double kMinFrameTimeS = 1e-4, kMaxFrameTimeS = 10.0;
 
-/// Bones from the lowest to the highest point of a grown-up: the body, and the foot's length.
+/// Assumed size of an adult's skeleton, from its lowest to its highest joint, and of its foot.
 inline constexpr double kAssumedBodyHeightM = 1.7;
 
-/// That clips give: as many as a motion stream takes.
+/// Largest number of joints taken from a clip; a motion stream holds as many.
 inline constexpr size_t kMaxBodyJoints = 12;
 
 struct LengthUnit {
   double m = 1.0;
   const char* name = "";  // of several, as in "bones of 180 cm"
 };
-/// Units that clips come in. CMU's unit, 1 / 0.45 of an inch, is that of its Acclaim files and of conversions
-/// that keep their numbers.
+/// Known units of clips. CMU's unit, 1 / 0.45 of an inch, is that of its Acclaim files; some conversions keep
+/// its numbers.
 inline constexpr LengthUnit kClipUnits[] = {
     {1e-3, "mm"}, {1e-2, "cm"},     {0.0254, "inches"}, {0.0254 / 0.45, "CMU's units"},
     {0.1, "dm"},  {0.3048, "feet"}, {1.0, "m"}};
-/// A guess this near to one of them means that one.
+/// Relative distance within which a guessed unit is replaced by a known one.
 inline constexpr double kUnitSnap = 0.25;
 
-/// The head of a resting body is so many times as far above the hips as it is beside them.
+/// Factor by which the resting head must be farther above the hips than beside them for an axis to count as
+/// up.
 inline constexpr double kUpClearly = 2.0;
 
 struct BvhOptions {
@@ -53,13 +54,13 @@ struct BvhOptions {
   bool recentre = true;  // subtract the first pose's horizontal position
 };
 
-/// World poses of the head joint, one per frame. The rest pose of the file (all rotations zero) is taken to
-/// look along +Z when +Y is up, and along -Y when +Z is up (all known files do); it becomes the identity, +Z
-/// forward, +Y up. Rotations are applied in the order of CHANNELS; a position channel on any joint replaces
-/// that axis of its OFFSET. BadInput and LimitExceeded name file and line; NotFound lists the joints.
+/// Loads world poses of the head joint, one per frame. Rotations are applied in the order of CHANNELS; a
+/// position channel of any joint replaces that axis of its OFFSET. The rest pose (all rotations zero) is
+/// assumed to look along +Z if +Y is up, and along -Y if +Z is up, as in all known files. It becomes the
+/// identity: +Z forward, +Y up. BadInput and LimitExceeded name file and line; NotFound lists the joints.
 Result<MotionClip> load_bvh(const std::filesystem::path& path, const BvhOptions& options);
 
-/// As load_bvh, from text; `place` names it in errors.
+/// Parses BVH text like load_bvh(); `place` names it in errors.
 Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, const BvhOptions& options);
 
 }  // namespace strandcast

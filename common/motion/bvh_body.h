@@ -1,5 +1,5 @@
-// Which joints of a clip are neck, chest, shoulders and elbows, by the names that captures give them: those
-// of the CMU files and of most programs. Any thread.
+// Finds neck, chest, shoulders and elbows among a clip's joints by their usual names, as CMU's files and most
+// programs use them. Any thread.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace strandcast {
 
-/// Pairs of a name that body presets know (common/scene/body_desc.h) and an index into the names of a file;
-/// what has no usual name is not there. A prefix ending in ':' or '_' does not count, nor does case.
+/// Returns pairs of a joint name of the body presets (common/scene/body_desc.h) and its index in the file's
+/// names. Joints without a usual name are missing. Case and a prefix ending in ':' or '_' are ignored.
 std::vector<std::pair<std::string, size_t>> usual_body(const std::vector<std::string>& joint_names);
 
 }  // namespace strandcast

@@ -1,6 +1,6 @@
-// ClipPath: a clip of head motion as it is played. It begins from rest, and where it is looped the head is
-// led from the clip's end back to its start, at no more than the speeds and accelerations that the clip has
-// itself. Any thread. Does not read files (motion_file.h).
+// ClipPath: playback of a clip of head motion. Motion begins from rest. In a loop the head is led from the
+// clip's end back to its start, within the speeds and accelerations of the clip itself. Any thread. Does not
+// read files (motion_file.h).
 #pragma once
 
 #include <glm/glm.hpp>
@@ -11,29 +11,30 @@
 
 namespace strandcast {
 
-/// Over this time a motion sets in, and at least so long is the way back of a loop.
+/// Time in which a motion accelerates from rest, and the shortest way back in a loop, in seconds.
 inline constexpr double kClipBlendS = 0.3;
-/// A way back takes no longer, however far it is.
+/// Longest duration of the way back in a loop.
 inline constexpr double kLongestWayBackS = 10.0;
 
-/// Motion time at time t of a motion that sets in over `blend_s`: its speed rises from 0 to 1, twice
-/// differentiable. From then on it is half of `blend_s` behind. 0 = at once.
+/// Returns the time within a motion that starts from rest at t = 0. Its speed rises from 0 to 1 over
+/// `blend_s`, twice differentiable; from then on it lags by half of `blend_s`. 0 starts at once.
 double time_from_rest_s(double t_s, double blend_s);
 
-/// Fastest movement and strongest acceleration from sample to sample, of place and of rotation.
+/// Greatest speeds and accelerations between samples, of position and rotation.
 struct MotionPeaks {
   double mps = 0.0;
   double mps2 = 0.0;
   double rad_per_s = 0.0;
   double rad_per_s2 = 0.0;
 
-  /// The larger of both, each by itself.
+  /// Returns the larger of each pair of values.
   MotionPeaks with(const MotionPeaks& other) const;
-  /// True where none is larger than `factor` times that of `other`.
+  /// Returns whether no value exceeds `factor` times that of `other`.
   bool is_within(const MotionPeaks& other, double factor) const;
 };
 
-/// Of poses that are `step_s` apart. A `share` below 1 gives what that share of them keeps to.
+/// Returns the peaks of poses that are `step_s` apart. With a `share` below 1, the values that this share of
+/// the samples does not exceed.
 MotionPeaks peaks_of(const std::vector<Pose>& poses, double step_s, double share = 1.0);
 
 struct ClipPathOptions {
@@ -45,13 +46,14 @@ class ClipPath {
  public:
   ClipPath(MotionClip clip, const ClipPathOptions& options);
 
-  /// Pose at time t of playing; beyond the end of a clip that is not looped its last pose.
+  /// Returns the pose at playing time t; after the end of a clip that is not looped, its last pose.
   Pose sample(double t_s) const;
-  /// Places of the clip's joints at time t, likewise; head space, m.
+  /// Returns the positions of the clip's joints at playing time t, in head space, m; like sample().
   std::vector<glm::dvec3> sample_joints(double t_s) const;
-  /// When the clip's last pose is reached for the first time, s.
+  /// Returns the time at which the clip's last pose is first reached, s.
   double duration_s() const;
-  /// How long the head takes from the end to the start, s; 0 where it is not looped or not blended.
+  /// Returns the duration of the head's way from the clip's end to its start, s; 0 if it is not looped or not
+  /// blended.
   double way_back_s() const { return way_back_s_; }
   const MotionClip& clip() const { return clip_; }
 

@@ -1,5 +1,5 @@
 // Head motion and wind as functions of time, for the feeder and for tests. Built-in generators are
-// deterministic. Files: bvh.h and wind_csv.h. Not the network streams themselves (common/wire, server/input).
+// deterministic. Files are read in bvh.h and wind_csv.h; network streams are in common/wire and server/input.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace strandcast {
 
-/// Head poses at a fixed rate; loops seamlessly only if the data does.
+/// Head poses at a fixed rate; the clip loops seamlessly only if its data does.
 struct MotionClip {
   double frame_s = 1.0 / 60.0;
   std::vector<Pose> world_from_head;  // one per frame
@@ -23,11 +23,12 @@ struct MotionClip {
   std::string unit_reason;          // why this unit, when nobody stated it; else empty
   std::string up_reason;            // likewise why not +Y, of a file with another up axis
 
-  /// Time of the last pose, s; 0 for an empty clip.
+  /// Returns the time of the last pose, s; 0 for an empty clip.
   double duration_s() const;
-  /// Pose at time t (lerp/slerp), clamped to the clip; the identity for an empty clip.
+  /// Returns the pose at time t (linear and spherical interpolation), clamped to the clip; the identity for
+  /// an empty clip.
   Pose sample(double t_s) const;
-  /// Places of the joints at time t, likewise.
+  /// Returns the positions of the joints at time t, clamped to the clip.
   std::vector<glm::dvec3> sample_joints(double t_s) const;
 };
 
@@ -37,25 +38,26 @@ struct WindSeries {
   std::vector<glm::vec3> velocity_mps;
   std::vector<std::string> repairs;  // what a file needed to be read, a sentence for each kind
 
-  /// Time of the last sample, s; 0 for an empty series.
+  /// Returns the time of the last sample, s; 0 for an empty series.
   double duration_s() const;
-  /// Velocity at time t, linear, clamped to the series; zero for an empty series.
+  /// Returns the velocity at time t, linearly interpolated and clamped to the series; zero for an empty
+  /// series.
   glm::vec3 sample(double t_s) const;
 };
 
-/// Built-in head motion: walking bob, looks to the sides, nods and one fast turn, repeating every
-/// kBuiltInMotionPeriodS; smooth (twice differentiable) everywhere.
+/// Returns a pose of the built-in head motion: walking, looks to the sides, nods and one fast turn. Repeats
+/// every kBuiltInMotionPeriodS and is twice differentiable.
 Pose built_in_motion(double t_s);
 inline constexpr double kBuiltInMotionPeriodS = 12.0;
 
-/// Seeded turbulence about a mean wind: a sum of harmonics whose amplitudes follow the von Karman spectrum
-/// with the given intensity (standard deviation / mean speed, along the mean) and integral length; 0.8 and
-/// 0.5 times as strong sideways and across (IEC 61400-1). Without a mean there are no gusts. Any t; same
-/// seed, same wind.
+/// Seeded turbulence about a mean wind: a sum of harmonics whose amplitudes follow the von Karman spectrum.
+/// `intensity` is standard deviation / mean speed along the mean; it is 0.8 times as strong sideways and 0.5
+/// times across (IEC 61400-1). Without a mean there are no gusts. Works for any t; the same seed gives the
+/// same wind.
 class GustGenerator {
  public:
   GustGenerator(const glm::vec3& mean_mps, float intensity, float length_m, uint32_t seed);
-  /// Wind velocity at time t, m/s, world.
+  /// Returns the wind velocity at time t, m/s, world axes.
   glm::vec3 sample(double t_s) const;
 
  private:

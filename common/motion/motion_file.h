@@ -1,5 +1,5 @@
-// Head motion from a person's own file, with what was assumed about it in sentences to be shown once. The
-// feeder and the reports read files by this. Any thread.
+// Loads head motion from a user's file, with sentences that state the assumptions made. Feeder and reports
+// use it. Any thread.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +11,7 @@
 
 namespace strandcast {
 
-/// What programs call their option for the same.
+/// Options of loading, with the names of the matching command line options.
 struct MotionFileOptions {
   double unit_m = 0.0;                        // --unit; 0 = guessed
   std::string up;                             // --up: y or z; empty = guessed
@@ -27,7 +27,7 @@ struct MotionFile {
   std::vector<std::string> notes;  // each begins with the file's name
 };
 
-/// Errors are those of load_bvh; BadInput for an unknown axis.
+/// Loads a file. Returns the errors of load_bvh(), and BadInput for an unknown axis.
 Result<MotionFile> load_motion_file(const std::filesystem::path& path, const MotionFileOptions& options);
 
 }  // namespace strandcast

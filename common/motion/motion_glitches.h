@@ -1,5 +1,5 @@
-// Glitches of a motion capture: steps from one frame to the next that no head makes, and first frames that
-// are not of the motion. Found, counted, and taken out. Any thread.
+// Glitches of motion capture: steps between frames that no head can make, and first frames that are not part
+// of the motion. Finds, counts and removes them. Any thread.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,8 @@
 
 namespace strandcast {
 
-/// A sprinter's head moves at 12 m/s, and the fastest turns of the takes at hand are below 2,000 degrees/s.
+/// Fastest plausible head motion. A sprinter's head moves at 12 m/s, and the fastest rotations in known takes
+/// are below 2,000 degrees/s.
 inline constexpr double kMaxHeadMps = 15.0;
 inline constexpr double kMaxHeadDegPerS = 3000.0;
 
@@ -21,29 +22,32 @@ struct MotionGlitches {
 
 MotionGlitches find_glitches(const MotionClip& clip);
 
-/// Replaces every frame that cannot be reached from the last good one within the limits by what lies between
-/// the good frames around it; at the end the last good one stays. Returns how many frames were replaced;
+/// Replaces every frame that the last good one cannot reach within the limits by an interpolation of the good
+/// frames around it. At the end the last good frame is held. Returns the number of replaced frames;
 /// find_glitches() then finds none.
 uint32_t filter_glitches(MotionClip& clip);
 
-/// First frames are judged within this time, by what follows them for this long.
+/// Time at the beginning of a clip that is searched for wrong first frames, and time after it that they are
+/// compared with.
 inline constexpr double kFirstFramesS = 0.1, kFirstFramesAfterS = 0.25;
-/// A step out of them is so many times the median step of what follows, and at least as fast as this.
+/// A jump out of the first frames exceeds the median step of the following frames by this ratio, and this
+/// speed.
 inline constexpr double kFirstFramesRatio = 6.0;
 inline constexpr double kFirstFramesMps = 0.5;
 inline constexpr double kFirstFramesDegPerS = 90.0;
 
-/// Frames before a motion begins, as the T-pose that a capture was calibrated with.
+/// Frames before a motion begins, for example a calibration pose (T-pose).
 struct FirstFrames {
   uint32_t count = 0;     // up to the last jump out of them
   double jump_m = 0.0;    // the longest
   double jump_deg = 0.0;  // the widest
 };
 
-/// Judges the first frames by the steps of the frames behind them; none in a clip that is too short for that.
+/// Finds wrong first frames by comparing their steps with those of later frames; none if the clip is too
+/// short for that.
 FirstFrames find_first_frames(const MotionClip& clip);
 
-/// Takes so many frames from the beginning of a clip that has more; its time begins with the next one.
+/// Removes `count` frames from the beginning of a longer clip; time then begins with the next frame.
 void leave_out_first_frames(MotionClip& clip, uint32_t count);
 
 }  // namespace strandcast

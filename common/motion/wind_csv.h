@@ -1,4 +1,4 @@
-// Wind velocity over time out of CSV files. Input is untrusted: limits are checked before anything is
+// Reads wind velocity over time from CSV files. Input is untrusted: limits are checked before anything is
 // allocated.
 #pragma once
 
@@ -15,18 +15,19 @@ inline constexpr uint32_t kMaxWindRows = 1'000'000;
 inline constexpr uint32_t kMaxWindColumns = 256;
 inline constexpr double kMaxWindSpeedMps = 150.0;
 
-/// Values under a header row, separated by commas, or by semicolons or tabs, and then perhaps with decimal
-/// commas; columns are found by name, in any order, others are ignored, and so are empty lines and lines that
-/// begin with '#'. Time: `t_s` or `time_s` (seconds) or `logger_ms` (milliseconds); the first row becomes 0.
-/// Velocity, m/s: `x_mps`, `y_mps`, `z_mps` in world axes (+Y up), or `u`, `v`, `w` as meteorologists write
-/// it (towards east, towards north, up), which becomes world x = u, y = w, z = -v. A log is repaired as far
-/// as most of it can be used, and every kind of repair is a sentence with its count: rows that cannot be read
-/// (NaN, empty, beyond kMaxWindSpeedMps) or go back in time are left out, and so are repetitions; rows that
-/// share a time are spread evenly up to the next one; gaps are bridged by WindSeries::sample. BadInput and
-/// LimitExceeded name file, line and column.
+/// Loads a wind series. BadInput and LimitExceeded name file, line and column.
+/// Format: values under a header row, separated by commas, or by semicolons or tabs (then decimal commas are
+/// allowed). Columns are found by name in any order; other columns, empty lines and lines that begin with '#'
+/// are ignored.
+/// Time: `t_s` or `time_s` (seconds), or `logger_ms` (milliseconds); the first row becomes 0.
+/// Velocity in m/s: `x_mps`, `y_mps`, `z_mps` in world axes (+Y up), or the meteorologists' `u`, `v`, `w` (to
+/// the east, to the north, up). The latter become world x = u, y = w, z = -v.
+/// Repairs: rows that cannot be read (NaN, empty, beyond kMaxWindSpeedMps), that go back in time or that
+/// repeat are dropped. Rows that share a time are spread evenly up to the next one; WindSeries::sample()
+/// bridges gaps. Each kind of repair is reported in a sentence with its count.
 Result<WindSeries> load_wind_csv(const std::filesystem::path& path);
 
-/// As load_wind_csv, from text; `place` names it in errors.
+/// Parses CSV text like load_wind_csv(); `place` names it in errors.
 Result<WindSeries> parse_wind_csv(const std::string& text, const std::string& place);
 
 }  // namespace strandcast

@@ -5,10 +5,10 @@
 
 namespace strandcast {
 
-/// BadInput for empty pictures and sizes that disagree, LimitExceeded above kMaxImageSide.
+/// Returns BadInput for empty images and for sizes that disagree, LimitExceeded above kMaxImageSide.
 Status check_image(const Image& image);
 Status check_image_size(uint64_t width, uint64_t height);
-/// LimitExceeded outside the sizes of picture_size.h.
+/// Returns LimitExceeded outside the sizes of picture_size.h.
 Status check_picture_size(uint64_t width, uint64_t height);
 
 }  // namespace strandcast

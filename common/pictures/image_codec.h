@@ -1,5 +1,5 @@
-// Pictures: JPEG by libjpeg-turbo (picture stream), PNG by libpng (screenshots), animated WebP by libwebp
-// (clips).
+// Image formats: JPEG by libjpeg-turbo (picture stream), PNG by libpng (screenshots), animated WebP by
+// libwebp (clips).
 #pragma once
 
 #include <cstddef>
@@ -24,21 +24,21 @@ struct Image {
   bool operator==(const Image&) const = default;
 };
 
-/// quality 1..100, 4:2:0; alpha is dropped. BadInput for an empty image or one whose sizes disagree,
-/// LimitExceeded above kMaxImageSide.
+/// Encodes a JPEG with quality 1..100, 4:2:0; alpha is dropped. BadInput for an empty image or sizes that
+/// disagree, LimitExceeded above kMaxImageSide.
 Result<std::vector<std::byte>> encode_jpeg(const Image& image, int quality);
 struct ImageLimit {
   uint32_t width = kMaxImageSide;
   uint32_t height = kMaxImageSide;
 };
-/// Untrusted input: the size is read from the header and checked against the limit before allocation; damaged
-/// or cut-off pictures are BadInput.
+/// Decodes untrusted input. The size is read from the header and checked against the limit before allocation.
+/// BadInput for damaged or truncated pictures.
 Result<Image> decode_jpeg(std::span<const std::byte> bytes, ImageLimit limit = {});
 
 inline constexpr uint64_t kMaxPngFileBytes = 256ull << 20;
 
 Status save_png(const std::filesystem::path& path, const Image& image);
-/// Untrusted input like decode_jpeg; errors name the file.
+/// Loads an untrusted PNG file, checked like decode_jpeg(); errors name the file.
 Result<Image> load_png(const std::filesystem::path& path);
 
 /// Writes an animated WebP picture by picture; all have the size of the first.
@@ -49,7 +49,7 @@ class ClipWriter {
   ClipWriter& operator=(ClipWriter&&) noexcept;
   ~ClipWriter();
   Status add(const Image& image);
-  /// Writes the file. Call once.
+  /// Writes the file; call it once.
   Status finish();
 
  private:

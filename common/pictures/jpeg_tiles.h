@@ -1,7 +1,7 @@
-// Tiles: squares of a picture coded as JPEG one by one, without the headers that would cost more than the
-// pixels: a tile is the scan of a baseline JPEG of kTileSide x kTileSide pixels with the standard tables, and
-// its quality says which. Any number of them decode in one pass, as restart intervals of one tall picture.
-// Layout of the payload in proto/WIRE.md. Objects belong to one thread.
+// Tiles: squares of a picture, coded as separate JPEG scans without headers, which would cost more than the
+// pixels. A tile is the scan of a baseline JPEG of kTileSide x kTileSide pixels with the standard tables of
+// its quality. Any number of tiles decode in one pass, as restart intervals of one tall picture. Layout of
+// the payload in proto/WIRE.md. Objects belong to one thread.
 #pragma once
 
 #include <cstddef>
@@ -21,34 +21,34 @@ inline constexpr uint32_t kTileSide = 64;
 inline constexpr size_t kTilesFixedBytes = 8;
 inline constexpr size_t kTileHeaderBytes = 6;
 
-/// How many tiles cover `pixels` in one direction.
+/// Returns how many tiles cover `pixels` in one direction.
 constexpr uint32_t tiles_along(uint32_t pixels) {
   return (pixels + kTileSide - 1) / kTileSide;
 }
 
 enum class TileChroma : uint8_t { Halved, Full };  // 4:2:0, 4:4:4
 
-/// One coded tile; shared by all pictures that show it unchanged.
+/// One coded tile, shared by all pictures in which it is unchanged.
 struct CodedTile {
   uint8_t quality = 0;  // 1..100
   TileChroma chroma = TileChroma::Halved;
   std::vector<std::byte> scan;  // entropy-coded data, without markers
 };
 
-/// A tile with its place, counted along the rows.
+/// A tile with its index, counted row by row.
 struct PlacedTile {
   uint16_t index = 0;
   const CodedTile* tile = nullptr;
 };
 
-/// Payload of a JpegTiles message.
+/// Makes the payload of a JpegTiles message.
 std::vector<std::byte> pack_tiles(uint32_t width, uint32_t height, std::span<const PlacedTile> tiles);
 
 class TileEncoder {
  public:
   static Result<TileEncoder> make();
 
-  /// Codes the tile of a valid image; beyond the picture's edges its last pixels are repeated.
+  /// Encodes the tile `index` of a valid image; beyond the image's edges its last pixels are repeated.
   Result<CodedTile> encode(const Image& image, uint32_t index, uint8_t quality, TileChroma chroma);
 
  private:
@@ -64,8 +64,9 @@ class TileEncoder {
 
 class TileDecoder {
  public:
-  /// Untrusted payload: sizes, places and every scan are checked before the canvas changes at all. With
-  /// `is_whole` all tiles must be there and the canvas takes the size of the payload; else it must have it.
+  /// Decodes an untrusted payload. Sizes, indices and every scan are checked before the canvas changes.
+  /// Scope::Whole requires all tiles and resizes the canvas; Scope::Changes requires a canvas of the
+  /// payload's size.
   enum class Scope { Changes, Whole };
   Status decode(std::span<const std::byte> payload, Scope scope, Image& canvas);
 

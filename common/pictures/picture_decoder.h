@@ -1,5 +1,5 @@
-// PictureDecoder: turns the picture messages of any codec into the newest picture. Every byte is untrusted; a
-// message that cannot be used leaves the picture as it was. One thread.
+// PictureDecoder: decodes picture messages of any codec into the newest picture. Input is untrusted; a
+// message that cannot be used leaves the picture unchanged. One thread.
 #pragma once
 
 #include <memory>
@@ -15,12 +15,12 @@ namespace strandcast {
 
 class PictureDecoder {
  public:
-  /// Opcode JpegFrame, JpegTiles, Vp8Frame or H264Frame, where the build has it. BadInput and LimitExceeded
-  /// for damage, Unavailable when the picture it continues was missed. After any error a whole picture has to
-  /// be asked for.
+  /// Decodes an opcode JpegFrame, JpegTiles, Vp8Frame or H264Frame, if the build has it. BadInput or
+  /// LimitExceeded for damage, Unavailable if the picture's base was missed. After any error the caller must
+  /// request a whole picture.
   Status decode(const FrameHeader& header, std::span<const std::byte> payload);
 
-  /// Null before the first picture.
+  /// Returns the newest picture; null before the first.
   const Image* image() const { return has_image_ ? &image_ : nullptr; }
 
  private:

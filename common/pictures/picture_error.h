@@ -1,5 +1,5 @@
-// How far one picture is from another where it matters: within a mask, as a signal, as structure, and to the
-// eye. Pure functions, any thread.
+// Compares pictures within a mask: as signals, by structure, and as the eye sees them. Pure functions, any
+// thread.
 #pragma once
 
 #include <cstdint>
@@ -10,10 +10,10 @@
 
 namespace strandcast {
 
-/// 1 per pixel that counts.
+/// One value per pixel: 1 = the pixel counts.
 using PictureMask = std::vector<uint8_t>;
 
-/// Pixels where the picture differs from the one without its subject by more than the least step of a colour.
+/// Marks the pixels where the picture differs from one without its subject by more than one step of a colour.
 PictureMask mask_of(const Image& picture, const Image& without_subject);
 
 struct PictureError {
@@ -23,10 +23,11 @@ struct PictureError {
   double masked_share = 0.0;  // of the picture
 };
 
-/// BadInput for pictures and masks of different sizes and an empty mask.
+/// Compares two pictures. BadInput for different sizes of pictures or mask, and for an empty mask.
 Result<PictureError> picture_error(const Image& seen, const Image& truth, const PictureMask& mask);
 
-/// A picture whose sides are a multiple of `factor`, as the mean of the light of factor x factor pixels.
+/// Shrinks a picture by averaging the linear light of factor x factor pixels; its sides must be multiples of
+/// `factor`.
 Image shrunk(const Image& image, uint32_t factor);
 
 }  // namespace strandcast

@@ -1,6 +1,6 @@
-// Video for pictures in motion: VP8 by libvpx, and H.264 by libavcodec where the build has it
-// (STRANDCAST_H264). One thread (more of them spin on a busy machine), no picture waits for a later one, no
-// periodic keyframes. Colours are BT.601 in studio range. Objects belong to one thread.
+// Video for pictures in motion: VP8 by libvpx, and H.264 by libavcodec if the build has it (STRANDCAST_H264).
+// Encodes without lookahead and without periodic keyframes, on one thread, because more threads spin on a
+// busy machine. Colours are BT.601 in studio range. Objects belong to one thread.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace strandcast {
 
-/// Of the messages of a codec: the opcodes of pictures stand in the order of the codecs.
+/// Returns the opcode of a codec's messages; opcodes of pictures have the order of the codecs.
 constexpr Opcode opcode_of(PictureCodec codec) {
   return static_cast<Opcode>(static_cast<uint32_t>(Opcode::JpegFrame) + static_cast<uint32_t>(codec));
 }
@@ -27,17 +27,18 @@ struct VideoConfig {
 };
 
 enum class VideoFrame { Delta, Keyframe };
-/// Finest: as good as it gets, whatever it takes; of H.264 a keyframe.
+/// Rate of one frame: the target bit rate, or the finest quality at any size. For H.264, Finest gives a
+/// keyframe.
 enum class VideoRate { Target, Finest };
 
 class VideoEncoder {
  public:
   virtual ~VideoEncoder() = default;
 
-  /// From the next frame on, without a keyframe.
+  /// Changes the bit rate from the next frame on, without a keyframe.
   void set_bits_per_s(double bits_per_s);
-  /// The first frame is a keyframe, whatever is asked for. BadInput for an image of another size. Never
-  /// empty: the encoder may not drop frames.
+  /// Encodes a frame; the first is always a keyframe. BadInput for an image of another size. Never empty,
+  /// since the encoder may not drop frames.
   Result<std::vector<std::byte>> encode(const Image& image, VideoFrame frame, VideoRate rate);
 
  protected:
@@ -45,13 +46,13 @@ class VideoEncoder {
   const VideoConfig& config() const { return config_; }
 
  private:
-  /// Of an image with the size of config().
+  /// Encodes an image that has the size of config().
   virtual Result<std::vector<std::byte>> code(const Image& image, VideoFrame frame, VideoRate rate) = 0;
 
   VideoConfig config_;
 };
 
-/// What a frame says before it is decoded.
+/// Facts that a frame states before it is decoded.
 struct VideoFrameInfo {
   bool is_keyframe = false;
   uint32_t width = 0, height = 0;  // of a keyframe, else 0
@@ -62,28 +63,29 @@ class VideoDecoder {
   virtual ~VideoDecoder() = default;
 
   PictureCodec codec() const { return codec_; }
-  /// Untrusted input: read_video_info() passes it before a library sees a byte. A delta frame needs the frame
-  /// before it. After an error only a keyframe helps.
+  /// Decodes untrusted input, which read_video_info() must accept before the library sees it. A delta frame
+  /// needs the preceding frame. After an error the next frame must be a keyframe.
   Result<Image> decode(std::span<const std::byte> frame);
 
  protected:
   explicit VideoDecoder(PictureCodec codec) : codec_(codec) {}
 
  private:
-  /// `info` has the size of the picture for a delta frame too; any other picture is an error.
+  /// Decodes a checked frame. `info` has the picture's size for delta frames too; a picture of another size
+  /// is an error.
   virtual Result<Image> decode_checked(std::span<const std::byte> frame, const VideoFrameInfo& info) = 0;
 
   const PictureCodec codec_;
   uint32_t width_ = 0, height_ = 0;  // of the last keyframe; 0 = a keyframe is needed
 };
 
-/// BadInput for sizes and rates out of range and codecs that are no video, Unsupported where the build or its
-/// libavcodec has no encoder.
+/// Makes an encoder. BadInput for sizes or rates out of range and for codecs that are not video. Unsupported
+/// if the build or its libavcodec has no encoder.
 Result<std::unique_ptr<VideoEncoder>> make_video_encoder(PictureCodec codec, const VideoConfig& config);
-/// Unsupported where the build has none.
+/// Makes a decoder; Unsupported if the build has none.
 Result<std::unique_ptr<VideoDecoder>> make_video_decoder(PictureCodec codec);
-/// Untrusted input. BadInput for what is no frame of the codec, LimitExceeded for sizes beyond those of
-/// pictures; of H.264 see h264_header.h.
+/// Reads an untrusted frame. BadInput for malformed frames, LimitExceeded beyond the picture sizes. For H.264
+/// see h264_header.h.
 Result<VideoFrameInfo> read_video_info(PictureCodec codec, std::span<const std::byte> frame);
 
 }  // namespace strandcast

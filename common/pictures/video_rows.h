@@ -1,5 +1,6 @@
-// The codecs behind video_codec.h, one row of its table each. Private to common/pictures. What both do alike
-// is done there: encoders are made with sizes and rates in range, decoders see what the reader let through.
+// Makers and header readers of the video codecs: VP8 and H.264, one row each of the table in video_codec.cpp.
+// Private to common/pictures. Callers check sizes and rates first; decoders get only frames that the header
+// reader accepted.
 #pragma once
 
 #include "common/pictures/video_codec.h"
@@ -8,13 +9,13 @@ namespace strandcast {
 
 Result<std::unique_ptr<VideoEncoder>> make_vp8_encoder(const VideoConfig& config);
 Result<std::unique_ptr<VideoDecoder>> make_vp8_decoder();
-/// RFC 6386, section 9.1.
+/// Reads the header of a VP8 frame (RFC 6386, section 9.1).
 Result<VideoFrameInfo> read_vp8_info(std::span<const std::byte> frame);
 
 Result<std::unique_ptr<VideoEncoder>> make_h264_encoder(const VideoConfig& config);
 Result<std::unique_ptr<VideoDecoder>> make_h264_decoder();
 
-/// What the rate control of either may borrow from the time around.
+/// Size of the rate control's buffer in seconds, by which both codecs may exceed the bit rate for a while.
 inline constexpr double kVideoBufferS = 0.6;
 
 }  // namespace strandcast

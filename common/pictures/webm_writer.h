@@ -1,5 +1,5 @@
-// WebmWriter: a film of VP8 in WebM (Matroska), picture by picture: as little of the format as players need,
-// with an index of keyframes. Debian's libwebm reads only. One thread.
+// WebmWriter: writes VP8 frames to a WebM (Matroska) file, with only the elements that players need and an
+// index of keyframes. (Debian's libwebm can only read.) One thread.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ class WebmWriter {
   ~WebmWriter();
 
   Status add(const Image& image);
-  /// Gives the file its name. Without it no file is left.
+  /// Renames the temporary file to its final name. Without this call no file is left.
   Status finish();
 
  private:

@@ -1,5 +1,5 @@
-// Pictures as the planes that video codecs take: BT.601 in studio range, colours at half the size both ways.
-// Private to common/pictures; pure functions, any thread.
+// Converts pictures to and from the planes of video codecs: BT.601, studio range, chroma at half the size in
+// both directions. Private to common/pictures; pure functions, any thread.
 #pragma once
 
 #include <cstddef>
@@ -18,11 +18,11 @@ struct YuvPlanes {
   YuvPlane luma, blue, red;
 };
 
-/// Rounds to the nearest, colours after taking the mean of their four pixels; libyuv rounds colours down,
-/// which tints every picture green by a level.
+/// Converts with rounding to nearest; chroma is the mean of four pixels. libyuv rounds chroma down, which
+/// tints every picture green by a level.
 void fill_planes(const Image& image, const YuvPlanes& planes);
 
-/// Of the first width x height pixels of the planes.
+/// Converts the first width x height pixels of the planes.
 Image make_image(const YuvPlanes& planes, uint32_t width, uint32_t height);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// Text inside HTML, SVG and XML. Pure, any thread.
+// Escaping of text for HTML, SVG and XML. Pure functions, any thread.
 #pragma once
 
 #include <string>
@@ -6,7 +6,7 @@
 
 namespace strandcast {
 
-/// The text with the five characters that mean something in HTML, SVG and XML replaced.
+/// Replaces the five characters that have a meaning in HTML, SVG and XML with entities.
 std::string html_escaped(std::string_view text);
 
 }  // namespace strandcast

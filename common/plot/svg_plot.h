@@ -30,13 +30,13 @@ struct PlotSeries {
   std::string name;
   std::vector<PlotPoint> points;  // lines join them in this order
   PlotMark mark = PlotMark::LineAndDots;
-  /// Series with the same index look alike from plot to plot; -1: their place in the plot.
+  /// Index of the series' appearance, the same in all plots; -1 uses its position in this plot.
   int style = -1;
   bool is_faint = false;  // background to the others
   bool has_legend = true;
 };
 
-/// A horizontal line with a name: a bound, a target.
+/// A labelled horizontal line, for example a bound or a target.
 struct PlotGuide {
   std::string name;
   double y = 0.0;
@@ -52,15 +52,16 @@ struct PlotDesc {
   double height = 480.0;  // px
 };
 
-/// Points that an axis cannot show (not finite, not positive on a logarithmic axis) are left out; a point
-/// outside a given range is drawn on the border. A plot without any point says so.
+/// Draws a plot as SVG text. Points that an axis cannot show (not finite, or not positive on a logarithmic
+/// axis) are omitted. Points outside a given range are drawn on the border. A plot without points shows a
+/// note.
 std::string make_svg_plot(const PlotDesc& desc);
 
-/// What every plot of a page shares: its <style>, and the colour of a series' style.
+/// Style sheet shared by all plots of a page, and the colour of a series' style.
 const char* plot_style_sheet();
 const char* plot_color(size_t style);
 
-/// Where an axis has its labels, ascending, within [minimum, maximum].
+/// Returns the positions of axis labels, ascending, within [minimum, maximum].
 std::vector<double> plot_ticks(PlotScale scale, double minimum, double maximum);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// DebugView: what a renderer shows instead of hair, for who wants to see how a picture comes about. A choice
-// of the moment, not of the scene. Any thread.
+// DebugView: what a renderer shows instead of hair to explain how a picture is made. It is a choice of the
+// moment, not part of the scene. Any thread.
 #pragma once
 
 #include <array>
@@ -19,22 +19,22 @@ enum class DebugView : uint8_t {
 inline constexpr std::array kDebugViews = {DebugView::None,   DebugView::Tangents, DebugView::Density,
                                            DebugView::Shadow, DebugView::Overdraw, DebugView::Tiles};
 inline constexpr float kOverdrawLayers = 32.0f;
-/// Linear light of what is white: the tone curve leaves it as it is (shaders/lib/tone.glsl).
+/// Linear light that represents white; the tone curve leaves it unchanged (shaders/lib/tone.glsl).
 inline constexpr float kDebugWhite = 0.7f;
 
-/// "none", "tangents", "density", "shadow", "overdraw", "tiles".
+/// Returns "none", "tangents", "density", "shadow", "overdraw" or "tiles".
 constexpr std::string_view name_of(DebugView view) {
   constexpr std::array<std::string_view, kDebugViews.size()> kNames = {"none",   "tangents", "density",
                                                                        "shadow", "overdraw", "tiles"};
   return kNames[static_cast<size_t>(view)];
 }
-/// None for an unknown name.
+/// Returns the view of a name; None for an unknown one.
 constexpr DebugView debug_view_named(std::string_view name) {
   for (const DebugView view : kDebugViews)
     if (name_of(view) == name) return view;
   return DebugView::None;
 }
-/// Each in turn, and again.
+/// Returns the next view, cyclically.
 constexpr DebugView next_of(DebugView view) {
   return kDebugViews[(static_cast<size_t>(view) + 1) % kDebugViews.size()];
 }

@@ -1,7 +1,6 @@
-// draw_heads: one picture of one or several heads. Each is drawn by a renderer of its own, with its own look,
-// light and shadows; the farthest first, and each over the picture of those before it. Where hair of two
-// heads lies within each other the nearer head's is in front, and no head shadows another. Runs where the
-// renderers do.
+// draw_heads: draws one picture of one or several heads. Each head has its own renderer, look, light and
+// shadows. The farthest is drawn first, each over the picture of those before it. Where the hair of two heads
+// overlaps, the nearer head's is in front. Heads do not shadow each other. Runs on the renderers' thread.
 #pragma once
 
 #include <span>
@@ -15,19 +14,19 @@ struct PlacedHead {
   const PosedStrands* strands = nullptr;
 };
 
-/// The point that a picture's camera follows: the middle of the heads, world, m. There is at least one.
+/// Returns the point that a picture's camera follows: the middle of the heads (at least one), world, m.
 glm::dvec3 middle_of(std::span<const PlacedHead> heads);
 
-/// A camera that follows `middle_m`, as one that follows `head_m`: what either sees is the same.
+/// Converts a camera that follows `middle_m` into one that follows `head_m` and shows the same view.
 CameraDesc camera_from_head(const CameraDesc& camera, const glm::dvec3& middle_m, const glm::dvec3& head_m);
 
-/// Where a picture of heads is seen from: follows their middle.
+/// Camera of a picture of heads; it follows their middle.
 struct HeadsCamera {
   CameraDesc own;
   CameraDesc of_scene;  // from which all heads are to be seen
 };
-/// How many times its distance the scene's camera must be away for all heads to be in its picture; 1 where
-/// they are. One's own camera goes along, so that whoever stands elsewhere than the others is not lost.
+/// Returns the factor on the scene camera's distance at which all heads are in the picture; 1 if they already
+/// are. The viewer's own camera is moved by it too, so that no head is out of view.
 double room_factor(std::span<const PlacedHead> heads, const CameraDesc& of_scene, RenderSize size);
 
 struct HeadsPicture {
@@ -35,8 +34,8 @@ struct HeadsPicture {
   RenderProfile profile;  // of all
 };
 
-/// With one head the same as that renderer's own draw() and read_image() from one's own camera. A picture
-/// that was given up half-way has no pixels. Errors as Renderer::draw().
+/// Draws the heads. With one head the result equals that renderer's draw() and read_image(). A picture that
+/// was abandoned has no pixels. Errors as Renderer::draw().
 Result<HeadsPicture> draw_heads(std::span<const PlacedHead> heads, const HeadsCamera& camera, RenderSize size,
                                 const DrawTerms& terms = {});
 

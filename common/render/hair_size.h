@@ -1,5 +1,5 @@
-// How high hair is on a screen, for whoever simulates less of it where it is small. Pure functions, any
-// thread.
+// Computes the height of hair on a screen, so that small hair can be simulated with less detail. Pure
+// functions, any thread.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -9,7 +9,7 @@
 
 namespace strandcast {
 
-/// Room that hair takes, in head space.
+/// Bounds of the hair in head space.
 struct HairExtent {
   glm::vec3 center_m{0.0f};  // of the groom's box
   float radius_m = 0.0f;     // of the ball around it that holds the groom
@@ -18,8 +18,8 @@ struct HairExtent {
 
 HairExtent hair_extent(const SceneAsset& asset);
 
-/// Height in pixels of the ball that holds the groom on a picture so high and wide; 0 where no hair can be in
-/// the picture, infinity where the camera is inside of the ball, or makes no picture.
+/// Returns the height in pixels of the groom's bounding sphere in a picture of this size. 0 if no hair can be
+/// visible; infinity if the camera is inside the sphere or invalid.
 double hair_height_px(const HairExtent& extent, const CameraDesc& camera, glm::uvec2 picture_px);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// HeadOccupancy: where head, neck and shoulders are solid, for light: distances to the surface of the head's
-// mesh in cells of head space. Found once per asset, from meshes with holes as well; no GL, any thread.
+// HeadOccupancy: signed distance to the surface of head, neck and shoulders in cells of head space, for
+// lighting. Computed once per asset, also from meshes with holes; no GL, any thread.
 #pragma once
 
 #include <cstdint>
@@ -12,9 +12,9 @@
 
 namespace strandcast {
 
-/// Cells at most: 1 MiB. A head that would take more has larger ones.
+/// Largest number of cells (1 MiB); larger heads get larger cells.
 inline constexpr uint64_t kMaxOccupancyCells = uint64_t{1} << 20;
-/// Distances are stored in such parts of a cell, up to 127 of them.
+/// Resolution of stored distances: steps per cell. Up to 127 steps are stored.
 inline constexpr float kDistanceStepsPerCell = 8.0f;
 
 struct HeadOccupancy {
@@ -27,21 +27,21 @@ struct HeadOccupancy {
   uint64_t size_bytes() const { return distance.capacity(); }
 };
 
-/// What of a head is looked at, and how finely.
+/// Part of the head that is examined, and the resolution.
 struct OccupancyRequest {
   glm::vec3 low_m{-1.0f}, high_m{1.0f};  // what lies outside does not count
   float cell_m = 0.004f;
   std::optional<FittedSphere> ball;  // stands for a head that the mesh does not hold together
 };
 
-/// Empty where there is nothing solid. A cell is solid where at least two of the lines through it along the
-/// axes say so; a line through a hole of the mesh does not say anything.
+/// Computes the occupancy; empty if nothing is solid. A cell is solid if at least two of the axis-parallel
+/// lines through it say so; a line through a hole of the mesh has no vote.
 HeadOccupancy make_head_occupancy(const Mesh& mesh, const OccupancyRequest& request);
-/// Of an asset, in the surroundings of its hair.
+/// Computes the occupancy of an asset around its hair.
 HeadOccupancy make_head_occupancy(const SceneAsset& asset, const std::optional<FittedSphere>& skull);
 
-/// Distance to the surface between the cells' middles, m, negative inside. `place` in cells from the first
-/// cell's middle; beyond the grid as at its border. Not for an empty one.
+/// Returns the interpolated distance to the surface, m, negative inside. `place` is in cells from the middle
+/// of the first cell; outside the grid the border's value applies. `head` must not be empty.
 inline float distance_at(const HeadOccupancy& head, const glm::vec3& place) {
   const glm::vec3 at = glm::clamp(place, glm::vec3(0.0f), glm::vec3(head.size - 1));
   const glm::ivec3 low = glm::min(glm::ivec3(at), head.size - 2);

@@ -1,5 +1,5 @@
-// The laws of shaders/lib as C++ over lanes: the same text that the shaders compile. Only for files with
-// kernels (common/simd/variants.h); everything in here is inlined into them.
+// The formulas of shaders/lib as C++ over lanes, compiled from the same text as the shaders. Include it only
+// in files with kernels (common/simd/variants.h), into which everything is inlined.
 #pragma once
 
 #include "common/simd/lanes.h"

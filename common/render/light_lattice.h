@@ -1,7 +1,7 @@
-// LightLattice: how much drawn hair lies between each place and the key light, the rim light and the sky, as
-// optical depth. Strands are summed into cells along the key light in integers, so the order does not matter;
-// a running sum along the light gives its depth, sweeps through the halved lattice those of the others. No
-// GL.
+// LightLattice: optical depth of drawn hair between each point and the key light, the rim light and the sky.
+// Strands are summed into cells along the key light as integers, so their order does not matter. A running
+// sum along the light gives its depth; sweeps through a lattice of half resolution give those of the other
+// lights. No GL.
 #pragma once
 
 #include <cstdint>
@@ -20,10 +20,10 @@ namespace strandcast {
 
 struct StrandPoints;
 
-/// Cells along the hair's largest side, unless somebody wants more or fewer.
+/// Default number of cells along the hair's largest side.
 inline constexpr uint32_t kLightCells = 112;
 
-/// What of a scene it needs and does not change from picture to picture.
+/// Properties of a scene that the lattice needs and that do not change between pictures.
 struct LightLatticeDesc {
   float extent_m = 0.3f;         // of the hair at rest, its largest side
   uint32_t cells = kLightCells;  // along that side
@@ -33,17 +33,17 @@ struct LightLatticeDesc {
   BustRig bust = {};                           // of the head's mesh, as it is at rest in `solid`
 };
 
-/// Of the strands that are summed.
+/// Properties of the strands that are summed.
 struct LightStrands {
   float width_m = 0.0f;  // at the root
   float tip_scale = 1.0f;
   float tip_fade = 0.0f;
 };
 
-/// Optical depth per unit of the stored numbers: 16 bits reach 64.
+/// Optical depth of one stored unit; 16 bits reach 64.
 inline constexpr float kLightDepthUnit = 64.0f / 65536.0f;
 
-/// Where its cells are.
+/// Position and orientation of the lattice's cells.
 struct LatticeFrame {
   glm::vec3 axis[3];         // unit: across, across, away from the key light
   glm::vec3 origin_m{0.0f};  // middle of the first cell, along the axes
@@ -53,32 +53,34 @@ struct LatticeFrame {
   glm::ivec3 half_size{0};  // of the other lights' cells, twice as large
 };
 
-/// Round points of head space and so much room beside them; every so many-th of many points is looked at.
+/// Fits the lattice around points of head space plus `room_m` on all sides; of many points only every n-th is
+/// used.
 LatticeFrame fit_lattice(const LightLatticeDesc& desc, const LightDirections& lights,
                          std::span<const glm::vec3> points_m, float room_m);
 
-/// Sums of strands are kept in such parts of a unit of optical depth: 2^31 of them are 32,768 units.
+/// Optical depth of one unit of the sums of strands; 2^31 units are 32,768.
 inline constexpr float kLightSumUnit = 1.0f / 65536.0f;
-/// A segment is summed at one place, one that is longer than two cells at more.
+/// Samples per cell length of a segment: one sample up to two cells long, more if it is longer.
 inline constexpr float kLightPiecesPerCell = 0.5f;
 inline constexpr int kMaxLightCellsPerAxis = 160;
-/// How much of a place is head: all of it or nothing so many LatticeFrame::soft_m from a surface that lies
-/// this deep below its skin, so that roots and skin stay lit.
+/// The head as an obstacle to light: its surface lies this deep below the skin, so that roots and skin stay
+/// lit, and opacity ramps over this width. Both in units of LatticeFrame::soft_m.
 inline constexpr float kSolidInset = 1.25f;
 inline constexpr float kSolidRamp = 1.25f;
-/// Along the lattice's sides nothing is head: whoever looks up beyond them is told what they hold, and a body
-/// that goes on out there does not lie in its own shade.
+/// Cells along the lattice's sides in which the head has no effect. Lookups outside the lattice use them, and
+/// a body that continues there must not shade itself.
 inline constexpr int kSolidBorderCells = 2;
-/// Optical depth behind the head, times the cube of the most that was passed: an edge as soft as the ramp.
+/// Optical depth behind the head, times the cube of the largest solidity passed; this makes an edge as soft
+/// as the ramp.
 inline constexpr float kSolidDepth = 12.0f;
-/// The other lights sum it up, per LatticeFrame::soft_m. The sky is all around: what lies above hides a part
-/// of it only.
+/// Optical depth of the head per LatticeFrame::soft_m for rim light and sky, which sum it up. The sky's is
+/// small, because an obstacle above hides only a part of it.
 inline constexpr float kSolidRimDepth = 2.0f;
 inline constexpr float kSolidSkyDepth = 0.06f;
-/// Optical depth that a metre of a strand of this width adds to its cell.
+/// Returns the optical depth that one metre of a strand of this width adds to its cell.
 float strand_depth_per_m(const LatticeFrame& frame, float width_m);
 
-/// The stored depths, for look-ups by kernels.
+/// Stored depths for lookups by kernels.
 struct LightLatticeView : LatticeFrame {
   const uint16_t* key = nullptr;     // (size.z x size.y x size.x)
   const uint32_t* others = nullptr;  // (half_size): rim in the low 16 bits, sky in the high ones
@@ -88,10 +90,10 @@ class LightLattice {
  public:
   explicit LightLattice(const LightLatticeDesc& desc) : desc_(desc) {}
 
-  /// `frame`: of fit_lattice(), with the same lights.
+  /// Builds the lattice; `frame` must come from fit_lattice() with the same lights.
   void build(const LatticeFrame& frame, const StrandPoints& points, const LightStrands& strands,
              const LightDirections& lights, WorkerPool& workers);
-  /// How neck and chest are turned from the next build() on.
+  /// Sets the rotation of neck and chest from the next build() on.
   void set_bust(const BustTurn& turn) { bust_turn_ = turn; }
   const LightLatticeDesc& desc() const { return desc_; }
   const LightLatticeView& view() const { return view_; }
@@ -102,7 +104,7 @@ class LightLattice {
   void sweep_key(WorkerPool& workers);
   bool has_solid() const { return desc_.solid && !desc_.solid->is_empty(); }
   void find_solid(int y, int z, std::vector<float>& share) const;
-  /// Across halved cells, with the head as opaque as this per LatticeFrame::soft_m.
+  /// Sweeps across the lattice of half resolution; the head has this opacity per LatticeFrame::soft_m.
   std::vector<float> halved_with(float solid_depth) const;
   void sweep(const glm::vec3& to_light, const std::vector<float>& halved, std::vector<float>& depth) const;
 

@@ -1,6 +1,6 @@
-// Light volume: how much light reaches each place in the hair. Key strands are summed into cells fixed in
-// head space, then optical depth is swept from the light through them. Makes hair look deep at the cost of
-// about a millisecond of CPU; no GL, one thread.
+// LightVolume: share of light that reaches each place in the hair. Key strands are summed into cells fixed in
+// head space, and optical depth is swept from the light through them. Costs about a millisecond of CPU; no
+// GL, one thread.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace strandcast {
 
-/// What of a scene the volume needs and does not change from picture to picture.
+/// Properties of a scene that the volume needs and that do not change between pictures.
 struct LightVolumeDesc {
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;  // per strand
@@ -23,22 +23,23 @@ struct LightVolumeDesc {
   FittedSphere skull;
 };
 
-/// Cells per axis at most; hair further out casts no shadow.
+/// Largest number of cells per axis; hair outside casts no shadow.
 inline constexpr int kMaxLightCells = 64;
 
 class LightVolume {
  public:
   explicit LightVolume(const LightVolumeDesc& desc) : desc_(desc) {}
 
-  /// `position_m`: (vertex_count x strand_count) vertex-major, head space; `to_light`: unit, head space.
+  /// Builds the volume. `position_m`: (vertex_count x strand_count), vertex-major, head space; `to_light`:
+  /// unit, head space.
   void build(const std::vector<glm::vec3>& position_m, const glm::vec3& to_light);
 
   const glm::ivec3& size() const { return size_; }
   const glm::vec3& origin_m() const { return origin_m_; }
   float cell_m() const { return desc_.cell_m; }
-  /// (size.z x size.y x size.x x 2) shares of direct and of surrounding light that arrive, 65535 = all.
+  /// Returns the shares of direct and of ambient light, (size.z x size.y x size.x x 2); 65535 = all.
   const std::vector<uint16_t>& texels() const { return texels_; }
-  /// Strands crossed per metre, per cell, before light is swept through (for tests).
+  /// Returns strands crossed per metre in each cell, before light is swept through (for tests).
   const std::vector<float>& crossings_per_m() const { return crossings_per_m_; }
 
  private:

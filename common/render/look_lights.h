@@ -1,4 +1,5 @@
-// Lights and colours of a look as the laws of shading take them. Pure functions, any thread.
+// Converts the lights and colours of a look into the inputs of the shading formulas. Pure functions, any
+// thread.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -8,7 +9,7 @@
 
 namespace strandcast {
 
-/// Unit vectors in head space.
+/// Directions towards the lights: unit vectors in head space.
 struct LightDirections {
   glm::vec3 to_key{0.0f, 1.0f, 0.0f};
   glm::vec3 to_rim{0.0f, 1.0f, 0.0f};
@@ -16,15 +17,15 @@ struct LightDirections {
   bool has_rim = false;
 };
 
-/// Towards a light that travels along `direction` of the world, in head space, unit; of one without a
-/// direction, straight up in the world.
+/// Returns the unit direction in head space towards a light that travels along `direction` in the world. A
+/// zero direction gives the world's up.
 glm::vec3 to_light_in_head(const glm::vec3& direction, const glm::dquat& world_from_head_rotation);
 
-/// `up`: world's up, head space.
+/// Returns the directions to the lights; `up` is the world's up in head space.
 LightDirections light_directions(const LookDesc& look, const glm::dquat& world_from_head_rotation,
                                  const glm::vec3& up);
 
-/// The look in the numbers of shaders/lib/hair_light.glsl.
+/// The look as the parameters of shaders/lib/hair_light.glsl.
 struct ShadingNumbers {
   glm::vec3 root_color, tip_color;
   float diffuse, scatter, highlight, transmission, second_highlight;

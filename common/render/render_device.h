@@ -1,5 +1,5 @@
-// RenderDevice: what draws pictures, chosen in one place: a hardware GPU through OpenGL where there is one,
-// else the processors in tiles. Opened, used and closed on one thread; renderers that it made go first.
+// RenderDevice: chooses what draws pictures: a hardware GPU through OpenGL if there is one, else the
+// processors in tiles. Opened, used and closed on one thread; its renderers must be destroyed first.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@ namespace strandcast {
 
 enum class RendererKind { Tiles, Gl };
 const char* to_string(RendererKind kind);
-/// Names that RenderDeviceConfig::renderer takes: "auto", "tiles", "gl".
+/// Returns whether RenderDeviceConfig::renderer accepts this name: "auto", "tiles" or "gl".
 bool is_renderer_name(const std::string& name);
 
 struct RenderDeviceConfig {
@@ -32,20 +32,21 @@ struct RenderDeviceInfo {
 
 class RenderDevice {
  public:
-  /// Makes its context current. "gl", and an OpenGL device that is named, fail where it is not there:
-  /// Unavailable, or BadInput for an unknown name.
+  /// Opens a device and makes its context current. If "gl" or a named OpenGL device is missing, returns
+  /// Unavailable; BadInput for an unknown name.
   static Result<std::unique_ptr<RenderDevice>> open(const RenderDeviceConfig& config);
-  /// Binds its context, if it has one, to the calling thread.
+  /// Binds its context, if any, to the calling thread.
   Status make_current();
   const RenderDeviceInfo& info() const { return info_; }
-  /// `asset` outlives the renderer. Where tiles draw, a look that names other methods than the main ones is
-  /// drawn by OpenGL, opened when the first such look comes; BadInput where "tiles" was asked for.
+  /// Makes a renderer for a look; `asset` must outlive it. On the tile renderer, a look with other than the
+  /// main methods is drawn by OpenGL, which is opened for the first such look. BadInput if "tiles" was
+  /// requested explicitly.
   Result<std::unique_ptr<Renderer>> make_renderer(const SceneAsset& asset, const LookDesc& look);
-  /// One of this kind, whatever the look names.
+  /// Makes a renderer of this kind, whatever methods the look names.
   Result<std::unique_ptr<Renderer>> make_renderer(RendererKind kind, const SceneAsset& asset,
                                                   const LookDesc& look);
-  /// What draws a look here. Where a look needs OpenGL and there is none, tiles draw their own methods, and
-  /// the log says so.
+  /// Returns the kind of renderer for a look. If a look needs OpenGL and there is none, tiles draw with their
+  /// own methods and a warning is logged.
   RendererKind kind_for(const LookDesc& look);
 
  private:
@@ -57,14 +58,14 @@ class RenderDevice {
   bool has_no_gl_ = false;                   // was looked for, for such methods
 };
 
-/// Whether pictures drawn with this configuration take processor cores: looks for what would draw, and lets
-/// go of it. True as well where nothing can draw.
+/// Returns whether pictures with this configuration use processor cores. Opens the device to find out and
+/// closes it again. Also true if nothing can draw.
 bool is_drawn_by_processors(const RenderDeviceConfig& config);
 
-/// What will draw a look where the renderer was asked for by this name and there is no hardware GPU.
+/// Returns the kind of renderer for a look and this renderer name if there is no hardware GPU.
 RendererKind likely_renderer(const std::string& renderer, const LookDesc& look);
 
-/// The passes that a renderer of this kind would run, without drawing.
+/// Returns the passes that a renderer of this kind would run, without drawing.
 Result<gl::PassReports> plan_renderer(const SceneAsset& asset, const LookDesc& look, RendererKind kind);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
 // Render paths: ways to draw a scene, each a list of passes over the same RenderScene. A path declares its
-// passes; what runs of them, the renderer's list decides. No GL calls in here.
+// passes; the renderer's list decides which of them run. No GL calls here.
 #pragma once
 
 #include <memory>
@@ -15,23 +15,23 @@ namespace strandcast {
 struct RenderPath {
   std::string name;
   std::string summary;
-  /// Adds all passes in the order in which they run; the last one writes scene.picture.
+  /// Adds all passes in running order; the last one writes scene.picture.
   void (*add_passes)(RenderScene& scene, RenderPassList& passes);
-  /// Samples per pixel side that RenderTurn::view counts.
+  /// Samples per pixel side on which RenderTurn::view is based.
   uint32_t view_samples = 1;
-  /// For RenderScene::methods, before passes are added; none: those of the look.
+  /// Methods that replace RenderScene::methods before passes are added; empty: those of the look.
   std::optional<RenderMethods> methods = std::nullopt;
 };
 
-/// Strands as exact coverage, blended in tiles by compute kernels: the main methods.
+/// The path of the main methods: strands with exact coverage, blended in tiles by compute kernels.
 const RenderPath& tile_path();
-/// Segments of strands as camera-facing quads with a depth test and a fixed pattern of coverage.
+/// The path that draws segments as camera-facing quads, with a depth test and a fixed coverage pattern.
 const RenderPath& segment_path();
-/// Whether a look names nothing but what every renderer draws in its own best way.
+/// Returns whether a look names only main methods, which every renderer draws in its own way.
 bool has_main_methods(const LookDesc& look);
-/// What draws a look: tiles where it names no other methods than the main ones.
+/// Returns the path for a look: tiles if it names only main methods.
 const RenderPath& path_for(const LookDesc& look);
-/// The same quads with other methods, which go together.
+/// Returns the segment path with other methods, which must be combinable.
 RenderPath segment_path_with(const RenderMethods& methods);
 
 }  // namespace strandcast

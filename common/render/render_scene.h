@@ -1,5 +1,5 @@
-// RenderScene: what the passes of every render path share: what the scene is like, and the resources that
-// they hand to one another. Made without GL; the passes that write a resource allocate it.
+// RenderScene: data shared by the passes of every render path: properties of the scene, and the resources
+// that passes exchange. Made without GL; the passes that write a resource allocate it.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ namespace strandcast {
 class Culling;
 class ShadowMap;
 
-/// Numbers of the methods that no scene sets.
+/// Parameters of methods that no scene sets.
 struct MethodSettings {
   uint32_t shadow_texels = 512;        // along each side of the light's map
   float strand_opacity = 0.30f;        // optical depth of one strand across, as in the light volume
@@ -30,10 +30,10 @@ struct MethodSettings {
 };
 
 struct RenderScene {
-  /// The asset has been checked.
+  /// Makes the scene of a checked asset (check_asset()).
   RenderScene(const SceneAsset& asset, const LookDesc& wanted_look, bool is_drawn_by_software);
 
-  /// Whether strands are blended in a layer of their own, over the scene.
+  /// Returns whether strands are drawn to a separate layer and blended over the scene.
   bool has_strand_layer() const {
     return features.has_strands.value &&
            (methods.transparency != TransparencyMethod::Hashed || methods.detail == DetailMethod::Volume);
@@ -64,10 +64,10 @@ struct RenderScene {
   PictureTarget picture;
 };
 
-/// What the light lattice has to know. `cells`: along the hair's largest side.
+/// Returns the inputs of the light lattice; `cells` counts along the hair's largest side.
 LightLatticeDesc describe_lattice(const SceneAsset& asset, const RenderScene& scene, uint32_t cells);
 
-/// BadInput names what of an asset does not fit together.
+/// Returns BadInput if parts of an asset are inconsistent, naming them.
 Status check_asset(const SceneAsset& asset);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// What render passes are given: once to be prepared, and anew in each draw.
+// Arguments of render passes: those of preparation, and those of each draw.
 #pragma once
 
 #include <cstdint>
@@ -21,16 +21,16 @@ struct RenderSetup {
   const SceneAsset& asset;
 };
 
-/// What of the detail may be missing, and when to give up.
+/// Options of a draw: permitted loss of detail, abortion, debug view and backdrop.
 struct DrawTerms {
-  /// Of the strands that a picture of this size shows, in (0, 1]: fewer, which together are as wide.
+  /// Share of the picture's strands that is drawn, in (0, 1]. Fewer strands are drawn wider, so that the
+  /// total width is the same.
   float strand_share = 1.0f;
-  /// Asked between batches of strands, which are small then: true leaves the picture unfinished. Empty:
-  /// never.
+  /// Asked between batches of strands, which are small if it is set; true abandons the picture. Empty: never.
   std::function<bool()> is_unwanted;
-  /// Instead of hair; renderers that have none draw hair.
+  /// View shown instead of hair; renderers without this view draw hair.
   DebugView debug_view = DebugView::None;
-  /// Seen where nothing is drawn, instead of the look's background: a picture of the same size, which
+  /// Picture shown where nothing is drawn, instead of the look's background. It has the picture's size and
   /// outlives the draw. Null: the background.
   const Image* backdrop = nullptr;
 };

@@ -1,6 +1,6 @@
-// The one renderer, used by the server's picture stream and by every client: runs the passes of a render path
-// (render_path.h) over what it is given. Same inputs on one driver give the same pixels. Needs a current GL
-// 4.5 core context; all calls from its thread. Does not simulate, decode or do I/O.
+// Renderer: draws pictures for the server's picture stream and for every client, by running the passes of a
+// render path (render_path.h). Equal inputs on one driver give equal pixels. Needs a current GL 4.5 core
+// context; all calls from its thread. Does not simulate, decode or do I/O.
 #pragma once
 
 #include <memory>
@@ -21,7 +21,7 @@
 
 namespace strandcast {
 
-/// Of the last draw.
+/// Measurements of the last draw.
 struct RenderProfile {
   double total_ms = 0.0;  // of all passes
   uint64_t drawn_strands = 0;
@@ -34,12 +34,13 @@ struct RenderProfile {
   bool operator==(const RenderProfile&) const = default;
 };
 
-/// What a picture lacks, in words for people; empty when it has everything.
+/// Describes for a person what a picture lacks; empty if it is complete.
 std::string left_out_text(const RenderProfile& profile);
 
 class Renderer {
  public:
-  /// Compiles, allocates and uploads only what asset and look need. `asset` outlives calls of set_look().
+  /// Makes a renderer; compiles, allocates and uploads only what asset and look need. `asset` must outlive
+  /// the renderer, since set_look() reads it.
   static Result<std::unique_ptr<Renderer>> make(const gl::ShaderLibrary& shaders,
                                                 const gl::DeviceInfo& device, const SceneAsset& asset,
                                                 const LookDesc& look,
@@ -51,21 +52,21 @@ class Renderer {
   /// input.
   virtual Status draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size,
                       const DrawTerms& terms = {}) = 0;
-  /// From the next draw on; its pixels are then those of a renderer that was made with this look. On an error
-  /// the look of before stays.
+  /// Changes the look from the next draw on; pixels are those of a renderer made with this look. After an
+  /// error the previous look stays.
   virtual Status set_look(const LookDesc& look) = 0;
-  /// Pixels of the last draw, top row first.
+  /// Returns the pixels of the last draw, top row first.
   virtual Image read_image() = 0;
   virtual const RenderProfile& profile() const = 0;
-  /// The passes as they run, and those that do not.
+  /// Returns all passes, including those that do not run.
   virtual const gl::PassListBase& passes() const = 0;
 };
 
-/// What every renderer refuses to draw. BadInput or LimitExceeded.
+/// Checks the inputs of a draw for every renderer. Returns BadInput or LimitExceeded for what none draws.
 Status check_draw(const PosedStrands& strands, size_t position_count, RenderSize size,
                   const DrawTerms& terms);
 
-/// The passes that a renderer of this would run, without any GL.
+/// Returns the passes that a renderer for these inputs would run, without any GL.
 Result<gl::PassReports> plan_renderer(const SceneAsset& asset, const LookDesc& look, bool is_software,
                                       const RenderPath& path = segment_path());
 

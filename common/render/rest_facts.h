@@ -1,5 +1,5 @@
-// What of an asset the renderers measure once, and the lights' volumes that follow from it. Pure functions;
-// no GL.
+// Measures of an asset at rest that renderers take once, and descriptions of the light volumes derived from
+// them. Pure functions; no GL.
 #pragma once
 
 #include <cstdint>
@@ -20,12 +20,12 @@ struct RestFacts {
 
 RestFacts measure_rest(const SceneAsset& asset);
 
-/// The look within what renderers can draw.
+/// Returns the look with its values limited to what renderers can draw.
 LookDesc drawable(LookDesc look);
 
-/// What the light volume has to know.
+/// Returns the inputs of the light volume.
 LightVolumeDesc describe_light(const SceneAsset& asset, const LookDesc& look, const RestFacts& rest);
-/// What the light lattice has to know. `cells`: along the hair's largest side.
+/// Returns the inputs of the light lattice; `cells` counts along the hair's largest side.
 LightLatticeDesc describe_lattice(const SceneAsset& asset, const RestFacts& rest,
                                   const LightVolumeDesc& light_volume, uint32_t cells);
 

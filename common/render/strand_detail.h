@@ -1,5 +1,5 @@
-// How finely a picture is drawn, by its size on the screen: fewer segments where bends are not seen, fewer
-// and wider strands where they are thinner than can be seen. Pure function, any thread.
+// Chooses how finely a picture is drawn by its size on the screen: fewer segments where bends are invisible,
+// fewer and wider strands where they are too thin to see. Pure functions, any thread.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace strandcast {
 
-/// What of a scene decides, and does not change from picture to picture.
+/// Properties of a scene that decide and do not change between pictures.
 struct DetailFacts {
   uint32_t key_count = 0;
   uint32_t vertex_count = 0;  // of each
@@ -23,25 +23,26 @@ struct DetailFacts {
   bool is_finest = false;      // all followers and segments of the look, whatever the size of the picture
 };
 
-/// How finely one picture is drawn.
+/// Resolution of one picture.
 struct StrandDetail {
   uint32_t segments_per_gap = 1;  // >= 1
   uint32_t followers = 0;         // per triangle, at most those of the look
   uint32_t strand_count = 0;      // the first of keys and followers
 };
 
-/// All but the limits.
+/// Returns the facts of a scene except the limits.
 DetailFacts detail_facts(const RenderScene& scene);
-/// Key strands and so many followers per triangle.
+/// Returns the number of key strands plus `followers` followers per triangle.
 uint32_t strand_count(const DetailFacts& facts, uint32_t followers);
-/// Points that a strand has at most.
+/// Returns the largest number of points of a strand.
 uint32_t points_per_strand(const DetailFacts& facts, const StrandDetail& detail);
-/// What the strands of a picture are as wide as, at their roots: fewer are as much wider. `drawn` > 0.
+/// Returns the width at the root of a picture's strands: if fewer are drawn, each is wider. `drawn` > 0.
 float drawn_width_m(const DetailFacts& facts, const LookDesc& look, uint32_t drawn);
 StrandDetail choose_detail(const DetailFacts& facts, const LookDesc& look, const View& view,
                            const DrawTerms& terms);
 
-/// Strands that there would be without DetailFacts::max_points, beyond those of `detail`.
+/// Returns how many more strands would be drawn than `detail` says, if DetailFacts::max_points were not a
+/// limit.
 uint32_t strands_without_room(const DetailFacts& facts, const LookDesc& look, const View& view,
                               const DrawTerms& terms, const StrandDetail& detail);
 

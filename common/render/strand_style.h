@@ -1,4 +1,5 @@
-// The look's style in the numbers of shaders/lib/strand_style.glsl, and where hair parts. Pure functions.
+// Converts the look's style into the parameters of shaders/lib/strand_style.glsl, and finds where hair parts.
+// Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -9,22 +10,23 @@
 
 namespace strandcast {
 
-/// The members of StrandStyle, in their order: lengths in m, counts per strand, all else shares.
+/// Members of StrandStyle in their order: lengths in m, counts per strand, and shares.
 struct StyleNumbers {
   float clump = 0.0f, locks = 1.0f, spread_m = 0.0f, wave_m = 0.0f, wave_count = 0.0f, frizz_m = 0.0f,
         frizz_count = 0.0f, stray_share = 0.0f, stray_spread = 1.0f, length_spread = 0.0f, short_share = 0.0f;
 };
 
-/// `mean_length_m`: of a key strand at rest.
+/// Returns the parameters of a look; `mean_length_m` is that of a key strand at rest.
 StyleNumbers style_numbers(const LookDesc& look, float mean_length_m);
 
-/// What a drawn strand may lie beside its keys, m.
+/// Returns the largest distance of a drawn strand from its key strands, m.
 float style_room_m(const StyleNumbers& style);
 
-/// Per root triangle: 1 where its hair falls to different sides at rest, else 0. Followers there hang on
-/// their nearest key alone.
+/// Returns for each root triangle 1 if its hair falls to different sides at rest, else 0. Followers in such a
+/// triangle follow only their nearest key strand.
 std::vector<uint8_t> parted_triangles(const SceneAsset& asset);
-/// The triangles whose hair runs together at rest: for who lets followers hang between all three keys.
+/// Returns the triangles whose hair runs together at rest, for users that interpolate followers from all
+/// three keys.
 std::vector<RootTriangle> joined_triangles(const SceneAsset& asset);
 
 }  // namespace strandcast

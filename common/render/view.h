@@ -1,5 +1,5 @@
-// Camera mathematics: where a point of head space lands on the screen. Everything is relative to the head
-// joint, so float precision does not depend on where in the world the head is. Pure functions, any thread.
+// Camera mathematics: projects points of head space to the screen. Everything is relative to the head joint,
+// so float precision does not depend on the head's position in the world. Pure functions, any thread.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +22,8 @@ struct View {
   float target_distance_m = 1.0f;  // from the eye to the point looked at
 };
 
-/// The camera follows the head's position, not its rotation. BadInput for a camera that is not finite, sits
-/// on its target or has a field of view outside (0, pi).
+/// Makes a view. The camera follows the head's position, not its rotation. BadInput for a camera that is not
+/// finite, sits on its target or has a field of view outside (0, pi).
 Result<View> make_view(const CameraDesc& camera, const glm::dquat& world_from_head_rotation,
                        glm::uvec2 target_px);
 

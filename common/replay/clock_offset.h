@@ -1,4 +1,4 @@
-// Clock offset between a client and the server from ping round trips. Pure arithmetic, no I/O.
+// Estimates the clock offset between client and server from ping round trips. Pure arithmetic, no I/O.
 #pragma once
 
 #include <cstddef>
@@ -10,15 +10,15 @@ namespace strandcast {
 /// Keeps the probe with the smallest round trip among the last kClockWindow; its midpoint gives the offset.
 class ClockOffset {
  public:
-  /// Client send, server receive, server send, client receive; all ns, each in its own clock. Probes with a
-  /// negative round trip, one above 10 s, times that run backwards and server times beyond kMaxClockNs are
-  /// ignored.
+  /// Adds a probe: client send, server receive, server send, client receive; in ns, each in its own clock.
+  /// Invalid probes are ignored: a negative round trip or one above 10 s, times that run backwards, server
+  /// times beyond kMaxClockNs.
   void add(int64_t client_send_ns, int64_t server_receive_ns, int64_t server_send_ns,
            int64_t client_receive_ns);
   bool has_value() const { return !probes_.empty(); }
-  /// server clock minus client clock, ns; 0 without a probe.
+  /// Returns server clock minus client clock, ns; 0 without a probe.
   int64_t offset_ns() const;
-  /// Half the best round trip: the largest possible error, ns; 0 without a probe.
+  /// Returns the largest possible error, which is half the best round trip, ns; 0 without a probe.
   int64_t error_ns() const;
   int64_t to_server_ns(int64_t client_ns) const { return client_ns + offset_ns(); }
 

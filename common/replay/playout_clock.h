@@ -1,6 +1,6 @@
-// PlayoutClock: which simulation time to show at a given client time so that motion stays even although
-// frames arrive unevenly. Fits a line through recent (receive, simulation) times, so it also follows a server
-// that runs slower than real time. Pure arithmetic, one thread.
+// PlayoutClock: chooses the simulation time to show at a client time, so that motion is even although frames
+// arrive unevenly. It fits a line through recent (receive, simulation) times, so it also follows a server
+// that is slower than real time. Pure arithmetic, one thread.
 #pragma once
 
 #include <cstddef>
@@ -13,29 +13,30 @@ inline constexpr size_t kPlayoutWindow = 64;                // frames, about a s
 inline constexpr int64_t kMaxPlayoutDelayNs = 100'000'000;  // for lateness, besides the frames below
 inline constexpr int64_t kPlayoutGapNs = 500'000'000;       // a longer silence starts the fit afresh
 
-/// Below this many states a simulated second playout stays two frames behind, so that a cubic through four
-/// states (common/replay/interpolation.h) has the one after the moment that is shown; from the other on one
-/// again. In between it stays as it is.
+/// Rates (states per simulated second) at which the playout delay changes, with hysteresis. Below the first
+/// it is two frames, so that the cubic (common/replay/interpolation.h) has a state after the shown moment.
+/// Above the second it is one frame.
 inline constexpr double kCubicBelowHz = 45.0;
 inline constexpr double kLinearAboveHz = 50.0;
-/// What the second frame may cost: at 20 Hz the cubic halves the line's error, at 15 Hz it takes a third off.
+/// Largest cost of the second frame of delay in ns. At 20 Hz the cubic halves the line's error, at 15 Hz it
+/// removes a third.
 inline constexpr double kMostCubicDelayNs = 55e6;
-/// How many frames playout is to be behind, when states are so far apart in simulated and in real time and it
-/// is `now_behind` of them behind.
+/// Returns the playout delay in frames for this spacing of states in simulated and client time; `now_behind`
+/// is the current delay.
 uint32_t frames_behind(double sim_frame_ns, double client_frame_ns, uint32_t now_behind);
 
 class PlayoutClock {
  public:
-  /// No more than so many frames behind, whatever frames_behind() says, from the next add() on.
+  /// Limits the delay to `most` frames from the next add() on, whatever frames_behind() returns.
   void limit_frames_behind(uint32_t most) { most_frames_behind_ = most; }
-  /// A frame of simulation time `sim_time_ns` was received at client time `receive_time_ns`.
+  /// Adds a frame of simulation time `sim_time_ns` that was received at client time `receive_time_ns`.
   void add(int64_t receive_time_ns, int64_t sim_time_ns);
 
   bool has_value() const { return samples_.size() >= 2; }
-  /// Simulation time to show at `client_time_ns`: frames_behind() behind the fitted line, and further behind
-  /// by the lateness that all but 5 % of recent frames stay under, at most kMaxPlayoutDelayNs.
+  /// Returns the simulation time to show at `client_time_ns`: the fitted line, delayed by frames_behind()
+  /// frames and by the lateness that 95 % of recent frames stay under (at most kMaxPlayoutDelayNs).
   int64_t sim_time_at(int64_t client_time_ns) const;
-  /// The delay behind the newest frame that sim_time_at uses, client ns.
+  /// Returns the delay after the newest frame that sim_time_at() uses, client ns.
   int64_t delay_ns() const { return delay_ns_; }
 
  private:
@@ -54,12 +55,12 @@ class PlayoutClock {
   int64_t delay_ns_ = 0;
 };
 
-/// The simulation time that is shown: follows what a PlayoutClock says, but never backwards and never faster
-/// or slower than kCatchUpRate allows, so that a change of the delay or a late burst is caught up without a
-/// jump or a freeze.
+/// The simulation time that is shown. It follows a PlayoutClock, but never runs backwards, and its speed
+/// changes by at most kCatchUpRate. So a change of delay or a late burst causes neither a jump nor a freeze.
 class PlayoutCursor {
  public:
-  /// The time to show at `client_time_ns`, which does not run backwards, when `wanted_ns` would be right.
+  /// Returns the time to show at `client_time_ns`, which must not decrease, when `wanted_ns` is the ideal
+  /// time.
   int64_t advance(int64_t client_time_ns, int64_t wanted_ns);
 
  private:

@@ -1,5 +1,5 @@
-// Coordinates between states, eight at a time: on the line between two states or on the cubic through four.
-// Every coordinate by itself, the same bits from every instruction set.
+// Interpolates coordinates between states, eight at a time: linearly between two or on the cubic through
+// four. Each coordinate is independent; all instruction sets give the same bits.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ struct LineBlend {
   size_t count = 0;
   float blend = 0.0f;  // 0 gives from
 };
-/// out = from + blend (to - from).
+/// Computes out = from + blend (to - from).
 void blend_on_line(simd::InstructionSet set, const LineBlend& of);
 
 struct CubicBlend {
@@ -30,13 +30,13 @@ struct CubicBlend {
   float bend_before = 0.0f;
   float bend_after = 0.0f;
 };
-/// What CubicTerms says, and the line alone where a coordinate jumps: where one of its three steps is more
-/// than kJumpSteps times the other two together. So the cubic leaves the states by no more than half a usual
-/// step beside a jump.
+/// Evaluates CubicTerms, but linearly where a coordinate jumps: one of its three steps exceeds kJumpSteps
+/// times the sum of the other two. So beside a jump the cubic overshoots the states by at most half a usual
+/// step.
 void blend_on_cubic(simd::InstructionSet set, const CubicBlend& of);
 
-/// A step of more than this many times the other two together is a jump. On recorded hair, wild clips too,
-/// 1 % of coordinates take one, and it adds no more than 1.5 % to the error.
+/// Ratio above which a step is a jump. On recorded hair, including wild clips, 1 % of coordinates jump;
+/// treating them linearly adds at most 1.5 % to the error.
 inline constexpr float kJumpSteps = 8.0f;
 
 }  // namespace strandcast

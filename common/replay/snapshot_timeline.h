@@ -1,5 +1,5 @@
-// SnapshotTimeline: the newest decoded states and the clock that says which moment to show. Copies are cheap,
-// because states are shared and never change: the receiving thread keeps one, a drawing thread works on a
+// SnapshotTimeline: the newest decoded states and the clock that chooses the moment to show. Copies are
+// cheap, because states are shared and immutable: the receiving thread owns one, a drawing thread works on a
 // copy. Pure logic.
 #pragma once
 
@@ -21,15 +21,15 @@ enum class Playout {
   Smooth,      // interpolated between snapshots, behind by an adaptive delay
 };
 
-/// Whether a state comes from the stream of the ones before.
+/// Whether a state belongs to the same stream as the preceding ones.
 enum class Continuity { SameStream, OtherStream };
 
-/// Smooth playout at 60 Hz is at most 100 ms behind, and as much again after a burst.
+/// Number of states kept. Smooth playout at 60 Hz lags at most 100 ms, and twice that after a burst.
 inline constexpr size_t kKeptSnapshots = 16;
-/// Of huge states only as many are kept as fit, but the two that a picture lies between: the line is then
-/// what is drawn.
+/// Memory limit of kept states. At least the two that a picture lies between are kept; they allow linear
+/// interpolation only.
 inline constexpr uint64_t kMaxKeptSnapshotBytes = 256ull << 20;
-/// A keyframe of another stream may repeat a state this much older than the newest one.
+/// Greatest age, relative to the newest state, of a state that a keyframe of another stream may repeat.
 inline constexpr int64_t kStreamOverlapNs = 1'000'000'000;
 
 class SnapshotTimeline {
@@ -38,14 +38,14 @@ class SnapshotTimeline {
   void set_playout(Playout playout) { playout_ = playout; }
   Playout playout() const { return playout_; }
 
-  /// A state received at `receive_time_ns` on the client's clock.
+  /// Adds a state received at `receive_time_ns` on the client's clock.
   void add(std::shared_ptr<const Snapshot> snapshot, int64_t receive_time_ns, Continuity continuity);
 
-  /// Null before the first.
+  /// Returns the newest state; null before the first.
   std::shared_ptr<const Snapshot> newest() const;
   const std::deque<std::shared_ptr<const Snapshot>>& snapshots() const { return snapshots_; }
   const PlayoutClock& clock() const { return clock_; }
-  /// How often time has run backwards: the server was reset.
+  /// Returns how often time has run backwards because the server was reset.
   uint64_t restarts() const { return restarts_; }
 
  private:
@@ -56,15 +56,15 @@ class SnapshotTimeline {
   uint64_t restarts_ = 0;
 };
 
-/// Walks through timelines, each newer than the last, without jumping back. What it chose between two states
-/// stays until the later one is reached, so that a change of it is never seen. One thread.
+/// Plays successive copies of a timeline without jumping back. The interpolation chosen between two states
+/// stays until the later one is reached, so that a change is never visible. One thread.
 class TimelinePlayer {
  public:
-  /// For states without all strands, made from the asset's rest shape.
+  /// Sets the fill for states without all strands, made from the asset's rest shape.
   void set_fill(StrandFill fill) { blend_.set_fill(std::move(fill)); }
-  /// What to draw at client time `client_time_ns`; nothing while the timeline is empty.
+  /// Returns the strands to draw at client time `client_time_ns`; empty while the timeline is empty.
   std::optional<PosedStrands> strands_at(const SnapshotTimeline& timeline, int64_t client_time_ns);
-  /// How the newest strands were made, and the simulated moment that they are of.
+  /// Interpolation of the newest strands, and their simulated time.
   Interpolation interpolation() const { return interpolation_; }
   int64_t sim_time_ns() const { return sim_time_ns_; }
 

@@ -1,5 +1,5 @@
-// StateBlend: strands at any moment between known states, by whichever way between them interpolation.h
-// chooses. Pure logic; one thread.
+// StateBlend: strands at any moment between known states, by the method that interpolation.h chooses. Pure
+// logic; one thread.
 #pragma once
 
 #include <array>
@@ -15,27 +15,27 @@
 
 namespace strandcast {
 
-/// The strands of one snapshot, as the server draws them when it has all.
+/// Returns the strands of one snapshot, filled up to all strands as the server draws them.
 PosedStrands posed_strands_of(const Snapshot& snapshot, StrandFill& fill);
 
 class StateBlend {
  public:
-  /// For states without all strands, made from the asset's rest shape.
+  /// Sets the fill for states without all strands, made from the asset's rest shape.
   void set_fill(StrandFill fill);
-  /// Forgets the states that it was between.
+  /// Forgets the states of the last interpolation.
   void leave() { knots_ = {}; }
 
   PosedStrands at(const Snapshot& state) { return posed_strands_of(state, fill_); }
-  /// At `sim_time_ns` between states `later - 1` and `later` of these, the oldest first. What it chose
-  /// between two states stays as long as it is asked for moments between them, so that a change is never
-  /// seen.
+  /// Returns the strands at `sim_time_ns` between states `later - 1` and `later`; `states` are ordered by
+  /// time. The method chosen for two states stays while moments between them are asked for, so that a change
+  /// is never visible.
   PosedStrands between(const std::deque<std::shared_ptr<const Snapshot>>& states, size_t later,
                        int64_t sim_time_ns);
-  /// How the newest strands between two states were made.
+  /// Returns the interpolation of the newest strands.
   Interpolation interpolation() const { return chosen_; }
 
  private:
-  /// A state with all its strands, made once for all moments that need it.
+  /// Prepares states with all their strands, once for all moments that need them.
   struct Knot {
     std::shared_ptr<const Snapshot> snapshot;
     PosedStrands strands;

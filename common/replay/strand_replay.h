@@ -1,6 +1,6 @@
-// StrandReplay: received strand frames -> what to draw now. Decodes, keeps the newest snapshots, blends
-// between them, asks for keyframes and measures. A viewer never decides: between snapshots it only
-// interpolates. One thread; no network, no GL.
+// StrandReplay: turns received strand frames into strands to draw. Decodes, keeps the newest snapshots,
+// interpolates between them, asks for keyframes and measures. A viewer never simulates: between snapshots it
+// only interpolates. One thread; no network, no GL.
 #pragma once
 
 #include <cstdint>
@@ -32,54 +32,55 @@ struct ReplayStats {
   std::string last_error;  // of the newest rejected frame
 };
 
-/// Asks the server for a keyframe; called at most once in kKeyframeRequestInterval.
+/// Asks the server for a keyframe; called at most once per kKeyframeRequestInterval.
 using KeyframeRequester = std::function<void()>;
 
 class StrandReplay {
  public:
-  /// Of a stream as its Welcome announces it. NotFound or BadInput when this program cannot decode it.
+  /// Makes a replay for a stream as its Welcome announces it. NotFound or BadInput if this program cannot
+  /// decode it.
   static Result<std::unique_ptr<StrandReplay>> make(const std::string& codec,
                                                     const StrandStreamLimits& limits,
                                                     KeyframeRequester request_keyframe);
 
-  /// Decodes one strand frame (header + payload), received at `receive_time_ns` on the client's clock. A
-  /// frame that cannot be used is counted, asks for a keyframe and returns null. `clock` may have no value
-  /// yet.
+  /// Decodes one strand frame (header and payload), received at `receive_time_ns` on the client's clock.
+  /// Returns null for a frame that cannot be used, counts it and asks for a keyframe. `clock` may have no
+  /// value yet.
   std::shared_ptr<const Snapshot> receive(std::span<const std::byte> message, int64_t receive_time_ns,
                                           const ClockOffset& clock);
 
-  /// Other frames were sent instead for a while: the next keyframe continues nothing that could be missing.
+  /// Accepts the next keyframe with any sequence number, because other frames were sent instead for a while.
   void forget_sequence() { last_sequence_ = 0; }
 
-  /// The server goes on by this codec: from the first keyframe of another stream on, or at once where
-  /// nothing was decoded yet. `rest_in_head_m` as for set_rest_shape(); empty before the asset came. NotFound
-  /// when this program cannot decode it; then nothing changes.
+  /// Changes to another codec: from the first keyframe of a new stream on, or at once if nothing was decoded
+  /// yet. `rest_in_head_m` as for set_rest_shape(); empty before the asset came. NotFound if this program
+  /// cannot decode it; then nothing changes.
   Status follow_codec(const std::string& codec, std::span<const glm::vec3> rest_in_head_m);
 
-  /// The asset's rest shape; comes before the first strand frame.
+  /// Sets the asset's rest shape; call it before the first strand frame.
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m);
 
   void set_playout(Playout playout) { timeline_.set_playout(playout); }
   Playout playout() const { return timeline_.playout(); }
 
-  /// Newest snapshot, null before the first keyframe.
+  /// Returns the newest snapshot; null before the first keyframe.
   std::shared_ptr<const Snapshot> newest() const { return timeline_.newest(); }
-  /// The newest states, for a drawing thread to copy.
+  /// Returns the newest states, which a drawing thread may copy.
   const SnapshotTimeline& timeline() const { return timeline_; }
-  /// What to draw at client time `client_time_ns`; nothing before the first keyframe.
+  /// Returns the strands to draw at client time `client_time_ns`; empty before the first keyframe.
   std::optional<PosedStrands> strands_at(int64_t client_time_ns) {
     return player_.strands_at(timeline_, client_time_ns);
   }
-  /// Time since the server sent the newest decoded frame, ms; 0 without a clock estimate.
+  /// Returns the time since the server sent the newest decoded frame, ms; 0 without a clock estimate.
   double state_age_ms(int64_t client_time_ns, const ClockOffset& clock) const;
 
-  /// Of the newest decoded state; each stream codes its states by itself.
+  /// Returns the stream of the newest decoded state; each stream numbers its frames itself.
   uint16_t stream_id() const { return stream_id_; }
   const ReplayStats& stats() const { return stats_; }
   const StageTimer& decode_timer() const { return decode_timer_; }
-  /// From the arrival of a motion sample at the server to the decoded state that contains it, ms.
+  /// Times from the arrival of a motion sample at the server to the decoded state that contains it, ms.
   const StageTimer& motion_latency_timer() const { return motion_latency_timer_; }
-  /// How far smooth playout stays behind, ms.
+  /// Returns the delay of smooth playout, ms.
   double playout_delay_ms() const { return static_cast<double>(timeline_.clock().delay_ns()) * 1e-6; }
 
  private:

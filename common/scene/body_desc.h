@@ -1,5 +1,5 @@
-// BodyDesc: what of a scene stands for the body under the head: capsules between joints of the motion stream
-// or between places in head space, planes, and how strands answer. Plain data, any thread.
+// BodyDesc: description of the body under the head: planes, capsules between joints of the motion stream or
+// points in head space, and the response of strands. Plain data, any thread.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -38,18 +38,19 @@ struct BodyDesc {
   std::vector<BodyPlaneDesc> planes = {};
   std::string response = kBodyResponses[0];
   double friction = 0.3;  // Coulomb coefficient
-  /// How far vertices stay away: at the root kBodyClearanceM, at the tip this (Nalu's growing spheres).
+  /// Distance that vertices keep: kBodyClearanceM at the root, growing to this value at the tip (growing
+  /// spheres of Nalu).
   double tip_clearance_m = kBodyClearanceM;
   double force_per_s2 = 1800.0;  // of the response "force": acceleration per depth
-  /// From a joint as the stream has it to where it is under this head: captured heads are held at the top of
-  /// the spine, this one in its middle.
+  /// Offset from a captured joint to its position under this head: captured heads are held at the top of the
+  /// spine, this one in its middle.
   glm::dvec3 joint_offset_m{0.0, -0.09, -0.02};
 
   bool acts() const { return preset != kNoBody || !capsules.empty() || !planes.empty(); }
   bool operator==(const BodyDesc&) const = default;
 };
 
-/// Names of joints that sources give theirs (common/motion/body_joints.h) and that presets know.
+/// Joint names that sources use (common/motion/body_joints.h) and that presets know.
 inline constexpr const char* kNeckJoint = "neck";
 inline constexpr const char* kChestJoint = "chest";
 inline constexpr const char* kLeftShoulderJoint = "left_shoulder";
@@ -57,17 +58,17 @@ inline constexpr const char* kRightShoulderJoint = "right_shoulder";
 inline constexpr const char* kLeftElbowJoint = "left_elbow";
 inline constexpr const char* kRightElbowJoint = "right_elbow";
 
-/// A capsule that a scene means, and what a person calls it.
+/// A capsule of a scene and its name for people.
 struct NamedCapsule {
   std::string field;  // "body.capsules.2", "body.preset upper_body"
   BodyCapsuleDesc capsule;
 };
-/// The preset's, then the scene's own; at most kMaxBodyCapsules.
+/// Returns the preset's capsules followed by the scene's own; at most kMaxBodyCapsules.
 std::vector<NamedCapsule> capsules_of(const BodyDesc& body);
-/// How many of them are the preset's; kMaxBodyCapsules + 1 for one that is unknown.
+/// Returns the number of capsules of a preset; kMaxBodyCapsules + 1 for an unknown one.
 size_t preset_size(const std::string& preset);
 
-/// Where joints were seen, by name; head space.
+/// Observed positions of joints by name; head space.
 struct JointPlaces {
   std::vector<std::string> name;
   std::vector<glm::dvec3> place_m;  // as many
@@ -76,10 +77,10 @@ struct JointPlaces {
 };
 inline constexpr size_t kMaxMotionJoints = 12;
 inline constexpr size_t kMaxJointNameBytes = 32;
-/// From the head's joint; further away is no body.
+/// Greatest plausible distance of a joint from the head's joint; farther ones are ignored.
 inline constexpr double kMaxJointDistanceM = 10.0;
 
-/// Places of a body's shapes: as far as its joints are known. Head space.
+/// Positions of a body's shapes whose joints are known. Head space.
 struct BodyShapes {
   std::vector<BodyCapsule> capsules;  // as long as now, so before; in the order of capsules_of()
   std::vector<std::string> missing;   // joints that capsules need, with their fields, a sentence for each

@@ -1,4 +1,5 @@
-// SceneFeatures: the only place that decides what runs. Passes, buffers and shader variants ask nothing else.
+// SceneFeatures: the only place that decides what runs. Passes, buffers and shader variants depend on nothing
+// else.
 #pragma once
 
 #include <string>
@@ -9,8 +10,8 @@
 
 namespace strandcast {
 
-/// Facts that may change while running, kept apart from the scene's own.
-/// How much of the simulation runs: each level leaves out what the one before it does, and more.
+/// How much of the simulation runs. Each level leaves out more than the one before it. It may change while
+/// running, unlike the facts of the scene.
 enum class DetailLevel {
   Full,
   NoHairHair,     // hair does not act on hair
@@ -28,12 +29,12 @@ struct RuntimeFacts {
   uint32_t frame_viewers = 0;
   DetailLevel detail = DetailLevel::Full;
   std::string detail_reason = {};  // of a level that is not Full
-  /// Facts by name that hold whatever decides otherwise: to measure what leaving them out saves. A fact that
-  /// needs something loaded (has_distance_field) stays without it.
+  /// Names of facts that are forced to be true, to measure what leaving them out saves. A fact that needs
+  /// loaded data (has_distance_field) stays false without it.
   std::vector<std::string> forced = {};
 };
 
-/// Positive facts; all false = the barest simulation.
+/// Facts about a scene, all positive; if all are false, the simulation is the barest one.
 struct SceneFeatures {
   bool has_wind = false;        // mean, gusts or a wind stream
   bool has_turbulence = false;  // wind varies over the head
@@ -54,16 +55,17 @@ struct SceneFeatures {
   bool operator==(const SceneFeatures&) const = default;
 };
 
-/// "full", "no hair-hair", "fewer strands", "fewer vertices", "half rate", "follow the head".
+/// Returns the name of a level: "full", "no hair-hair", "fewer strands", "fewer vertices", "half rate",
+/// "follow the head".
 const char* to_string(DetailLevel level);
 
 SceneFeatures analyse(const SceneDesc& scene, const RuntimeFacts& facts);
-/// Share of the strands that is simulated, the first of them; in (0, 1].
+/// Returns the share of strands that is simulated, in (0, 1]; it is a prefix of all strands.
 double simulated_share(const SceneDesc& scene, const RuntimeFacts& facts);
-/// Below this there is no half rate: states would come too rarely to be shown smoothly.
+/// Lowest rate at which half rate is used; below it, states would be too rare to be shown smoothly.
 inline constexpr double kLeastHalvedRateHz = 40.0;
 
-/// One fact in words: name, value, and why it has that value ("scene.wind has no mean and no gusts").
+/// One fact for people: its name, value and reason ("scene.wind has no mean and no gusts").
 struct FeatureReason {
   std::string name;
   bool value = false;
@@ -71,14 +73,14 @@ struct FeatureReason {
 };
 std::vector<FeatureReason> explain(const SceneDesc& scene, const RuntimeFacts& facts);
 
-/// A fact's value with its cause.
+/// A fact's value and its reason.
 struct Fact {
   bool value = false;
   std::string reason;
 };
 
-/// What of a picture there is to draw, and what the methods that the look names need for it: for the server's
-/// frames and for viewers, who have no scene file.
+/// What there is to draw in a picture, and what the drawing methods named by the look need. Used for the
+/// server's pictures and by viewers, who have no scene file.
 struct PictureFeatures {
   Fact has_strands;
   Fact has_followers;

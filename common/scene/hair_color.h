@@ -1,5 +1,4 @@
-// Colours of hair: presets by name, and the colour that an amount of melanin gives. Pure functions, any
-// thread.
+// Colours of hair: presets by name, and colours from amounts of melanin. Pure functions, any thread.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -10,7 +9,8 @@
 
 namespace strandcast {
 
-/// Linear RGB, 0..1: what is left of white light that was scattered many times among such strands.
+/// Colours at root and tip, linear RGB, 0..1: the share of white light that leaves the hair after much
+/// scattering between strands.
 struct HairColors {
   glm::vec3 root{0.0f};
   glm::vec3 tip{0.0f};
@@ -22,24 +22,24 @@ struct HairColorPreset {
 };
 std::span<const HairColorPreset> hair_color_presets();
 
-/// "custom", "melanin" or the name of a preset.
+/// Returns whether `name` is "custom", "melanin" or a preset.
 bool is_hair_color(std::string_view name);
-/// Said to whoever names another.
+/// Error sentence for an unknown name.
 inline constexpr const char* kHairColorSentence =
     "must be custom, melanin, black, brown, blond, red, grey or dyed";
 
-/// Absorption per strand radius of concentrations >= 0 (Chiang et al. 2016, section 4.2).
+/// Returns absorption per strand radius for melanin concentrations >= 0 (Chiang et al. 2016, section 4.2).
 glm::dvec3 absorption_of_melanin(double eumelanin, double pheomelanin);
-/// Absorption per strand radius with which hair as a whole has a colour, and back (their equation 9, a fit).
-/// `roughness`: azimuthal, 0..1. Components of the colour within (0, 1].
+/// Convert between the colour of hair as a whole and absorption per strand radius (equation 9 of Chiang et
+/// al., a fit). `roughness`: azimuthal, 0..1. Colour components are within (0, 1].
 inline constexpr double kUsualRoughness = 0.3;
 glm::dvec3 absorption_of_color(const glm::dvec3& color, double roughness = kUsualRoughness);
 glm::dvec3 color_of_absorption(const glm::dvec3& absorption, double roughness = kUsualRoughness);
 
-/// The colour that hair with these concentrations has as a whole.
+/// Returns the colour of hair as a whole with these melanin concentrations.
 glm::vec3 color_of_melanin(float eumelanin, float pheomelanin);
 
-/// What `look` asks for. An unknown name counts as "custom".
+/// Returns the colours that `look` states; an unknown name counts as "custom".
 HairColors colors_of(const LookDesc& look);
 
 }  // namespace strandcast

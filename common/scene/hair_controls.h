@@ -1,13 +1,13 @@
-// HairControls: what a newcomer changes first of some hair, as factors on what the scene says otherwise, so
-// that a change of quality, solver or groom leaves them alone. Plain data; the one table of their names and
-// ranges. Who applies them: server/source/hair_factors, server/scene/scene_content and step_builder.
+// HairControls: the settings of hair that a newcomer changes first, as factors on the scene's values. They
+// thus survive a change of quality, solver or groom. Plain data, and the one table of their names and ranges.
+// Applied by server/source/hair_factors, server/scene/scene_content and step_builder.
 #pragma once
 
 #include <array>
 
 namespace strandcast {
 
-/// 1 = as the scene says.
+/// Factors on the scene's values; 1 changes nothing.
 struct HairControls {
   double length = 1.0;  // of every strand's length as loaded
   double curl = 1.0;    // amplitude of waves and curls about each strand's smooth path; 0 = combed straight
@@ -27,7 +27,7 @@ struct HairControl {
   const char* note;  // a few words for people
 };
 
-/// In the order in which people see them; quality stands before them.
+/// Controls in the order in which they are shown; quality precedes them.
 inline constexpr std::array kHairControls{
     HairControl{"length", &HairControls::length, 0.3, 1.5, "of its length",
                 "0.5 = half as long as the groom, 1 = as it is"},

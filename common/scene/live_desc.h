@@ -1,6 +1,6 @@
-// LiveDesc: one input of live motion capture that a scene asks for: a port that senders of a protocol may
-// send to, or a peer that is asked. Plain data, any thread. Names of protocols and of what their numbers may
-// mean are checked by whoever owns the table (server/input/live/live_parser.h).
+// LiveDesc: one live motion capture input of a scene: a port that senders of a protocol use, or a peer that
+// is asked. Plain data, any thread. server/input/live/live_parser.h checks the names of protocols and data
+// meanings.
 #pragma once
 
 #include <cstddef>

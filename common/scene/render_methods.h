@@ -1,5 +1,5 @@
-// Methods by which hair can be drawn, as rows of tables: a scene names one of each kind, shader variants are
-// numbered like the enumerators. Pure data, any thread.
+// Methods of drawing hair, as rows of tables. A scene names one of each kind; shader variants have the
+// numbers of the enumerators. Pure data, any thread.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,10 @@
 
 namespace strandcast {
 
-/// The first row of every table, and what renderers without a choice do.
+/// Name of the first row of every table; renderers without a choice use it.
 inline constexpr const char* kMainMethod = "main";
 
-/// Names of rows. One kind of method has one such choice, whatever else is drawn.
+/// One method of each kind, by name of its row.
 struct RenderMethodsDesc {
   std::string shading = kMainMethod;
   std::string scattering = kMainMethod;
@@ -33,7 +33,7 @@ struct RenderMethodsDesc {
 
 /// How one strand scatters light.
 enum class ShadingModel : uint8_t { Sadeghi, KajiyaKay, Karis, Chiang, Marschner };
-/// How light that comes through other strands is taken into account.
+/// How light that passes through other strands is computed.
 enum class ScatteringModel : uint8_t { Volume, None, Isosurface, Dual };
 /// Where the light of a strand is computed.
 enum class ShadingPlace : uint8_t { Vertex, Fragment };
@@ -54,14 +54,14 @@ class MethodTable {
   }
   std::span<const MethodRow> rows() const { return rows_; }
   bool has(std::string_view name) const { return find(name) < rows_.size(); }
-  /// Of a name that is in the table.
+  /// Returns the method of a name that is in the table.
   Method at(std::string_view name) const {
     const size_t row = find(name);
     CHECK(row < rows_.size());
     return static_cast<Method>(row);
   }
   const MethodRow& row(Method method) const { return rows_[static_cast<size_t>(method)]; }
-  /// Said to whoever names another; names all that there are.
+  /// Error sentence for an unknown name; it lists all names.
   const char* refusal() const { return refusal_.c_str(); }
 
  private:

@@ -16,7 +16,7 @@ inline constexpr uint32_t kMaxScenarioDatagramBytes = 65'507;  // of UDP over IP
 /// Loads a scenario; relative paths in it start at the file's folder.
 Result<Scenario> load_scenario(const std::filesystem::path& path);
 
-/// Parses its text; `place` names it in errors, and its paths start at `folder`.
+/// Parses a scenario's text; `place` names it in errors, and relative paths start at `folder`.
 Result<Scenario> parse_scenario(const std::string& text, const std::string& place,
                                 const std::filesystem::path& folder);
 

@@ -1,6 +1,5 @@
 // SceneDesc: a validated scene in SI units. Made by scene_file.h from protobuf text
-// (proto/strandcast/v1/scene.proto) or by built_in_scene(); everything downstream reads only this. Plain
-// data.
+// (proto/strandcast/v1/scene.proto) or by built_in_scene(); all later stages read only this. Plain data.
 #pragma once
 
 #include <cstdint>
@@ -60,7 +59,7 @@ struct FileGroomDesc {
 
 inline constexpr size_t kMaxMeshFiles = 8;  // that one head is drawn from
 
-/// Wind from the scene itself; a wind stream, once one is connected, replaces it.
+/// Wind of the scene itself; a connected wind stream replaces it.
 struct WindDesc {
   glm::vec3 mean_mps{0.0f};     // world
   float gust_intensity = 0.0f;  // standard deviation over mean speed, 0 = steady
@@ -71,7 +70,8 @@ struct WindDesc {
   bool operator==(const WindDesc&) const = default;
 };
 
-/// Angles from a segment to the next, from the root to the tip. How the groom bends is always allowed.
+/// Greatest angles between successive segments at root and tip. The bends of the groom at rest are always
+/// allowed.
 struct BendLimitDesc {
   double least_root_deg = 0.0;
   double least_tip_deg = 0.0;
@@ -90,7 +90,7 @@ inline constexpr const char* kDetailAuto = "auto";
 inline constexpr const char* kIdleFollow = "follow";
 inline constexpr const char* kIdleFull = "full";
 
-/// How much is simulated, by who looks and how large the hair is on their screens.
+/// How the amount of simulation depends on the readers and on the size of the hair on their screens.
 struct DetailDesc {
   std::string mode = kDetailOff;   // kDetailOff: whoever reads gets all of it; kDetailAuto: by size
   double full_at_px = 240.0;       // height of the hair on a screen from which on all of it is simulated
@@ -128,8 +128,8 @@ struct HeadDesc {
   bool operator==(const HeadDesc&) const = default;
 };
 
-/// How drawn strands lie between and beside the simulated ones. Shares are of a strand's length unless told
-/// otherwise; all of it is 0 at the root.
+/// How drawn strands lie between and beside simulated ones. Shares are relative to strand length unless
+/// stated otherwise; all offsets vanish at the root.
 struct StrandStyleDesc {
   float clump = 0.8f;       // 0..1: how far tips are drawn together into locks
   uint32_t locks = 5;       // per root triangle, 1..16
@@ -147,7 +147,7 @@ struct StrandStyleDesc {
   bool operator==(const StrandStyleDesc&) const = default;
 };
 
-/// How a strand takes the light: weights of the terms, and how strands differ.
+/// How a strand reflects light: weights of the terms, and variation between strands.
 struct HairShadingDesc {
   float diffuse = 0.42f;
   float scatter = 0.5f;           // light that comes through other strands
@@ -198,7 +198,7 @@ struct LookDesc {
   bool operator==(const LookDesc&) const;
 };
 
-/// Camera about the head: it follows the head's position, not its rotation.
+/// Camera that follows the head's position, but not its rotation.
 struct CameraDesc {
   glm::vec3 offset_m{0.22f, 0.07f, 0.62f};  // from the point looked at, world axes
   glm::vec3 target_m{0.0f, -0.055f, 0.0f};  // from the head joint, world axes
@@ -267,7 +267,7 @@ struct SceneDesc {
   bool operator==(const SceneDesc&) const;
 };
 
-/// The scene that runs when no file is given: 2,000 procedural strands x 16, head, gentle gusts.
+/// Returns the scene that runs without a file: 2,000 procedural strands x 16 vertices, head, gentle gusts.
 SceneDesc built_in_scene();
 
 }  // namespace strandcast

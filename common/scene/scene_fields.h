@@ -1,6 +1,6 @@
-// The one list of scene fields with their ranges, walked by the reader and the writer of scene files, and for
-// look and camera by those of messages (common/wire), so that they cannot disagree. Names are those of
-// scene.proto; a name that scene.proto lacks is a broken invariant found by the first test.
+// The one list of scene fields with their ranges. Readers and writers of scene files walk it, and those of
+// messages (common/wire) for look and camera, so that they cannot disagree. Names are those of scene.proto; a
+// name that is missing there is a broken invariant, which the first test finds.
 #pragma once
 
 #include <algorithm>
@@ -305,7 +305,7 @@ void visit_live(Visitor& v, LiveDesc& live) {
   v.number("scale", live.scale, kLiveScale);
 }
 
-/// Whether each head of a scene is called otherwise than all others.
+/// Returns whether all heads of a scene have different names.
 inline bool have_own_names(const SceneDesc& scene) {
   std::vector<std::string> names = {scene.name};
   for (const SceneDesc& head : scene.heads) names.push_back(head.name);
@@ -313,7 +313,7 @@ inline bool have_own_names(const SceneDesc& scene) {
   return std::adjacent_find(names.begin(), names.end()) == names.end();
 }
 
-/// Shows every field of `scene` to the visitor, in the order of scene.proto.
+/// Calls the visitor for every field of `scene`, in the order of scene.proto.
 template <class Visitor>
 void visit_scene(Visitor& v, SceneDesc& scene) {
   v.text("name", scene.name, kMaxNameBytes);

@@ -12,29 +12,29 @@ namespace strandcast {
 
 inline constexpr uint64_t kMaxSceneFileBytes = 1u << 20;
 
-/// Loads a scene; relative paths in it are resolved against the scene file's folder. `overrides` are
-/// "path=value" pairs applied before validation, for example "stream.bound_m=0.0005",
-/// "solver.parameters.damping=0.9" or "colliders.0.radius_m=0.1"; relative paths in them start at the current
-/// folder. The solver's name and parameters are checked by whoever owns the solver table.
+/// Loads a scene; relative paths in it start at the file's folder. `overrides` are "path=value" pairs applied
+/// before validation, for example "stream.bound_m=0.0005" or "colliders.0.radius_m=0.1"; relative paths in
+/// them start at the current folder. The owner of the solver table checks the solver's name and parameters.
 Result<SceneDesc> load_scene(const std::filesystem::path& path, const std::vector<std::string>& overrides);
 
 /// Parses scene text; `place` names it in errors.
 Result<SceneDesc> parse_scene(const std::string& text, const std::string& place,
                               const std::vector<std::string>& overrides);
 
-/// The built-in scene with overrides applied.
+/// Returns the built-in scene with overrides applied.
 Result<SceneDesc> built_in_scene_with(const std::vector<std::string>& overrides);
 
-/// A scene with overrides applied and validated again, for changes while running.
+/// Returns a scene with overrides applied and validated, for changes while running.
 Result<SceneDesc> with_overrides(const SceneDesc& scene, const std::vector<std::string>& overrides);
 
-/// The scene as protobuf text that parse_scene reads back to an equal SceneDesc.
+/// Returns the scene as protobuf text, which parse_scene() reads back to an equal SceneDesc.
 std::string to_text(const SceneDesc& scene);
-/// Likewise in one line, for messages.
+/// Returns the scene as text in one line, for messages.
 std::string to_line(const SceneDesc& scene);
-/// With paths that hold wherever it is saved; relative ones start at the current folder.
+/// Returns the scene with absolute paths, so that it can be saved anywhere; relative ones start at the
+/// current folder.
 SceneDesc with_absolute_paths(SceneDesc scene);
-/// Look and camera alone: a scene whose other fields keep their defaults.
+/// Returns look and camera as the text of a scene whose other fields keep their defaults.
 std::string to_text(const LookDesc& look, const CameraDesc& camera);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// Methods by which hair shadows itself, is seen through and has smooth edges, as rows of tables: a renderer
-// is given one of each kind. Pure data, any thread. What draws them is in common/render/shadow and
+// Methods of self-shadowing, transparency and antialiasing of hair, as rows of tables; a renderer uses one of
+// each kind. Pure data, any thread. They are implemented in common/render/shadow and
 // common/render/transparency.
 #pragma once
 
@@ -12,18 +12,19 @@
 
 namespace strandcast {
 
-/// How much of the light reaches a strand through the others. Shader variants of SHADOW have these numbers.
+/// How the light that reaches a strand through other strands is computed. Shader variants of SHADOW have
+/// these numbers.
 enum class ShadowMethod : uint8_t { Volume, None, DeepOpacity, OpacityMaps, DensityRays, DeepShadow, Hybrid };
-/// How strands that cover a part of a pixel are put in front of one another.
+/// How strands that cover part of a pixel are ordered and blended.
 enum class TransparencyMethod : uint8_t { Hashed, Lists, ThreeDepths, Weighted, Moments };
-/// How the edge of a strand becomes smooth.
+/// How edges of strands are antialiased.
 enum class AntialiasingMethod : uint8_t { Analytic, Msaa4, DensitySamples };
 
 const MethodTable<ShadowMethod>& shadow_methods();
 const MethodTable<TransparencyMethod>& transparency_methods();
 const MethodTable<AntialiasingMethod>& antialiasing_methods();
 
-/// One of each kind.
+/// One method of each kind.
 struct RenderMethods {
   ShadowMethod shadow = ShadowMethod::Volume;
   TransparencyMethod transparency = TransparencyMethod::Hashed;
@@ -37,14 +38,15 @@ struct RenderMethods {
   bool operator==(const RenderMethods&) const = default;
 };
 
-/// BadInput for kinds that do not go together.
+/// Returns BadInput for methods that cannot be combined.
 Status check_render_methods(const RenderMethods& methods);
 
-/// By the names of their rows. BadInput names an unknown one with all that there are, and kinds that do not
-/// go together.
+/// Finds methods by the names of their rows. BadInput for an unknown name (with all known ones) and for
+/// methods that cannot be combined.
 Result<RenderMethods> find_render_methods(const RenderMethodsDesc& names);
 
-/// Empty where the methods of a look go together, else why they do not. Unknown names count as the main ones.
+/// Returns why the methods of a look cannot be combined; empty if they can. Unknown names count as the main
+/// methods.
 const char* method_conflict(const RenderMethodsDesc& methods);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// What protobuf's text parser finds wrong, as one error with line and column. Private to common/scene.
+// Turns the errors of protobuf's text parser into one error with line and column. Private to common/scene.
 #pragma once
 
 #include <google/protobuf/io/tokenizer.h>
@@ -9,7 +9,7 @@
 
 namespace strandcast {
 
-/// "file:3:7" from a line and column that count from 0.
+/// Returns "file:3:7" for a line and column that count from 0.
 std::string place_at(const std::string& place, int line, int column);
 
 /// Keeps the parser's first error; an unknown field gets the list of known ones.

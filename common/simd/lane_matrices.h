@@ -1,5 +1,5 @@
-// Vectors of four, matrices and unsigned vectors of GLSL over lanes (common/simd/lanes.h), and vectors that
-// are the same in all lanes. For kernels of the simulation.
+// GLSL's four-component vectors, matrices and unsigned vectors over lanes (common/simd/lanes.h), and uniform
+// vectors, which have one value for all lanes. For kernels of the simulation.
 #pragma once
 
 #include "common/simd/lanes.h"

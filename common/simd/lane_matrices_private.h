@@ -1,8 +1,7 @@
-// Vectors of four, matrices and unsigned vectors of GLSL, and vectors that are the same in all lanes as
-// uniform blocks hold them, over whatever Float is where this is included (as
-// common/simd/lane_vectors_private.h).
+// GLSL's four-component vectors, matrices, unsigned vectors and uniform vectors over the Float type of the
+// including header. Included inside its namespace, as common/simd/lane_vectors_private.h is.
 
-/// The same in all lanes; placed as in a uniform block.
+/// A vector with one value for all lanes, laid out as in a uniform block.
 struct alignas(16) UniformVec4 {
   float x, y, z, w;
   STRANDCAST_LANES vec3 xyz() const { return {Float(x), Float(y), Float(z)}; }
@@ -64,7 +63,7 @@ STRANDCAST_LANES vec4 select(Bool which, vec4 yes, vec4 no) {
 STRANDCAST_LANES Float distance(vec3 a, vec3 b) {
   return length(a - b);
 }
-/// Whether any component differs.
+/// Returns in each lane whether any component differs.
 STRANDCAST_LANES Bool operator!=(vec3 a, vec3 b) {
   return a.x != b.x || a.y != b.y || a.z != b.z;
 }

@@ -1,6 +1,6 @@
-// Pairs of lanes: everything of common/simd/lanes.h and lane_matrices.h over two registers at a time. What
-// one result waits for, roots and quotients above all, is then half as long for each strand: for kernels that
-// walk along strands and wait more than they compute. The same bits.
+// Pairs of lanes: the types of common/simd/lanes.h and lane_matrices.h over two registers at a time. Two
+// independent chains of operations hide the latency of roots and quotients. For kernels that walk along
+// strands and wait for results more than they compute. Results are the same bits as with single registers.
 #pragma once
 
 #include "common/simd/lanes.h"

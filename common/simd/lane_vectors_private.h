@@ -1,5 +1,5 @@
-// Vectors of GLSL over whatever Float is where this is included: lanes (common/simd/lanes.h) or pairs of them
-// (common/simd/lane_pairs.h). Inside of their namespaces.
+// GLSL's vectors over the Float type of the including header: lanes (common/simd/lanes.h) or pairs of lanes
+// (common/simd/lane_pairs.h). Included inside their namespaces.
 
 struct vec2 {
   Float x, y;
@@ -12,7 +12,7 @@ struct vec3 {
   vec3() = default;
   STRANDCAST_LANES constexpr vec3(Float all) : x(all), y(all), z(all) {}
   STRANDCAST_LANES constexpr vec3(Float a, Float b, Float c) : x(a), y(b), z(c) {}
-  /// Any vector of three numbers, the same in all lanes.
+  /// Converts any three-component vector to one with that value in all lanes.
   template <class Vector>
   requires requires(const Vector& v) { v.x, v.y, v.z, v[2]; }
   STRANDCAST_LANES vec3(const Vector& v) : x(v.x), y(v.y), z(v.z) {}

@@ -1,9 +1,9 @@
-// Lanes: the types and functions of GLSL over invocations side by side, so that what is written once in
-// shaders/ runs on the CPU as well (common/render/laws.h, common/kernels/lane_kernel_private.h). Every
-// operation is done for every lane as a scalar would do it, without contraction, so all instruction sets and
-// numbers of lanes give the same bits. Choices are made by select(), never by branches. Everything is inline;
-// instruction sets are chosen by common/simd/variants.h, and numbers of lanes by who compiles a file for one
-// set: STRANDCAST_LANE_COUNT is 8 unless it says 4 or 16.
+// Lanes: GLSL's types and functions over invocations side by side in vector registers. Code in shaders/
+// thereby runs on the CPU too (common/render/laws.h, common/kernels/lane_kernel_private.h). Every lane
+// computes what a scalar would, without contraction, so all instruction sets and lane counts give the same
+// bits. Choices use select(), never branches. Everything is inline. Instruction sets are chosen by
+// common/simd/variants.h. STRANDCAST_LANE_COUNT, set when a file is compiled, is 8 by default and may be 4 or
+// 16.
 #pragma once
 
 #include <concepts>
@@ -51,7 +51,7 @@
 #endif
 
 namespace strandcast::simd {
-/// Types differ with the number of lanes, and so do their names.
+/// Namespace whose name contains the lane count, since types differ with it.
 inline namespace STRANDCAST_LANE_NAMESPACE {
 
 inline constexpr uint32_t kLanes = STRANDCAST_LANE_COUNT;
@@ -64,7 +64,7 @@ using FloatBits = float __attribute__((vector_size(4 * kLanes)));
 using IntBits = int32_t __attribute__((vector_size(4 * kLanes)));
 using UintBits = uint32_t __attribute__((vector_size(4 * kLanes)));
 
-/// True or false in each lane. It steers no branch: lanes may differ.
+/// A boolean in each lane. It cannot steer a branch, because lanes may differ.
 struct Bool {
 #if STRANDCAST_HAS_MASKS
   __mmask16 v;
@@ -79,7 +79,7 @@ struct Bool {
   }
 };
 
-/// Towards zero; the least integer for what does not fit and for NaN, as x86 has it.
+/// Truncates to integers. NaN and values out of range give the least integer, as on x86.
 STRANDCAST_LANES IntBits to_int_bits(FloatBits x) {
   IntBits whole = __builtin_convertvector(x, IntBits);
 #if !defined(__x86_64__)  // others give the nearest that fits, and 0 for NaN
@@ -90,7 +90,7 @@ STRANDCAST_LANES IntBits to_int_bits(FloatBits x) {
   return whole;
 }
 
-/// 0 of the same sign in place of what is too small for full precision, where lanes do that by themselves.
+/// Replaces subnormal numbers with zero of the same sign, where the processor's lanes do so.
 STRANDCAST_LANES FloatBits flushed(FloatBits x) {
 #if STRANDCAST_LANES_FLUSH
   const v128_t bits = (v128_t)x;
@@ -109,7 +109,7 @@ struct Uint {
   STRANDCAST_LANES constexpr Uint(UintBits bits) : v(bits) {}
   template <std::same_as<uint32_t> Number>
   STRANDCAST_LANES constexpr Uint(Number value) : v(UintBits{} + value) {}
-  /// Of values in 0 .. 2^31, towards zero.
+  /// Truncates values in 0 .. 2^31.
   STRANDCAST_LANES explicit Uint(Float value);
 };
 
@@ -121,7 +121,7 @@ struct Float {
   STRANDCAST_LANES constexpr Float(double value) : v(FloatBits{} + static_cast<float>(value)) {}
   STRANDCAST_LANES constexpr Float(int value) : v(FloatBits{} + static_cast<float>(value)) {}
   STRANDCAST_LANES constexpr Float(uint32_t value) : v(FloatBits{} + static_cast<float>(value)) {}
-  /// Of values below 2^31.
+  /// Converts values below 2^31.
   STRANDCAST_LANES explicit Float(Uint value) : v(__builtin_convertvector((IntBits)value.v, FloatBits)) {}
 };
 
@@ -333,7 +333,7 @@ STRANDCAST_LANES Float abs(Float x) {
 STRANDCAST_LANES Float inversesqrt(Float x) {
   return 1.0f / sqrt(x);
 }
-/// Of values within +-2^31.
+/// Rounds down values within +-2^31.
 STRANDCAST_LANES Float floor(Float x) {
   const FloatBits cut = __builtin_convertvector(to_int_bits(x.v), FloatBits);
   return cut > x.v ? cut - 1.0f : cut;
@@ -345,7 +345,7 @@ STRANDCAST_LANES Float smoothstep(Float low, Float high, Float x) {
   const Float t = clamp((x - low) / (high - low), 0.0f, 1.0f);
   return t * t * (3.0f - 2.0f * t);
 }
-/// Relative error below 3e-7; 0 below e^-87, and no more than e^88.
+/// e^x with a relative error below 3e-7; 0 for x < -87, and x above 88 counts as 88.
 STRANDCAST_LANES Float exp(Float x) {
   // 2^n 2^f with |f| <= 1/2; the polynomial is the Taylor series of 2^f to the sixth power.
   const Float y = clamp(x, -87.0f, 88.0f) * 1.44269504f;
@@ -357,7 +357,7 @@ STRANDCAST_LANES Float exp(Float x) {
   const IntBits power = (to_int_bits(n.v) + 127) << 23;
   return p * Float((FloatBits)power);
 }
-/// Of positive numbers; absolute error below 1e-6.
+/// Base-2 logarithm of positive numbers, with an absolute error below 1e-6.
 STRANDCAST_LANES Float log2(Float x) {
   const IntBits bits = (IntBits)x.v;
   IntBits exponent = (bits >> 23) - 127;
@@ -376,7 +376,7 @@ STRANDCAST_LANES Float pow(Float x, Float power) {
   return exp(0.693147181f * (power * log2(x)));
 }
 
-/// Error below 1e-6 for |x| < 1e4.
+/// Sine of x shifted by quarter turns (shift 1 gives the cosine); error below 1e-6 for |x| < 1e4.
 STRANDCAST_LANES Float sine_of_quarters(Float x, int shift) {
   // Minimax polynomials of the Cephes library's sinf and cosf on [-pi/4, pi/4].
   const Float quarters = floor(x * 0.636619772f + 0.5f);
@@ -394,7 +394,7 @@ STRANDCAST_LANES Float sin(Float x) {
 STRANDCAST_LANES Float cos(Float x) {
   return sine_of_quarters(x, 1);
 }
-/// Angle of (x, y), within +-pi; error below 4e-7. 0 for (0, 0).
+/// Angle of (x, y) in radians, within +-pi; error below 4e-7. Returns 0 for (0, 0).
 STRANDCAST_LANES Float atan(Float y, Float x) {
   // The Cephes library's atanf on [0, tan(pi / 8)], of the smaller over the larger side.
   const Float tall = abs(y);
@@ -447,12 +447,12 @@ STRANDCAST_LANES void store_lanes(Float x, float* to) {
   std::memcpy(to, &v, sizeof v);
 }
 #if STRANDCAST_LANE_COUNT == 8
-/// 0, 1, 2 ...
+/// Returns the index of each lane: 0, 1, 2, ...
 STRANDCAST_LANES Float lane_numbers() {
   return FloatBits{0, 1, 2, 3, 4, 5, 6, 7};
 }
 #endif
-/// Towards zero, of values within +-2^31.
+/// Truncates values within +-2^31 to integers.
 STRANDCAST_LANES IntBits to_integers(Float x) {
   return to_int_bits(x.v);
 }

@@ -1,8 +1,7 @@
-// Raw lanes: eight floats or integers side by side as the strand codecs use them, beside GLSL's types of
-// common/simd/lanes.h: comparisons give masks of integers, ?: chooses by them, integers wrap around where it
-// is said. The same operations in the same order for every lane as scalars would have, without contraction,
-// so all instruction sets give the same bits. Everything is inline; sets are chosen by
-// common/simd/variants.h.
+// Raw lanes: eight floats or integers side by side for the strand codecs. Unlike in common/simd/lanes.h,
+// comparisons give integer masks and ?: selects by them. Integers wrap around only in the functions that say
+// so. Every lane computes what a scalar would, in the same order and without contraction, so all instruction
+// sets give the same bits. Everything is inline; instruction sets are chosen by common/simd/variants.h.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +16,7 @@ using Lanes = FloatBits;
 using IntLanes = IntBits;
 using UintLanes = UintBits;
 
-/// One vector in each lane.
+/// A three-component vector in each lane.
 struct LaneVectors {
   Lanes axis[3];
 };
@@ -50,7 +49,7 @@ STRANDCAST_LANES void store_lanes(const IntLanes& lanes, int32_t* to) {
   std::memcpy(to, &lanes, sizeof lanes);
 }
 
-/// from[index[lane]] for each lane.
+/// Loads from[index[lane]] into each lane.
 STRANDCAST_LANES Lanes gather_lanes(const float* from, const uint32_t* index) {
   return Lanes{from[index[0]], from[index[1]], from[index[2]], from[index[3]],
                from[index[4]], from[index[5]], from[index[6]], from[index[7]]};
@@ -69,12 +68,12 @@ STRANDCAST_LANES Lanes sizes_of(const Lanes& value) {
 STRANDCAST_LANES Lanes to_floats(const IntLanes& value) {
   return __builtin_convertvector(value, Lanes);
 }
-/// Towards zero; the least integer for what does not fit and for NaN.
+/// Truncates to integers; NaN and values out of range give the least integer.
 STRANDCAST_LANES IntLanes to_integers(const Lanes& value) {
   return to_int_bits(value);
 }
 
-/// Sums and differences that wrap around.
+/// Sums and differences of integers that wrap around on overflow.
 STRANDCAST_LANES IntLanes wrapping_sums(const IntLanes& a, const IntLanes& b) {
   return (IntLanes)((UintLanes)a + (UintLanes)b);
 }
@@ -86,7 +85,7 @@ STRANDCAST_LANES Lanes dots(const LaneVectors& a, const LaneVectors& b) {
   return (a.axis[0] * b.axis[0] + a.axis[1] * b.axis[1]) + a.axis[2] * b.axis[2];
 }
 
-/// True when a comparison holds in some lane.
+/// Returns true if a comparison holds in any lane.
 STRANDCAST_LANES bool is_any(const IntLanes& comparison) {
   return is_any(Bool{comparison});
 }

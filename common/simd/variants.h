@@ -1,7 +1,7 @@
-// One kernel for several instruction sets, chosen at run time. STRANDCAST_KERNEL(name, Arguments) behind an
-// always-inline function `name_lanes(const Arguments&)` makes `name(InstructionSet, const Arguments&)`. All
-// of them give the same bits (common/simd/lanes.h). Lambdas in kernels need STRANDCAST_LANES_LAMBDA: others
-// would not be compiled for the set.
+// Compiles one kernel for several instruction sets and chooses one at run time. After an always-inline
+// function `name_lanes(const Arguments&)`, STRANDCAST_KERNEL(name, Arguments) defines `name(InstructionSet,
+// const Arguments&)`. All variants give the same bits (common/simd/lanes.h). Mark lambdas in kernels with
+// STRANDCAST_LANES_LAMBDA, or they are not compiled for the instruction set.
 #pragma once
 
 #include <span>
@@ -10,11 +10,11 @@
 
 namespace strandcast::simd {
 
-/// From the narrowest to the widest; Plain is what every processor of the kind has (SSE2, NEON).
+/// Instruction sets from the narrowest to the widest. Plain is the baseline of the architecture (SSE2, NEON).
 enum class InstructionSet { Plain, Sse4, Avx2, Avx512 };
 
 const char* to_string(InstructionSet set);
-/// Those that this processor has, the widest last.
+/// Returns the sets that this processor supports, the widest last.
 std::span<const InstructionSet> instruction_sets();
 inline InstructionSet widest_set() {
   return instruction_sets().back();

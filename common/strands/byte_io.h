@@ -1,4 +1,4 @@
-// Little-endian packing of numbers into bytes and checked reading back. Header only, any thread.
+// Little-endian packing of numbers into bytes, and checked reading. Header only, any thread.
 #pragma once
 
 #include <bit>
@@ -31,8 +31,8 @@ class ByteWriter {
   std::vector<std::byte>& bytes_;
 };
 
-/// Reads numbers from untrusted bytes. Reading past the end gives zero and is remembered: ask ok()
-/// afterwards.
+/// Reads numbers from untrusted bytes. Reading past the end gives zero and clears ok(), which the caller
+/// checks afterwards.
 class ByteReader {
  public:
   explicit ByteReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
@@ -45,7 +45,7 @@ class ByteReader {
     if (!source.empty()) std::memcpy(&value, source.data(), sizeof(T));
     return value;
   }
-  /// The next `count` bytes, or none at all when fewer are left.
+  /// Takes the next `count` bytes; returns an empty span if fewer are left.
   std::span<const std::byte> take_bytes(size_t count) {
     if (count > bytes_.size()) {
       ok_ = false;

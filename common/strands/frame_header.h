@@ -23,15 +23,15 @@ enum class Opcode : uint8_t {
   H264Frame = 0x33,
 };
 
-/// Pictures that may build on the one before.
+/// Returns true for pictures that may depend on the preceding picture.
 constexpr bool is_chained_picture(Opcode opcode) {
   return opcode == Opcode::JpegTiles || opcode == Opcode::Vp8Frame || opcode == Opcode::H264Frame;
 }
 
 inline constexpr size_t kFrameHeaderBytes = 32;
-/// Set in the stream_id of pictures, so that none is a strand stream's.
+/// Bit of stream_id that marks pictures and keeps them apart from streams of strands.
 inline constexpr uint16_t kPictureStreamBit = 0x8000;
-/// The stream_id of a picture class.
+/// Returns the stream_id of a picture class.
 constexpr uint16_t picture_stream_id(uint32_t picture_class) {
   return static_cast<uint16_t>(kPictureStreamBit | (picture_class & (kPictureStreamBit - 1u)));
 }
@@ -50,10 +50,10 @@ struct FrameHeader {
   bool operator==(const FrameHeader&) const = default;
 };
 
-/// The header as sent, little-endian.
+/// Serialises the header, little-endian.
 std::array<std::byte, kFrameHeaderBytes> pack(const FrameHeader& header);
 
-/// Reads a header and checks opcode, limit and that exactly payload_bytes follow in `message`.
+/// Reads a header; checks its opcode, its limit, and that exactly payload_bytes follow it in `message`.
 Result<FrameHeader> unpack_frame_header(std::span<const std::byte> message);
 
 /// One encoded media message: header and payload in one buffer, ready for the socket; shared by all sessions.
@@ -63,10 +63,10 @@ struct EncodedFrame {
 };
 using EncodedFramePtr = std::shared_ptr<const EncodedFrame>;
 
-/// Sets header.payload_bytes. Null when the payload has more than kMaxMediaPayloadBytes.
+/// Makes a message and sets header.payload_bytes. Returns null if the payload exceeds kMaxMediaPayloadBytes.
 EncodedFramePtr make_encoded_frame(FrameHeader header, std::span<const std::byte> payload);
 
-/// A copy of the frame for this stream with send_time_ns set, in the header and in the message.
+/// Copies a frame for another stream and sets send_time_ns in both the header and the message.
 EncodedFramePtr with_send_time(const EncodedFrame& frame, uint16_t stream_id, int64_t send_time_ns);
 
 }  // namespace strandcast

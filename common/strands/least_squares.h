@@ -1,5 +1,5 @@
-// LeastSquares: weights of a linear prediction from samples, as the small integers that go on the wire.
-// Private to common/strands; one thread.
+// LeastSquares: fits the weights of a linear prediction to samples and rounds them to the small integers of
+// the wire format. Private to common/strands; one thread.
 #pragma once
 
 #include <algorithm>
@@ -12,12 +12,12 @@
 
 namespace strandcast {
 
-/// Sums of products of kCount features and, last, of the wanted value; the upper half counts.
+/// Gram matrix: sums of products of kCount features and, last, the wanted value. Only the upper half is used.
 template <uint32_t kCount>
 using Gram = std::array<std::array<double, kCount + 1>, kCount + 1>;
 
-/// The weights that fit best, in units of `unit`: normal equations by Cholesky with a little ridge and
-/// `floor` on the diagonal.
+/// Returns the best-fitting weights in units of `unit`. Solves the normal equations by Cholesky, with a small
+/// ridge and `floor` added to the diagonal.
 template <uint32_t kCount>
 std::array<int16_t, kCount> solve_weights(const Gram<kCount>& gram, double floor, double unit) {
   constexpr double kRidge = 1e-6;
@@ -45,14 +45,15 @@ std::array<int16_t, kCount> solve_weights(const Gram<kCount>& gram, double floor
   return weights;
 }
 
-/// Collects samples (features, wanted value, by how much it counts). Sums of a batch are floats in eight
-/// lanes, those of all batches doubles, in an order that is the same for every instruction set. In a kernel
-/// of common/simd it is compiled for the kernel's set.
+/// Collects samples: features, wanted value and weight of the sample. A batch is summed in floats over eight
+/// lanes, the batches in doubles. The order of summation is the same for every instruction set. In a kernel
+/// of common/simd it is compiled for that kernel's set.
 template <uint32_t kCount>
 class LeastSquares {
  public:
   static constexpr uint32_t kTerms = kCount + 1;
-  /// Terms (features and, last, the wanted value) of eight samples, each times how much the samples count.
+  /// Terms of eight samples: the features and, last, the wanted value, each multiplied by the weight of the
+  /// sample.
   using Eight = simd::FloatBits[kTerms];
 
   STRANDCAST_LANES void add(const std::array<float, kCount>& value, float wanted, float trust) {
@@ -64,8 +65,9 @@ class LeastSquares {
     if (++filled_ == kBatch) flush();
   }
 
-  /// For samples eight by eight, when only whole eights were added since the last flush(): the next room + 0
-  /// .. kSpare - 1 of them, to be filled; add_eights() adds the first `count`.
+  /// Lets a caller write samples in place, eight at a time. Valid if only whole groups of eight were added
+  /// since the last flush(). room(0) .. room(kSpare - 1) are the next groups to fill; add_eights() adds the
+  /// first `count`.
   static constexpr uint32_t kSpare = 3;
   STRANDCAST_LANES simd::FloatBits* room(uint32_t i) { return batch_[filled_ / simd::kLanes + i]; }
   STRANDCAST_LANES void add_eights(uint32_t count) {
@@ -77,10 +79,10 @@ class LeastSquares {
     std::memcpy(batch_[0], batch_[kEights], rest / simd::kLanes * sizeof batch_[0]);
     filled_ = rest;
   }
-  /// Of one sample, in their order.
+  /// Adds the weight of one sample; samples come in the order in which they were added.
   STRANDCAST_LANES void count(float trust) { trust_ += static_cast<double>(trust * trust); }
 
-  /// Ends a batch; needed before weights().
+  /// Ends a batch; call it before weights().
   STRANDCAST_LANES void flush() {
     if (filled_ == 0) return;
     for (; filled_ % simd::kLanes != 0; ++filled_)
@@ -92,8 +94,8 @@ class LeastSquares {
       for (uint32_t b = 0; b < std::min(a + kTile, kTerms); b += 2) add_products(a, b);
   }
 
-  /// In units of `unit`. Features will be off by `noise` when they are used: what moves less predicts
-  /// nothing.
+  /// Returns weights in units of `unit`. `noise` is the expected error of each feature in use; a feature that
+  /// varies less than its noise gets little weight.
   std::array<int16_t, kCount> weights(double unit, const std::array<double, kCount>& noise) const {
     constexpr double kLeast = 1e-9;
     Gram<kCount> blurred;
@@ -111,7 +113,7 @@ class LeastSquares {
   using Four = float __attribute__((vector_size(16)));
   using Doubles = double __attribute__((vector_size(32)));
 
-  /// Four times four lanes; their sums, (0 + 2) + (1 + 3).
+  /// Sums of four groups of four lanes, added as (0 + 2) + (1 + 3).
   STRANDCAST_LANES static Four sums(const Four (&x)[kTile]) {
     const Four low =
         __builtin_shufflevector(x[0], x[1], 0, 1, 4, 5) + __builtin_shufflevector(x[0], x[1], 2, 3, 6, 7);
@@ -120,7 +122,7 @@ class LeastSquares {
     return __builtin_shufflevector(low, high, 0, 2, 4, 6) + __builtin_shufflevector(low, high, 1, 3, 5, 7);
   }
 
-  /// Products of four terms from a on with two from b on: as many as fit into registers.
+  /// Adds products of the four terms from a on with the two from b on; this many fit into registers.
   STRANDCAST_LANES void add_products(uint32_t a, uint32_t b) {
     simd::FloatBits sum[2][kTile] = {};
     for (uint32_t i = 0; i < kEights; ++i) {

@@ -1,11 +1,11 @@
-// Places on a Morton curve through a cube of 1024 cells a side. Header only, any thread.
+// Positions on a Morton curve through a cube of 1024 cells a side. Header only, any thread.
 #pragma once
 
 #include <cstdint>
 
 namespace strandcast {
 
-/// The low 10 bits of `cell` with two zeros between each: one axis of a place on the curve.
+/// Spreads the low 10 bits of `cell` with two zero bits between them: one axis of a Morton code.
 inline uint32_t morton_bits(uint32_t cell) {
   cell &= 0x3ff;
   cell = (cell | (cell << 16)) & 0x030000ff;

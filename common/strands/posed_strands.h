@@ -1,4 +1,4 @@
-// PosedStrands: strands as they are drawn, with the head that they stand on.
+// PosedStrands: strands to draw, with the pose of their head.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -9,7 +9,7 @@
 
 namespace strandcast {
 
-/// What to draw: strands in head space as a viewer has them after decoding (and blending).
+/// Decoded (and interpolated) strands in head space, ready to draw.
 struct PosedStrands {
   Pose world_from_head;
   std::vector<glm::vec3>

@@ -1,5 +1,5 @@
-// Entropy coding of signed integers that are mostly small: zig-zag, four byte planes, zstd. No shape, no
-// state between calls. One object per thread.
+// Entropy coding of mostly small signed integers: zig-zag, four byte planes, zstd. Keeps no state between
+// calls. One object per thread.
 #pragma once
 
 #include <cstddef>
@@ -24,8 +24,8 @@ class PlaneEncoder {
 
 class PlaneDecoder {
  public:
-  /// Reads what append wrote from the front of untrusted `source` into `values` (size known beforehand) and
-  /// gives the bytes behind it. BadInput otherwise.
+  /// Reads what append() wrote from the front of untrusted `source` and fills `values`, whose size the caller
+  /// knows. Returns the remaining bytes; BadInput for malformed ones.
   Result<std::span<const std::byte>> fill(std::span<const std::byte> source, std::span<int32_t> values);
 
  private:

@@ -1,5 +1,5 @@
-// SceneAsset: what a viewer needs once: strand topology, rest shape, follower triangles and the head mesh.
-// Encoded as a packed byte layout under zstd (proto/WIRE.md). Decoding input is untrusted.
+// SceneAsset: what a viewer needs once: strand topology, rest shape, follower triangles and head mesh.
+// Encoded as a packed byte layout under zstd (proto/WIRE.md). Decodes untrusted input.
 #pragma once
 
 #include <cstddef>
@@ -35,11 +35,11 @@ struct SceneAsset {
   Mesh head;                           // may be empty
 };
 
-/// Payload of an Asset message.
+/// Serialises the payload of an Asset message.
 std::vector<std::byte> encode_scene_asset(const SceneAsset& asset);
 
-/// Untrusted input. BadInput or LimitExceeded: every number is checked to be finite, every index against its
-/// array.
+/// Decodes an untrusted payload. Checks that every number is finite and every index within its array. Errors:
+/// BadInput, LimitExceeded.
 Result<SceneAsset> decode_scene_asset(std::span<const std::byte> payload);
 
 }  // namespace strandcast

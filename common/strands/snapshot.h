@@ -1,6 +1,6 @@
 // Snapshot: one published state of all strands, quantised in head space. Immutable once published
-// (shared_ptr<const Snapshot>), so any thread may read it. Server frames and clients draw from this, never
-// from the solver's floats.
+// (shared_ptr<const Snapshot>), so any thread may read it. Server and clients draw from snapshots, never from
+// the solver's floats.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ namespace strandcast {
 
 struct StepTrail;
 
-/// What a state is of, and how its positions are kept: all but the positions themselves.
+/// Everything about a state except its positions: identity, times, poses and the lattice of the positions.
 struct SnapshotInfo {
   uint64_t tick = 0;           // simulation step number
   int64_t sim_time_ns = 0;     // tick x step, from 0
@@ -26,8 +26,8 @@ struct SnapshotInfo {
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;  // per strand
   float quantum_m = 0.0f;     // lattice step; error of a vertex <= quantum * sqrt(3) / 2
-  /// How the simulation got here, for codecs that predict by its steps; nullptr = nobody knows. No part of
-  /// the state hash.
+  /// Steps that led to this state, for codecs that predict by simulating them; nullptr = not known. Not part
+  /// of the state hash.
   std::shared_ptr<const StepTrail> trail = {};
 
   size_t plane_size() const { return static_cast<size_t>(strand_count) * vertex_count; }
@@ -37,18 +37,20 @@ struct Snapshot : SnapshotInfo {
   std::vector<int32_t> lattice;  // (3 x vertex_count x strand_count) axis-major, then vertex, strand fastest
 };
 
-/// |lattice| stays below this, so that sums of three of them fit in 32 bits; positions outside are clamped.
+/// Upper limit of |lattice|, chosen so that sums of three values fit in 32 bits. Positions outside are
+/// clamped.
 inline constexpr int32_t kMaxLattice = 1 << 28;
 
-/// The announced bound holds for vertices within this distance of the head joint along every axis; farther
-/// out the float positions themselves become coarser.
+/// Distance from the head joint, along each axis in metres, within which the announced bound holds. Beyond it
+/// float positions themselves become coarser.
 inline constexpr float kBoundReachM = 2.0f;
 
-/// Finest bound that a stream can announce; the checks of a scene use it.
+/// Finest bound that a stream can announce, in metres; scene checks use it.
 inline constexpr float kMinBoundM = 1e-6f;
 
-/// Coarsest cubic lattice step whose rounding error stays within the Euclidean bound: 2 bound / sqrt(3), less
-/// the rounding of float positions within kBoundReachM. `bound_m` is at least kMinBoundM.
+/// Returns the coarsest cubic lattice step (m) whose rounding error stays within the Euclidean bound. It is 2
+/// bound / sqrt(3), less the rounding error of float positions within kBoundReachM. `bound_m` is at least
+/// kMinBoundM.
 float quantum_for_bound(float bound_m);
 
 struct QuantiseInput : SnapshotInfo {
@@ -62,17 +64,17 @@ struct Quantised {
   uint64_t replaced_count = 0;  // vertices that were not finite
 };
 
-/// Rounds positions to the lattice. Positions beyond the lattice are clamped to it.
+/// Rounds positions to the lattice; positions beyond it are clamped.
 Quantised quantise(const QuantiseInput& input);
 
-/// Head-space positions in metres, (vertex_count x strand_count x vec3), vertex-major, strand fastest.
+/// Returns positions in head space, metres, shape (vertex_count x strand_count): vertex-major, strand
+/// fastest.
 std::vector<glm::vec3> positions_in_head(const Snapshot& snapshot);
 
-/// Hash of everything in a snapshot but motion_time_ns and the positions: what that of the positions goes on
-/// from.
+/// Hash of a snapshot without motion_time_ns and positions; the state hash continues from it.
 uint64_t info_hash(const SnapshotInfo& info);
 
-/// Hash of everything in a snapshot but motion_time_ns; equal on server and client for the same tick.
+/// Hash of a snapshot without motion_time_ns; equal on server and client for the same tick.
 uint64_t state_hash(const Snapshot& snapshot);
 
 }  // namespace strandcast

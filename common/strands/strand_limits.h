@@ -1,5 +1,4 @@
-// Limits of all strands and meshes, wherever they come from: a file, a generator or a stream. Checked before
-// anything is allocated.
+// Limits of all strands and meshes from files, generators or streams. Checked before anything is allocated.
 #pragma once
 
 #include <cstdint>

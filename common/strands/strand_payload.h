@@ -1,5 +1,5 @@
-// The fixed part in front of every strand payload (keyframe or delta, any codec), and the table rows of the
-// codecs. Used by the codecs only; layout in proto/WIRE.md.
+// The fixed part at the front of every strand payload (keyframe or delta, any codec), and the table rows of
+// the codecs. Used by the codecs only; layout in proto/WIRE.md.
 #pragma once
 
 #include "common/strands/strand_codec.h"
@@ -13,7 +13,7 @@ inline constexpr int64_t kMaxStrandTimeNs = int64_t{1} << 61;  // 73 years eithe
 inline constexpr double kMaxHeadPositionM = 1e9;               // along every axis
 inline constexpr double kRotationTolerance = 1e-3;             // of the length of the head's quaternion
 
-/// Everything of a snapshot but its lattice, and what is needed to check that.
+/// All of a snapshot except its lattice, with the hash that checks the decoded lattice.
 struct StrandFixedPart {
   uint64_t tick = 0;
   int64_t motion_time_ns = 0;
@@ -25,18 +25,18 @@ struct StrandFixedPart {
   uint64_t state_hash = 0;
 };
 
-/// A received strand message, its fixed part checked against the limits.
+/// A received strand message whose fixed part was checked against the limits.
 struct StrandMessage {
   FrameHeader header;
   StrandFixedPart fixed;
   std::span<const std::byte> body;  // codec data, points into the message
 };
 
-/// Appends the fixed part of a snapshot with this hash for the codec with this wire number.
+/// Appends the fixed part of a snapshot with its state hash and the codec's number on the wire.
 void append_fixed_part(const SnapshotInfo& snapshot, uint64_t state_hash, uint8_t codec_number,
                        std::vector<std::byte>& payload);
 
-/// The flags of the header in front of it.
+/// Returns the flags of the frame header that say whether the snapshot has a bust.
 constexpr uint8_t bust_flags(const SnapshotInfo& snapshot) {
   return static_cast<uint8_t>(snapshot.bust >> 24);
 }
@@ -45,15 +45,17 @@ constexpr uint8_t bust_flags(const SnapshotInfo& snapshot) {
 Result<StrandMessage> read_strand_message(std::span<const std::byte> message, uint8_t codec_number,
                                           const StrandStreamLimits& limits);
 
-/// Snapshot with everything but the lattice filled in.
+/// Makes a snapshot with everything except the lattice filled in.
 Snapshot make_snapshot(const StrandMessage& message);
 
-/// BadInput unless every lattice value is in range and the state hash is the announced one.
+/// Checks a decoded snapshot: BadInput unless every lattice value is in range and the state hash matches the
+/// announced one.
 Status check_decoded(const Snapshot& snapshot, const StrandMessage& message);
-/// The same of what is known of the lattice.
+/// Does the same check for a lattice whose range and hash the caller has computed.
 Status check_decoded(bool is_in_range, uint64_t state_hash, const StrandMessage& message);
 
-/// Unavailable unless `message` is a keyframe or follows `last_sequence` (0 = nothing decoded yet).
+/// Checks the order of frames: Unavailable unless the message is a keyframe or follows `last_sequence` (0 =
+/// nothing decoded yet).
 Status check_chain(const FrameHeader& header, uint32_t last_sequence);
 
 std::unique_ptr<StrandEncoder> make_raw_encoder();

@@ -1,9 +1,9 @@
-// Prediction of the "delta" codec: the lattice velocity of a vertex as a weighted sum of what both sides
-// know. Integer arithmetic that wraps around, so encoder and decoder agree bit for bit whatever the values
-// are. No I/O; one thread.
+// Prediction of the "delta" codec: the lattice velocity of a vertex as a weighted sum of features that both
+// sides know. Integer arithmetic wraps around, so encoder and decoder agree bit for bit for all values. No
+// I/O; one thread.
 //
-// Names follow the usual ones of linear prediction: velocity = lattice now - lattice one frame ago; residual
-// = velocity - predicted velocity. Arrays are (3 x vertex_count x strand_count), axis-major, strand fastest.
+// Names are those of linear prediction: velocity = lattice now - lattice one frame ago; residual = velocity -
+// predicted velocity. Arrays are (3 x vertex_count x strand_count), axis-major, strand fastest.
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@ inline constexpr int kWeightShift = 10;        // weights are in 1/1024
 using RowWeights = std::array<int16_t, kFeatureCount>;
 using PredictorWeights = std::array<RowWeights, kRowClassCount>;
 
-/// What the codec remembers of the last frame, equal on both sides.
+/// State of the codec after the last frame, equal on both sides.
 struct StrandChain {
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
@@ -36,18 +36,18 @@ struct StrandChain {
   size_t plane_size() const { return static_cast<size_t>(strand_count) * vertex_count; }
 };
 
-/// Finds for each strand the two nearest roots among strands of smaller index (approximately: among those
-/// near it on a Morton curve).
+/// Finds for each strand the two nearest roots among strands of smaller index. Approximate: it searches near
+/// the root on a Morton curve.
 void find_neighbours(StrandChain& chain);
-/// Weights for the step from `chain` to `velocity` by least squares over a sample of strands; falls back to
-/// plain extrapolation or to no motion where one of these does better.
+/// Fits weights that predict `velocity` from `chain`, by least squares over a sample of strands. Uses plain
+/// extrapolation or no motion where one of these is better.
 PredictorWeights fit_weights(const StrandChain& chain, const std::vector<int32_t>& velocity);
 
-/// residual = velocity - prediction.
+/// Returns velocity - prediction for every vertex.
 std::vector<int32_t> find_residual(const StrandChain& chain, const PredictorWeights& weights,
                                    const std::vector<int32_t>& velocity);
 
-/// velocity = prediction + residual: the inverse of find_residual.
+/// Returns prediction + residual: the inverse of find_residual().
 std::vector<int32_t> find_velocity(const StrandChain& chain, const PredictorWeights& weights,
                                    const std::vector<int32_t>& residual);
 

@@ -1,6 +1,5 @@
-// A prefix of strands: a scene's strands are ordered at load such that the first n cover the head evenly, so
-// the first n alone are a picture of all. A stream for a slow link codes only those. Pure functions, any
-// thread.
+// A prefix of strands. At load, strands are ordered so that the first n cover the head evenly and can stand
+// for all. A stream for a slow link codes only those. Pure functions, any thread.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +11,14 @@
 
 namespace strandcast {
 
-/// How many of `strand_count` strands a share in (0, 1] stands for: at least 1.
+/// Returns how many of `strand_count` strands a share in (0, 1] means: at least 1.
 uint32_t prefix_count(uint32_t strand_count, float share);
 
-/// The first `count` strands of a snapshot (at most all).
+/// Returns a snapshot with the first `count` strands, or all if it has fewer.
 Snapshot prefix_of(const Snapshot& snapshot, uint32_t count);
 
-/// The first `count` strands of a shape of (vertex_count x strand_count), strand fastest; nothing when it has
-/// fewer or is no such shape.
+/// Returns the first `count` strands of a shape of (vertex_count x strand_count) points, strand fastest.
+/// Empty if it has fewer strands or another size.
 std::vector<glm::vec3> prefix_of_shape(std::span<const glm::vec3> shape, uint32_t vertex_count,
                                        uint32_t count);
 

@@ -1,5 +1,5 @@
 // The prediction of strand_predictor.h for one row (one axis of one vertex index, all strands), for codecs
-// that go row by row. Private to common/strands; one thread.
+// that process row by row. Private to common/strands; one thread.
 #pragma once
 
 #include "common/simd/variants.h"
@@ -24,14 +24,14 @@ struct RowFeatures {
   const int32_t* residual_then;
 };
 
-/// Which weights serve a vertex index.
+/// Returns the class of weights that a vertex index uses.
 inline uint32_t row_class(uint32_t vertex_index, uint32_t vertex_count) {
   if (vertex_index < 3) return 0;
   return vertex_index + 1 == vertex_count ? 2 : 1;
 }
 
-/// `now`: the velocities of this frame (3 x vertex_count x strand_count), known for earlier rows; `zeros`:
-/// strand_count zeros for what does not exist.
+/// Returns the features of a row. `now`: velocities of this frame (3 x vertex_count x strand_count), known
+/// for earlier rows. `zeros`: strand_count zeros, used where a feature does not exist.
 RowFeatures row_features(const StrandChain& chain, const int32_t* now, const int32_t* zeros, size_t axis,
                          uint32_t vertex_index);
 
@@ -41,11 +41,11 @@ struct RowSums {
   uint32_t* sum;
   size_t count;
 };
-/// sum[s] = rounding + weighted sum of the features that lie in whole rows, for all s below `count`. A kernel
-/// for every instruction set, all with the same bits.
+/// Computes for all s below `count`: sum[s] = rounding + weighted sum of the features that are whole rows. A
+/// kernel for every instruction set, all with the same bits.
 void sum_rows(simd::InstructionSet set, const RowSums& of);
 
-/// The neighbours' share.
+/// Weights and rows of the features that come from neighbouring strands.
 struct NeighbourTerms {
   std::array<uint32_t, kFeatureCount - kRowFeatureCount> w;
 
@@ -53,7 +53,7 @@ struct NeighbourTerms {
     for (uint32_t k = 0; k < w.size(); ++k)
       w[k] = static_cast<uint32_t>(int32_t{weights[kRowFeatureCount + k]});
   }
-  /// `sum` with the neighbours of strand s added: the predicted velocity.
+  /// Adds the neighbours' terms for strand s to `sum` and returns the predicted velocity.
   int32_t predict(const StrandChain& chain, const RowFeatures& features, uint32_t sum, size_t s) const {
     const uint32_t n = chain.neighbour[s];
     const uint32_t m = chain.second_neighbour[s];

@@ -1,7 +1,7 @@
-// Entropy coding of signed integers whose probable size is known beforehand: 16-symbol tables that follow the
-// data, range asymmetric numeral systems (J. Duda 2013, arXiv 1311.2540) for the symbols, plain bits for the
-// rest. Integers only, so the same bytes everywhere. Header only for speed; one object per thread and slice.
-// Layout in proto/WIRE.md.
+// Entropy coding of signed integers with an expected size. Adaptive tables of 16 symbols code the high bits
+// by range asymmetric numeral systems (J. Duda 2013, arXiv 1311.2540); the low bits are plain. Integers only,
+// so bytes are the same everywhere. Header only for speed; one object per thread and slice. Layout in
+// proto/WIRE.md.
 #pragma once
 
 #if defined(__SSE2__)
@@ -29,7 +29,7 @@ inline constexpr uint32_t kProbabilityBits = 15;
 inline constexpr int32_t kProbabilityOne = 1 << kProbabilityBits;
 inline constexpr uint32_t kRansLow = 1u << 16;  // the state stays in [kRansLow, 2^32)
 
-/// Where each symbol's share of [0, kProbabilityOne) begins; strictly increasing from 0.
+/// Start of each symbol's share of [0, kProbabilityOne); strictly increasing from 0.
 struct alignas(32) SymbolTable {
   std::array<int16_t, kSymbolCount> start;
 
@@ -37,7 +37,7 @@ struct alignas(32) SymbolTable {
     // Behind the last symbol comes the first, which begins at 0, so at kProbabilityOne when wrapped around.
     return (start[(symbol + 1) % kSymbolCount] - start[symbol]) & (kProbabilityOne - 1);
   }
-  /// Moves the shares 1/2^rate of the way to where only `symbol` occurs.
+  /// Moves the shares by 1/2^rate towards a table where only `symbol` occurs.
   STRANDCAST_LANES void learn(uint32_t symbol);
 
   bool operator==(const SymbolTable&) const = default;
@@ -59,7 +59,7 @@ alignas(32) inline constexpr auto kLearnTargets = [] {
   return rows;
 }();
 
-/// The last symbol whose share begins at or before `place`.
+/// Returns the last symbol whose share begins at or before `place`.
 STRANDCAST_LANES uint32_t find_symbol(const SymbolTable& table, int32_t place) {
 #if defined(__SSE2__)
   const __m128i wanted = _mm_set1_epi16(static_cast<int16_t>(place));
@@ -98,7 +98,7 @@ inline constexpr std::array<uint32_t, 3> kTailBits = {1, 2, 4};
 inline constexpr std::array<uint32_t, 4> kTailBegin = {12, 14, 18, 34};
 inline constexpr uint32_t kLengthBits = 5;  // of an escaped value
 
-/// 0, 1, -1, 2, -2, ... become 0, 1, 2, 3, 4, ...; one to one for all 32-bit values.
+/// Maps 0, 1, -1, 2, -2, ... to 0, 1, 2, 3, 4, ...; one to one for all 32-bit values.
 constexpr uint32_t fold_sign(int32_t value) {
   const uint32_t negated = 0u - static_cast<uint32_t>(value);
   return (negated << 1) ^ (0u - (negated >> 31));
@@ -108,16 +108,16 @@ constexpr int32_t unfold_sign(uint32_t folded) {
   return static_cast<int32_t>(0u - negated);
 }
 
-/// Where the share of a symbol begins and ends.
+/// Begin and end of a symbol's share.
 struct SymbolStep {
   uint16_t begin;
   uint16_t end;
 };
 
-/// Collects one slice.
+/// Collects the symbols of one slice.
 class ValueWriter {
  public:
-  /// The value's lowest `shift` bits are written plainly, the rest with `table`, which learns.
+  /// Writes the value's lowest `shift` bits plainly and the rest with `table`, which adapts.
   void put(uint32_t folded, SymbolTable& table, uint32_t shift) {
     SymbolStep* next = begin_run(1);
     put(folded, table, shift, next);
@@ -133,7 +133,8 @@ class ValueWriter {
     }
   }
 
-  /// Many values at a time: room for so many, to be given to put() and, moved on by it, to end_run().
+  /// Makes room for `value_count` values. Pass the pointer to put(), which advances it, and at the end to
+  /// end_run().
   SymbolStep* begin_run(size_t value_count) {
     if (steps_.size() < step_count_ + value_count)
       steps_.resize(std::max(2 * steps_.size(), step_count_ + value_count));
@@ -156,13 +157,13 @@ class ValueWriter {
   }
   void end_run(const SymbolStep* next) { step_count_ = static_cast<size_t>(next - steps_.data()); }
 
-  /// Appends two u32 lengths, the symbols' words and the plain bits, and starts anew.
+  /// Appends two u32 lengths, the symbols' words and the plain bits, and resets the writer.
   void finish(std::vector<std::byte>& destination);
-  /// The same for several, in less time: the states of rANS wait for themselves, but for no other.
+  /// Does the same for several writers in less time, because their rANS states are independent.
   static void finish_all(std::span<ValueWriter> writers, std::span<std::vector<std::byte>> destinations);
 
  private:
-  /// Gives the symbol.
+  /// Decodes and returns the next symbol.
   uint32_t put_tail(uint32_t value) {
     uint32_t symbol = kFirstTail;
     while (symbol + 1 < kSymbolCount && value >= kTailBegin[symbol + 1 - kFirstTail]) ++symbol;
@@ -187,20 +188,20 @@ class ValueWriter {
   uint32_t pending_count_ = 0;
 };
 
-/// The state of a reader while it reads many symbols.
+/// State of a reader during a run of symbols.
 struct SymbolCursor {
   uint32_t state;
   const uint16_t* next;
 
-  /// The next symbol of `table`, which learns.
+  /// Decodes the next symbol of `table`, which adapts.
   STRANDCAST_LANES uint32_t take(SymbolTable& table) {
     const auto place = static_cast<int32_t>(state & (kProbabilityOne - 1));
     const uint32_t symbol = find_symbol(table, place);
     pass(table, symbol, place, table.start[symbol], static_cast<uint32_t>(table.share(symbol)));
     return symbol;
   }
-  /// Takes a 0 if it is next: a guess of the processor's where that is likely, instead of a search that it
-  /// must wait for.
+  /// Consumes a 0 if it is next and returns whether it was. Where 0 is likely, a predicted branch is faster
+  /// than a table search.
   STRANDCAST_LANES bool take_zero(SymbolTable& table) {
     const auto place = static_cast<int32_t>(state & (kProbabilityOne - 1));
     const int32_t share = table.start[1];
@@ -219,10 +220,11 @@ struct SymbolCursor {
   }
 };
 
-/// Reads one slice from untrusted bytes: any bytes give some values; ask is_spent() afterwards.
+/// Reads one slice from untrusted bytes: any bytes give some values; call is_spent() afterwards.
 class ValueReader {
  public:
-  /// Takes the slice from the front of `source` and gives the bytes behind it; the bytes must stay.
+  /// Takes the slice from the front of `source` and returns the remaining bytes. `source` must outlive the
+  /// reader.
   Result<std::span<const std::byte>> open(std::span<const std::byte> source);
 
   uint32_t take(SymbolTable& table, uint32_t shift) {
@@ -232,13 +234,13 @@ class ValueReader {
     return value_of(symbol, shift);
   }
   uint32_t take_bits(uint32_t count);
-  /// True when exactly the bytes of the slice were needed.
+  /// Returns true if exactly the bytes of the slice were read.
   bool is_spent() const;
-  /// True when more was asked for than there is: everything since then is made up.
+  /// Returns true if more was read than the slice holds; values since then are meaningless.
   bool is_short() const { return is_short_; }
 
-  /// Many symbols at a time, at most so many; value_of() makes values of them, and end_run() takes the cursor
-  /// back.
+  /// Begins a run of at most `symbol_count` symbols. value_of() turns them into values; end_run() takes the
+  /// cursor back.
   SymbolCursor begin_run(size_t symbol_count);
   STRANDCAST_LANES uint32_t value_of(uint32_t symbol, uint32_t shift) {
     uint32_t value = symbol;

@@ -1,4 +1,4 @@
-// 32-bit integers that wrap around instead of overflowing. Header only, any thread.
+// Arithmetic of 32-bit integers that wraps around instead of overflowing. Header only, any thread.
 #pragma once
 
 #include <cstdint>

@@ -32,7 +32,7 @@ class ZstdCompressor {
 class ZstdDecompressor {
  public:
   ZstdDecompressor();
-  /// Fills `destination` exactly from `source`, which is exactly one frame. BadInput otherwise.
+  /// Decompresses `source`, which must be exactly one frame that fills `destination` exactly; else BadInput.
   Status fill(std::span<const std::byte> source, std::span<std::byte> destination);
 
  private:
@@ -42,8 +42,8 @@ class ZstdDecompressor {
   std::unique_ptr<ZSTD_DCtx_s, Free> context_;
 };
 
-/// Declared content size of a frame. BadInput when it is absent or not a zstd frame, LimitExceeded above the
-/// limit.
+/// Returns the declared content size of a frame. BadInput if it is absent or not a zstd frame, LimitExceeded
+/// above the limit.
 Result<size_t> zstd_content_bytes(std::span<const std::byte> source, size_t limit_bytes);
 
 }  // namespace strandcast

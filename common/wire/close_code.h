@@ -1,4 +1,4 @@
-// WebSocket close codes of the protocol: a client decides by them whether to try again. Meaning:
+// WebSocket close codes of the protocol, by which a client decides whether to reconnect. Meanings:
 // proto/WIRE.md.
 #pragma once
 

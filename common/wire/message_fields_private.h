@@ -1,15 +1,19 @@
-// The one list of the fields of every control message, with their limits: walked by the writer and by the
-// reader of messages (messages.cpp), so that the two cannot disagree. Names are those of session.proto and
-// input.proto; a name that is not there is a broken invariant found by the first test. Private to
-// common/wire.
+// The one list of the fields of every control message, with their limits. The writer and the reader of
+// messages (messages.cpp) walk it, so that they cannot disagree. Names are those of session.proto and
+// input.proto; a missing name is a broken invariant, which the first test finds. Private to common/wire.
 //
-// A new field: its line in proto/, its member in messages.h, its line here. What a visitor knows:
-//   value         a number or flag that may be anything     number     one within a range
-//   measure       a time or rate: finite, not negative      side       of a picture: 0 or within a range
-//   choice        an enumerator up to a last one            text       for people: a sender shortens and
-//   cleans it exact_text    text that is sent as it is, in bytes      secret     likewise, and never printed
-//   places        points, three numbers each, which may be anything        names      different ones, none
-//   empty group, repeated, require and the parts of looks and cameras: as in common/scene/scene_fields.h
+// A new field needs a line in proto/, a member in messages.h and a line here. Functions of a visitor:
+//   value       a number or flag without limits
+//   number      a number within a range
+//   measure     a time or rate: finite, not negative
+//   side        the side of a picture: 0 or within a range
+//   choice      an enumerator up to a last one
+//   text        text for people, which the sender shortens and cleans
+//   exact_text  text that is sent unchanged, with a limit in bytes
+//   secret      exact text that is never printed
+//   places      points of three numbers each, without limits
+//   names       distinct names, none of them empty
+//   group, repeated, require, and the parts of looks and cameras: as in common/scene/scene_fields.h
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// The visitors of the lists of fields that write messages and read them with their checks. Private to
-// common/wire: messages of the wire (messages.cpp) and of recordings (recording_messages.cpp) share them.
+// Visitors of the field lists: they write messages, and read and check them. Private to common/wire. Shared
+// by wire messages (messages.cpp) and recordings (recording_messages.cpp).
 #pragma once
 
 #include <google/protobuf/descriptor.h>
@@ -26,7 +26,8 @@ namespace pb = google::protobuf;
 using scene_fields::Range;
 using wire_fields::kKind;
 
-/// A message and what its type says of it, which costs protobuf more to find than a field to read.
+/// A message with its descriptor and reflection, which are cached because protobuf takes long to look them
+/// up.
 template <class Message>
 struct Place {
   explicit Place(Message& m) : message(&m), type(m.GetDescriptor()), reflection(m.GetReflection()) {}
@@ -38,8 +39,8 @@ struct Place {
 using PlaceToWrite = Place<pb::Message>;
 using PlaceToRead = Place<const pb::Message>;
 
-/// Finds fields by name, a literal. The elements of a list ask for the same ones in the same order, so only
-/// the first of them searches.
+/// Finds fields by name, which must be a literal. Elements of a list ask for the same fields in the same
+/// order, so only the first element searches.
 class FieldFinder {
  public:
   struct Field {
@@ -81,7 +82,7 @@ using PartNames = std::array<const char*, 3>;
 constexpr PartNames kVectorParts = {"x", "y", "z"};
 constexpr PartNames kColorParts = {"r", "g", "b"};
 
-/// Copies fields into a message, all of them.
+/// Writes all visited fields into a message.
 class MessageWriter {
  public:
   explicit MessageWriter(pb::Message& message) : at_(message) {}
@@ -186,8 +187,7 @@ class MessageWriter {
   FieldFinder finder_;
 };
 
-/// Copies fields out of a message and checks them; keeps the first error, which names the field and its
-/// group.
+/// Reads fields from a message and checks them; keeps the first error, which names the field and its group.
 class MessageReader {
  public:
   explicit MessageReader(const pb::Message& message) : at_(message) {}
@@ -318,12 +318,12 @@ class MessageReader {
       values[i / 3][static_cast<int>(i % 3)] = get(field, static_cast<int>(i));
   }
 
-  /// Fields of looks and cameras that are missing keep their default, all others are then 0.
+  /// A missing field of a look or camera keeps its default; any other missing field becomes 0.
   bool is_given(const FieldFinder::Field& field) const {
     return !field.may_be_missing || at_.reflection->HasField(*at_.message, field.descriptor);
   }
 
-  /// As wide as it came: what does not fit into a T is checked first.
+  /// Value in its wire type; the range of T is checked before it is narrowed.
   template <class T>
   auto get(const pb::FieldDescriptor& field) const {
     if constexpr (std::is_same_v<T, bool>)
@@ -399,7 +399,8 @@ class MessageReader {
   std::optional<Error> error_;
 };
 
-/// Reads the field `name` into the alternative of that kind, from the i-th on; false when there is none.
+/// Reads the field `name` into the variant alternative of that kind, searching from index i on. Returns false
+/// if there is none.
 template <size_t i = 0, class Variant>
 bool read_kind(const std::string& name, MessageReader& reader, Variant& result) {
   if constexpr (i == std::variant_size_v<Variant>) {

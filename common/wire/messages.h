@@ -1,7 +1,7 @@
-// Control messages as domain types; protobuf never leaves common/wire. Decoding checks every field: finite
-// numbers, ranges, counts, text. The one exception are the values of motion and wind samples: they pass as
-// they are, NaN included, because the server's input hub judges and counts them. No I/O. Sizes and versions:
-// proto/WIRE.md.
+// Control messages as domain types; protobuf types never leave common/wire. Decoding checks every field:
+// finite numbers, ranges, counts, text. The only exception is the values of motion and wind samples. They are
+// passed on unchecked, NaN included, because the server's input hub checks and counts them. No I/O. Sizes and
+// versions: proto/WIRE.md.
 #pragma once
 
 #include <cstddef>
@@ -352,7 +352,7 @@ struct ParameterList {                    // answer to a ParameterRequest
   bool is_change = false;                 // no answer: these have other values now
   bool operator==(const ParameterList&) const = default;
 };
-/// When a state was where on its way through the server; server clock, ns, 0 = not known.
+/// Times at which a state passed the stages of the server, in ns of the server's clock; 0 = not known.
 struct StateTime {
   uint64_t tick = 0;
   int64_t sim_time_ns = 0;   // simulation time
@@ -388,17 +388,19 @@ using ServerMessage =
     std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality, ModeChange, SessionList,
                  FrameQuality, LookChange, SceneText, ParameterList, CameraChange, StateTimes, StreamList>;
 
-/// Message as sent: opcode byte Control, then protobuf; at most kMaxControlBytes for messages within their
-/// limits. Names, reasons and notices are shortened to theirs, and characters that cannot be printed become
+/// Serialises a message: an opcode byte (Control), then protobuf. Messages within their limits take at most
+/// kMaxControlBytes. Names, reasons and notices are shortened to their limits; unprintable characters become
 /// spaces or '?'.
 std::vector<std::byte> encode(const ClientMessage& message);
 std::vector<std::byte> encode(const ServerMessage& message);
 
-/// Inverse of encode for untrusted bytes. BadInput / LimitExceeded name the field; Unsupported: ignore it.
+/// Inverse of encode() for untrusted bytes. BadInput and LimitExceeded name the field; Unsupported means that
+/// the caller should ignore the message.
 Result<ClientMessage> decode_client_message(std::span<const std::byte> bytes);
 Result<ServerMessage> decode_server_message(std::span<const std::byte> bytes);
 
-/// By what a viewer gets strands and why, for a person; older servers do not say why.
+/// Describes for a person the codec of a viewer's strands and why it was chosen; older servers give no
+/// reason.
 std::string codec_text(const Welcome& welcome);
 const char* to_string(StreamMode mode);
 const char* to_string(Role role);

@@ -13,7 +13,7 @@ namespace strandcast {
 
 inline constexpr int kMaxMessageNesting = 16;
 
-/// False for what is not exactly one message; then `message` is of no use.
+/// Parses exactly one message. Returns false otherwise; then the content of `message` is undefined.
 inline bool parse_message(std::span<const std::byte> bytes, google::protobuf::Message& message) {
   namespace io = google::protobuf::io;
   // Hostile bytes must not fill the log: protobuf would print a line for each.

@@ -1,6 +1,6 @@
-// Several messages of one kind in one message of a recording, with the order in which they came: a message of
-// its own for each would take more bytes than most of them have. Layout: proto/RECORDING.md. Reading is of
-// untrusted bytes. Pure, any thread.
+// Packs several messages of one kind, with their order, into one message of a recording, since a file entry
+// costs more bytes than most messages. Layout: proto/RECORDING.md. Reads untrusted bytes. Pure functions, any
+// thread.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace strandcast {
 
-/// Of one message, and of one chunk of a recording.
+/// Largest number of messages in a batch and in one chunk of a recording.
 inline constexpr size_t kMaxBatchItems = 4096;
 
 struct BatchItem {
@@ -29,9 +29,9 @@ class RecordBatch {
   uint32_t first_order() const { return first_order_; }
   uint64_t first_time_ns() const { return first_time_ns_; }
 
-  /// `order` and `time_ns` never decrease.
+  /// Appends a message; `order` and `time_ns` must never decrease.
   void add(std::span<const std::byte> message, uint32_t order, uint64_t time_ns);
-  /// The protobuf message.
+  /// Returns the batch as protobuf bytes.
   std::vector<std::byte> encode() const;
 
  private:
@@ -43,12 +43,12 @@ class RecordBatch {
   uint64_t last_time_ns_ = 0;
 };
 
-/// What stands beside the message in the file.
+/// Order and time of a batch's first message, as stored beside it in the file.
 struct BatchStart {
   uint32_t order = 0;
   uint64_t time_ns = 0;
 };
-/// Views into `bytes`. BadInput where they are not exactly such a message.
+/// Returns the items as views into `bytes`. BadInput if the bytes are not exactly one batch.
 Result<std::vector<BatchItem>> read_batch(std::span<const std::byte> bytes, const BatchStart& start);
 
 }  // namespace strandcast

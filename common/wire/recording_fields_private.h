@@ -1,5 +1,5 @@
-// The one list of the fields of what recordings hold (message_fields_private.h says how to add one). Private
-// to common/wire.
+// The list of the fields of all messages in recordings (message_fields_private.h says how to add one).
+// Private to common/wire.
 #pragma once
 
 #include "common/wire/message_fields_private.h"

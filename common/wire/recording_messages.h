@@ -1,6 +1,6 @@
-// What a recording holds besides strands, as domain types: what came in, what each step of the simulation
-// took of it, what was changed and by whom, and what came out. Layout: proto/RECORDING.md. Decoding checks
-// every field as that of control messages does. No I/O.
+// Messages of a recording besides strands, as domain types: inputs, what each simulation step used of them,
+// changes and their authors, and outputs. Layout: proto/RECORDING.md. Decoding checks every field like that
+// of control messages. No I/O.
 #pragma once
 
 #include <cstddef>
@@ -37,7 +37,7 @@ struct RecordingStart {
   bool operator==(const RecordingStart&) const = default;
 };
 
-/// Motion or wind as it came in.
+/// A motion or wind message as it was received.
 struct RecordedMotion {
   uint64_t source = 0;
   int64_t arrival_ns = 0;
@@ -51,8 +51,8 @@ struct RecordedWind {
   bool operator==(const RecordedWind&) const = default;
 };
 
-/// What one step took of all inputs: with the scene and the changes it decides the state that the step ends
-/// in.
+/// Inputs that one step used. With the scene and its changes, they determine the state at the end of the
+/// step.
 struct RecordedStep {
   uint64_t tick = 0;
   int64_t time_ns = 0;      // that the end of the step stands for
@@ -70,7 +70,7 @@ struct RecordedStep {
   bool operator==(const RecordedStep&) const = default;
 };
 
-/// A command or assignment that was carried out or refused between the step `tick` and the next.
+/// A command or assignment that was carried out or refused between step `tick` and the next.
 struct RecordedChange {
   uint64_t tick = 0;
   std::variant<ControlCommand, SetParameter> what;
@@ -79,7 +79,7 @@ struct RecordedChange {
   bool operator==(const RecordedChange&) const = default;
 };
 
-/// From the state published after step `tick` on, positions are published on another lattice.
+/// Change of the lattice of published positions; it applies from the state after step `tick` on.
 struct RecordedStream {
   uint64_t tick = 0;
   std::string codec;
@@ -87,7 +87,7 @@ struct RecordedStream {
   bool operator==(const RecordedStream&) const = default;
 };
 
-/// What was published.
+/// A published state.
 struct RecordedState {
   uint64_t tick = 0;
   int64_t sim_time_ns = 0;
@@ -95,14 +95,14 @@ struct RecordedState {
   bool operator==(const RecordedState&) const = default;
 };
 
-/// The camera of one viewer of pictures, or of one who said what it looks through.
+/// Camera of one viewer: of a viewer of pictures, or of one that reported its camera.
 struct RecordedCamera {
   uint64_t viewer = 0;
   CameraDesc camera;
   bool operator==(const RecordedCamera&) const = default;
 };
 
-/// So much could not be written between what is before and what is after.
+/// Numbers of messages that could not be written between the preceding and the following one.
 struct RecordedLoss {
   uint64_t frames = 0;
   uint64_t messages = 0;
@@ -114,27 +114,30 @@ using RecordedMessage =
     std::variant<RecordingStart, RecordedMotion, RecordedWind, RecordedStep, RecordedChange, RecordedStream,
                  RecordedState, RecordedCamera, RecordedLoss, LookChange, ServerStatus>;
 
-/// One kind of them, as its channel in the file says it.
+/// Description of one kind of recorded message, as stored in its channel of the file.
 struct RecordedKind {
   const char* topic;             // "/steps"
   const char* schema;            // full name of the channel's protobuf message
   bool has_many_in_one = false;  // that message is a RecordBatch of them
 };
-/// In the order of RecordedMessage.
+/// Returns all kinds, in the order of RecordedMessage's alternatives.
 std::span<const RecordedKind> recorded_kinds();
-/// Of a protobuf message of ours by its full name: a FileDescriptorSet with what it needs, and no more.
+/// Returns a FileDescriptorSet with one of our protobuf messages, given by its full name, and its
+/// dependencies.
 std::vector<std::byte> message_descriptors(const std::string& schema);
 
 inline constexpr const char* kMediaSchema = "strandcast.v1.MediaMessage";
-/// A RecordBatch of what viewers get.
+/// Schema of a RecordBatch of media messages.
 inline constexpr const char* kManyMediaSchema = "strandcast.v1.MediaMessages";
-/// What a viewer gets (header and payload) as a MediaMessage, and out of one: a view into it.
+/// Wraps a media message (header and payload) into a MediaMessage. decode_media() returns a view into
+/// `bytes`.
 std::vector<std::byte> encode_media(std::span<const std::byte> message);
 Result<std::span<const std::byte>> decode_media(std::span<const std::byte> bytes);
 
-/// The protobuf message alone; strings are shortened and cleaned as in control messages.
+/// Serialises the protobuf message without an opcode; strings are shortened and cleaned as in control
+/// messages.
 std::vector<std::byte> encode(const RecordedMessage& message);
-/// Inverse for untrusted bytes; `kind` is an index of recorded_kinds().
+/// Inverse of encode() for untrusted bytes; `kind` is an index of recorded_kinds().
 Result<RecordedMessage> decode_recorded(size_t kind, std::span<const std::byte> bytes);
 
 }  // namespace strandcast

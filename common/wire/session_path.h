@@ -1,4 +1,4 @@
-// Where a session lies behind a proxy that serves many: "/s/NAME" in front of every path. Pure functions on
+// URL prefix of a session at a proxy that serves several: "/s/NAME" before every path. Pure functions on
 // untrusted text, any thread.
 #pragma once
 
@@ -10,11 +10,11 @@ namespace strandcast {
 inline constexpr std::string_view kSessionFolder = "/s/";
 inline constexpr size_t kMaxSessionNameChars = 64;
 
-/// Letters, digits, '.', '_' and '-', a letter or digit first.
+/// Returns true for letters, digits, '.', '_' and '-', beginning with a letter or digit.
 bool is_session_name(std::string_view name);
 
-/// The target of a request without the session's folder: "/v1" of "/s/anna/v1", "" of "/s/anna"; else as it
-/// is.
+/// Removes a session's prefix from a request target: "/s/anna/v1" gives "/v1", "/s/anna" gives "". Other
+/// targets are returned unchanged.
 std::string_view without_session(std::string_view target);
 
 }  // namespace strandcast

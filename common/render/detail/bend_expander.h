@@ -1,6 +1,6 @@
-// Expansion by need: of every gap of every strand as many segments as keep their chords within a part of a
-// pixel of the curve. The GPU counts them, sums the counts and writes them, in the order of strands; their
-// number is read back once. All calls from the context's thread.
+// BendExpander: adaptive tessellation. Each gap between vertices gets as many segments as keep the chords
+// within a fraction of a pixel of the curve. The GPU counts the segments, sums the counts and writes the
+// segments in strand order; only the total is read back. All calls from the context's thread.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +17,9 @@ namespace strandcast {
 class BendExpander {
  public:
   BendExpander() = default;
-  /// `max_gaps`: of all strands that are expanded at once.
+  /// Makes an expander; `max_gaps` counts all strands that are expanded at once.
   static Result<BendExpander> make(const gl::ShaderLibrary& shaders, StrandCurves curves, uint64_t max_gaps);
-  /// As StrandExpander::run(), for this view; `level` says how many segments a gap may have.
+  /// Does what StrandExpander::run() does, for this view; `level` limits the segments of a gap.
   uint32_t run(const KeyStrands& keys, const ExpandedStrands& expanded, uint32_t first, uint32_t count,
                const ExpandLevel& level, const View& view) const;
   static uint64_t size_bytes(uint64_t max_gaps) { return RunningSum::size_bytes(max_gaps); }

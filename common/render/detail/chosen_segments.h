@@ -1,6 +1,5 @@
-// Segments of the expanded strands that the camera draws, chosen on the GPU: a list of them, and the indirect
-// draws that it takes. To draw them the CPU need not know how many they are. All calls from the context's
-// thread.
+// Segments of the expanded strands that the camera draws, chosen on the GPU: a list and its indirect draws.
+// The CPU need not know their number. All calls from the context's thread.
 #pragma once
 
 #include <cstdint>
@@ -11,18 +10,18 @@ namespace strandcast {
 
 class ChosenSegments {
  public:
-  /// Of at most so many segments.
+  /// Makes an empty list for at most `max_segments` segments.
   explicit ChosenSegments(uint64_t max_segments) : max_segments_(static_cast<uint32_t>(max_segments)) {}
   void allocate();
-  /// For the kernel that writes both.
+  /// Binds list and draws for the kernel that writes them.
   void bind_for_writing() const;
-  /// For draws with a vertex stage that includes the list.
+  /// Binds the list for draws whose vertex stage includes it.
   void bind() const;
-  /// Draws for so many segments, were all of them chosen.
+  /// Returns the number of draws that would be needed if all `segments` were chosen.
   uint32_t draw_count(uint32_t segments) const;
-  /// One of them; strands and indices are bound.
+  /// Issues one of the draws; strands and indices must be bound.
   void draw(uint32_t index) const;
-  /// Of so many. Waits for the GPU: for who wants to know.
+  /// Returns how many of `segments` were chosen. Waits for the GPU; for diagnosis.
   uint32_t read_count(uint32_t segments) const;
   uint64_t size_bytes() const;
 

@@ -1,6 +1,6 @@
-// Culling: segments that the camera cannot see are not sent to be drawn, by a list and indirect draws that
-// the GPU makes for itself behind each of the camera's walks. Shadows are drawn of all strands. A picture
-// with it is the same as without, bit for bit. All calls that touch GL from the context's thread.
+// Culling: leaves out segments that the camera cannot see. After each of the camera's walks the GPU makes a
+// list of visible segments and their indirect draws. All strands cast shadows. The picture is the same, bit
+// for bit, as without culling. All calls that touch GL come from the context's thread.
 #pragma once
 
 #include <memory>
@@ -19,7 +19,7 @@ class Culling final : public gl::Resource {
  public:
   Culling(const RenderScene& scene, const ExpandedStrands& expanded);
   Status prepare(const gl::ShaderLibrary& shaders);
-  /// Chooses among what is expanded now.
+  /// Chooses among the currently expanded segments.
   void run(const RenderScene& scene, const ExpandedStrands& expanded, const RenderTurn& turn);
   const ChosenSegments& chosen() const { return chosen_; }
   uint64_t size_bytes() const override;
@@ -39,9 +39,9 @@ class Culling final : public gl::Resource {
   gl::Program list_program_;
 };
 
-/// Makes the scene's culling, where its method is one: before any pass that draws strands is made.
+/// Adds culling to the scene if its method uses it; call it before any pass that draws strands is made.
 void add_culling(RenderScene& scene, const ExpandedStrands& expanded, RenderPassList& passes);
-/// A walk of the camera: what it expands, and what of that is chosen.
+/// Adds a walk of the camera: the pass that expands strands and the pass that chooses among them.
 void add_camera_walk(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes,
                      const std::string& purpose = "");
 

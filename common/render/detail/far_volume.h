@@ -1,6 +1,6 @@
-// Hair from far away as a volume (vkhr; reference: 003, 6.3 asks for a fall-back): where strands are much
-// thinner than a pixel, rays through their density show what all of them together look like. In between some
-// pixels show the one and some the other. All calls from the context's thread.
+// Distant hair as a volume, after vkhr. Where strands are much thinner than a pixel, rays through their
+// density show how all of them look together. At intermediate distances some pixels show strands and others
+// the volume. All calls from the context's thread.
 #pragma once
 
 #include "common/gl/objects.h"
@@ -12,20 +12,20 @@
 
 namespace strandcast {
 
-/// Per cell of a cube around the hair: what a ray from the eye loses, the mean way of the strands, and how
-/// far along them it is.
+/// Volume around the hair. Each cell holds the extinction along a ray from the eye, the mean direction of its
+/// strands, and the position along them.
 class FarVolume final : public gl::Resource {
  public:
   FarVolume() : Resource("far volume") {}
-  /// Once per draw; empties all cells where the volume is seen.
+  /// Starts a draw; clears all cells if the volume is visible.
   void begin(const RenderScene& scene, RenderTurn& turn);
-  /// Adds what is expanded now; `program` is of far_volume_sum.comp.
+  /// Adds the currently expanded strands; `program` must be far_volume_sum.comp.
   void add(const gl::Program& program, const RenderScene& scene, const ExpandedStrands& expanded,
            const RenderTurn& turn) const;
   void finish() const;
   void set_uniforms(const gl::Program& program, const RenderTurn& turn) const;
   bool is_seen() const { return share_ > 0.0f; }
-  /// 0: strands alone; 1: the volume alone.
+  /// Share of the volume in the picture: 0 = strands alone, 1 = volume alone.
   float share() const { return share_; }
   uint64_t size_bytes() const override {
     return cell_.size_bytes() + way_.size_bytes() + along_.size_bytes();
@@ -39,10 +39,11 @@ class FarVolume final : public gl::Resource {
   gl::Texture along_;  // times depth
 };
 
-/// How much of the hair is shown as a volume: by how wide a strand is on the screen.
+/// Returns the share of hair that is shown as a volume, which depends on the width of a strand on the screen.
 float far_share(const RenderScene& scene, const View& view);
 
-/// The passes that fill it, before the camera's walk; and the one that draws it, behind the strands.
+/// Add the passes that fill the volume, before the camera's walk, and the pass that draws it, after the
+/// strands.
 FarVolume& add_far_volume(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
 void add_far_volume_draw(RenderScene& scene, RenderPassList& passes, FarVolume& volume);
 

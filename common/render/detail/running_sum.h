@@ -1,5 +1,5 @@
-// Running sums of counts on the GPU: where each of many writers of unknown counts begins. All calls from the
-// context's thread.
+// RunningSum: prefix sums of counts on the GPU, so that each of many writers knows where its output begins.
+// All calls from the context's thread.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +12,14 @@ namespace strandcast {
 class RunningSum {
  public:
   RunningSum() = default;
-  /// Of at most so many counts.
+  /// Makes sums of at most `max_count` counts.
   static Result<RunningSum> make(const gl::ShaderLibrary& shaders, uint64_t max_count);
   static uint64_t size_bytes(uint64_t max_count) { return sizeof(uint32_t) * (max_count + 1); }
-  /// For kernels that write counts or read sums.
+  /// Binds the buffer for kernels that write counts or read sums.
   void bind() const;
-  /// Turns the first `count` counts into sums, once the kernels before are through.
+  /// Turns the first `count` counts into sums, after the preceding kernels have finished.
   void run(uint32_t count) const;
-  /// Of all of them. Waits for the GPU.
+  /// Returns the sum of `count` counts. Waits for the GPU.
   uint32_t read_total(uint32_t count) const;
 
  private:

@@ -1,5 +1,5 @@
-// GpuBins: which segments touch which tile of a picture, each tile's from front to back, on the GPU. All
-// calls from the context's thread; the frame's uniform block is bound.
+// GpuBins: sorts segments into the tiles of a picture on the GPU, each tile's from front to back. All calls
+// from the context's thread; the frame's uniform block must be bound.
 #pragma once
 
 #include "common/gl/pass_plan.h"
@@ -8,10 +8,10 @@
 
 namespace strandcast {
 
-/// Pairs of a segment and a tile in one picture of the GPU, at most; more, and fewer strands are drawn.
+/// Largest number of (segment, tile) pairs in one picture on the GPU; beyond it fewer strands are drawn.
 inline constexpr uint64_t kMaxGpuTilePairs = uint64_t{1} << 23;
 
-/// Of one picture.
+/// Counts of the last picture.
 struct GpuBinCounts {
   uint64_t pairs = 0;
   uint64_t segments = 0;    // on the picture
@@ -22,11 +22,11 @@ class GpuBins final : public gl::Resource {
  public:
   GpuBins();
   Status prepare(const gl::ShaderLibrary& shaders);
-  /// Counts the segments of the points that are bound to kUnitTilePoints. Waits for the GPU.
+  /// Counts the (segment, tile) pairs of the points bound to kUnitTilePoints. Waits for the GPU.
   GpuBinCounts count(glm::uvec2 tiles, uint64_t segments);
-  /// Fills and orders the lists that were counted last.
+  /// Fills and sorts the lists whose pairs count() has counted.
   void fill(glm::uvec2 tiles, uint64_t segments, uint64_t pairs);
-  /// Lists to kUnitTileOrder and kUnitTileFirst.
+  /// Binds the lists to the units kUnitTileOrder and kUnitTileFirst.
   void bind() const;
   uint64_t size_bytes() const override;
 

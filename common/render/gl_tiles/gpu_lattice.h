@@ -1,6 +1,6 @@
-// GpuLattice: the light lattice (common/render/light_lattice.h) on the GPU, from the points of the drawn
-// strands: optical depth towards key light, rim light and sky in three volumes. All calls from the context's
-// thread; the frame's uniform block is bound.
+// GpuLattice: the light lattice (common/render/light_lattice.h) on the GPU. From the points of drawn strands
+// it computes the optical depth towards key light, rim light and sky, in three volumes. All calls from the
+// context's thread; the frame's uniform block must be bound.
 #pragma once
 
 #include "common/gl/pass_plan.h"
@@ -14,11 +14,11 @@ class GpuLattice final : public gl::Resource {
  public:
   GpuLattice() : Resource("light lattice") {}
   Status prepare(const gl::ShaderLibrary& shaders, const HeadOccupancy& solid);
-  /// How neck and chest are turned from the next build() on.
+  /// Sets the rotation of neck and chest from the next build() on.
   void set_bust(const BustRig& rig, const BustTurn& turn);
-  /// Reads the points and strands that are bound to kUnitTilePoints and kUnitTileStrands.
+  /// Builds the volumes from the points and strands bound to kUnitTilePoints and kUnitTileStrands.
   void build(const LatticeFrame& frame, const LightDirections& lights, uint32_t strand_count, float width_m);
-  /// Depths to the units that shaders/render/tile_light.glsl reads.
+  /// Binds the depths to the units that shaders/render/tile_light.glsl reads.
   void bind() const;
   uint64_t size_bytes() const override;
 

@@ -1,5 +1,5 @@
-// GrownBuffer: a GPU buffer that grows with what it has to hold, and kernels' view of it as texels, which on
-// llvmpipe cost half of a storage block's loads. All calls from the context's thread.
+// GrownBuffer: a GPU buffer that grows on demand, with a texel view for kernels, since a texel load costs
+// half of a storage block's on llvmpipe. All calls from the context's thread.
 #pragma once
 
 #include <algorithm>
@@ -13,11 +13,11 @@ namespace strandcast {
 
 class GrownBuffer {
  public:
-  /// `texel_format` 0: no view.
+  /// Makes an empty buffer; a `texel_format` of 0 makes no view.
   GrownBuffer(std::string label, uint32_t texel_format = 0)
       : label_(std::move(label)), texel_format_(texel_format) {}
 
-  /// What was in it is lost when it grows.
+  /// Makes room for `size_bytes`; the contents are lost if the buffer grows.
   void reserve(uint64_t size_bytes) {
     if (size_bytes <= buffer_.size_bytes()) return;
     // The old one first: two sizes side by side may not fit.

@@ -1,5 +1,5 @@
-// TileBlock: the uniform block that all kernels of the tiles on the GPU read, as
-// shaders/render/tile_frame.glsl declares it. Filled once per picture; no GL.
+// TileBlock: the uniform block of all GPU kernels of the tiles, declared in shaders/render/tile_frame.glsl.
+// Filled once per picture; no GL.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -13,8 +13,8 @@
 
 namespace strandcast {
 
-/// std140: nothing but four-vectors and matrices of them. shaders/render/tile_frame.glsl says what each
-/// holds.
+/// Block in std140 layout, so it holds only four-component vectors and matrices.
+/// shaders/render/tile_frame.glsl describes each member.
 struct TileBlock {
   glm::mat4 clip_from_head;
   glm::mat4 head_from_clip;
@@ -44,7 +44,7 @@ struct TileBlock {
 };
 static_assert(sizeof(TileBlock) == (8 + 15 + 3 + 3 + 3 + 3) * 16 && std::is_trivially_copyable_v<TileBlock>);
 
-/// What of a scene and a look goes into it, beside the picture's own.
+/// Values of scene and look that the block needs besides those of the picture.
 struct TileBlockInput {
   const LookDesc& look;
   const View& view;  // target_px: of the picture
@@ -56,7 +56,7 @@ struct TileBlockInput {
 };
 TileBlock make_tile_block(const TileBlockInput& input);
 
-/// Tiles across and down a picture.
+/// Returns the number of tiles across and down a picture.
 glm::uvec2 gpu_tiles(glm::uvec2 size_px);
 
 }  // namespace strandcast

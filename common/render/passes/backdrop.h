@@ -1,5 +1,5 @@
-// Backdrop: the picture that lies behind what is drawn instead of the look's background, on the device, and
-// the programs that draw over either. Nothing of it exists before the first draw with one. GL thread.
+// Backdrop: a picture on the device that is seen behind what is drawn, instead of the look's background, and
+// the programs that draw over either. Allocated at the first draw that has one. GL thread.
 #pragma once
 
 #include <string>
@@ -13,10 +13,11 @@ namespace strandcast {
 
 class Backdrop {
  public:
-  /// Makes the program of these shaders that draws over the background; `variant` without HAS_BACKDROP.
-  /// `shaders` outlives this.
+  /// Makes the program that draws over the background from these shaders; `variant` must not set
+  /// HAS_BACKDROP. `shaders` must outlive this object.
   Status prepare(const gl::ShaderLibrary& shaders, std::vector<std::string> files, gl::Variant variant);
-  /// The program for a draw with this backdrop, or with none, in use and with what it reads of it.
+  /// Activates the program for a draw with this backdrop, or with none if null, sets its inputs and returns
+  /// it.
   Result<const gl::Program*> use(const Image* backdrop);
   uint64_t size_bytes() const { return texture_.size_bytes(); }
 

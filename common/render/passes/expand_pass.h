@@ -1,6 +1,5 @@
-// Expand pass: key strands and followers through tessellation into a buffer of line segments. The passes
-// after it pull their vertices from that buffer. Needs a bound framebuffer; all calls from the context's
-// thread.
+// Expand pass: expands key strands and followers by tessellation into a buffer of line segments, from which
+// later passes pull their vertices. Needs a bound framebuffer; all calls from the context's thread.
 #pragma once
 
 #include <cstdint>
@@ -16,12 +15,12 @@
 
 namespace strandcast {
 
-/// Drawn segments per gap between two vertices, at most.
+/// Largest number of drawn segments per gap between two vertices.
 inline constexpr uint32_t kMaxSegmentsPerGap = 8;
 /// Largest expanded buffer; more strands are expanded and drawn in several batches.
 inline constexpr uint64_t kMaxExpandedBytes = 96ull << 20;
 
-/// What is known about an expansion before there is any GL.
+/// Sizes of an expansion, computed without GL.
 class ExpandSizes {
  public:
   ExpandSizes(const KeyStrands& keys, uint32_t triangle_count, uint32_t followers_per_triangle)
@@ -30,16 +29,16 @@ class ExpandSizes {
         triangle_count_(triangle_count),
         max_followers_(triangle_count > 0 ? followers_per_triangle : 0) {}
 
-  /// Key strands and followers together.
+  /// Returns the number of key strands and followers together.
   uint32_t strand_count(uint32_t followers) const { return key_count_ + triangle_count_ * followers; }
-  /// Followers per triangle at most; 0 without triangles.
+  /// Largest number of followers per triangle; 0 without triangles.
   uint32_t max_followers() const { return max_followers_; }
   uint32_t segments_per_strand(uint32_t segments_per_gap) const {
     return vertex_count_ > 0 ? segments_per_gap * (vertex_count_ - 1) : 0;
   }
-  /// Bytes of a buffer for all strands at once, as far as kMaxExpandedBytes allows.
+  /// Returns the bytes of a buffer for all strands at once, at most kMaxExpandedBytes.
   uint64_t buffer_bytes(uint32_t max_segments_per_gap) const;
-  /// Strands that fit in a buffer of so many bytes.
+  /// Returns the number of strands that fit in a buffer of `size_bytes`.
   uint32_t batch_strands(uint64_t size_bytes, uint32_t segments_per_gap) const;
 
  private:
@@ -49,15 +48,15 @@ class ExpandSizes {
   uint32_t max_followers_;
 };
 
-/// The GL part: program and triangles.
+/// GL part of the expansion: program and triangles.
 class StrandExpander {
  public:
   StrandExpander() = default;
-  /// The asset must have strands. Followers need triangles: without them none are drawn, and no code for them
-  /// is compiled.
+  /// Makes an expander; the asset must have strands. Without triangles no followers are drawn and no code for
+  /// them is compiled.
   static Result<StrandExpander> make(const gl::ShaderLibrary& shaders, const SceneAsset& asset,
                                      const FollowerDesc& followers, CurveMethod curve = CurveMethod::Hermite);
-  /// Expands strands first .. first + count - 1 into `expanded`. Returns the segments written.
+  /// Expands strands first .. first + count - 1 into `expanded`. Returns the number of segments written.
   uint32_t run(const KeyStrands& keys, const ExpandedStrands& expanded, uint32_t first, uint32_t count,
                const ExpandLevel& level) const;
   uint64_t size_bytes() const { return curves_.size_bytes(); }
@@ -68,10 +67,10 @@ class StrandExpander {
   gl::VertexArray no_attributes_;
 };
 
-/// What the expand pass writes for a pass after it.
+/// Make the buffer of expanded strands, and the pass that writes it for later passes.
 std::unique_ptr<ExpandedStrands> make_expanded_strands(const RenderScene& scene);
 std::unique_ptr<RenderPass> make_expand_pass(RenderScene& scene, ExpandedStrands& expanded);
-/// Strands that cast shadows and are not drawn: as fine as the map of the light that they are drawn into.
+/// Make strands that only cast shadows, at the resolution of the light's map, and the pass that expands them.
 std::unique_ptr<ExpandedStrands> make_casters(const RenderScene& scene);
 std::unique_ptr<RenderPass> make_caster_pass(RenderScene& scene, ExpandedStrands& casters);
 

@@ -1,6 +1,6 @@
-// Walks over the expanded strands. A method that has to see all strands before it draws any takes another
-// walk: a pass of its own in front, over the same buffer and the same program. Where all strands fit in the
-// buffer at once, they are expanded in the first walk only. All calls from the context's thread.
+// ExpandWalks: walks over the expanded strands. A method that must see all strands before it draws any takes
+// another walk: an additional expand pass over the same buffer and program. If all strands fit in the buffer
+// at once, only the first walk expands them. All calls from the context's thread.
 #pragma once
 
 #include <memory>
@@ -13,18 +13,18 @@ namespace strandcast {
 
 class ExpandWalks {
  public:
-  /// `expand` writes `expanded`, in batches.
+  /// Starts with the pass `expand`, which writes `expanded` in batches.
   ExpandWalks(std::unique_ptr<RenderPass> expand, ExpandedStrands& expanded);
 
-  /// The pass of one more walk, named as the expand pass with `purpose` behind it. What draws the walk's
-  /// strands follows it directly; a pass that is not batched has to stand between two walks.
+  /// Returns the pass of a further walk, named like the expand pass plus `purpose`. Passes that draw its
+  /// strands must follow it directly; a pass that is not batched must separate two walks.
   std::unique_ptr<RenderPass> add(const std::string& purpose = "");
   ExpandedStrands& expanded() const { return expanded_; }
 
-  /// Whether the camera has walked already.
+  /// Whether the camera's walk has been added.
   bool has_camera_walk = false;
 
-  /// What the passes of all walks share.
+  /// State shared by the passes of all walks.
   struct Shared {
     std::unique_ptr<RenderPass> expand;
     uint32_t batch_count = 0;  // of the first walk of the draw that is under way

@@ -1,5 +1,5 @@
-// HeadMesh: the mesh under the hair as it lies on the GPU: positions, normals and how much of the skin is
-// under hair, per vertex. All calls from the context's thread.
+// HeadMesh: the mesh under the hair on the GPU: positions, normals, and per vertex how far the skin is
+// covered by hair. All calls from the context's thread.
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,11 @@ class HeadMesh {
  public:
   HeadMesh() = default;
   HeadMesh(const SceneAsset& asset, const RenderScene& scene);
-  /// Neck and chest are turned so from the next draw() on.
+  /// Sets the rotation of neck and chest from the next draw() on.
   void pose(const BustTurn& turn);
-  /// With the program that is in use, which has the vertex stage render/head.vert.
+  /// Draws with the active program, whose vertex stage must be render/head.vert.
   void draw() const;
-  /// What one of this scene takes.
+  /// Returns the bytes of this scene's head mesh.
   static uint64_t size_bytes(const RenderScene& scene);
 
  private:

@@ -1,5 +1,5 @@
-// The light volume on the GPU, with the uniforms of shaders/render/light.glsl. All calls from the context's
-// thread.
+// LightTexture: the light volume on the GPU, with the uniforms of shaders/render/light.glsl. All calls from
+// the context's thread.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -16,12 +16,12 @@ namespace strandcast {
 class LightTexture final : public gl::Resource {
  public:
   LightTexture() : Resource("light volume") {}
-  /// Allocates when the volume has another size than the last.
+  /// Uploads the volume; reallocates if its size has changed.
   void upload(const LightVolume& volume);
-  /// Light and surroundings as the shaders see them, in head space.
+  /// Sets key and ambient light as the shaders take them, in head space.
   void set_light(const LookDesc& look, const View& view, const glm::vec3& to_light_in_head);
   void set_uniforms(const gl::Program& program, uint32_t unit) const;
-  /// Follows the hair: 0 before the first upload.
+  /// Returns the texture's bytes, which depend on the extent of the hair; 0 before the first upload.
   uint64_t size_bytes() const override { return texture_.size_bytes(); }
 
  private:

@@ -1,5 +1,5 @@
-// Buffers of strands on the GPU: the key strands as they were decoded, and the segments that they are
-// expanded into. Allocated by the passes that write them. All calls that touch GL from the context's thread.
+// Buffers of strands on the GPU: decoded key strands and the segments that they are expanded into. The passes
+// that write them allocate them. All calls that touch GL come from the context's thread.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace strandcast {
 
-/// (vertex_count x strand_count) vec3 packed, vertex-major, head space, m.
+/// Key strands: (vertex_count x strand_count) packed vec3, vertex-major, head space, m.
 class KeyStrands final : public gl::Resource {
  public:
   KeyStrands(uint32_t strand_count, uint32_t vertex_count)
@@ -40,7 +40,7 @@ struct ExpandedVertex {
 static_assert(sizeof(ExpandedVertex) == 32);
 inline constexpr uint64_t kSegmentBytes = 2 * sizeof(ExpandedVertex);
 
-/// (segments x 2) ExpandedVertex of the strands that were expanded last. Segments of one strand may come in
+/// Expanded strands: (segments x 2) ExpandedVertex of the last expansion. Segments of one strand may be in
 /// any order.
 class ExpandedStrands final : public gl::Resource {
  public:

@@ -1,5 +1,5 @@
-// What kernels that include shaders/render/strand_curves.glsl need to know: where key strands and their
-// followers lie. All calls from the context's thread.
+// Inputs of kernels that include shaders/render/strand_curves.glsl: locations of key strands and their
+// followers. All calls from the context's thread.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ struct FollowerDesc {
   float shorten = 0.0f;      // 0..1, largest part cut off at the tip
 };
 
-/// How finely one draw expands.
+/// Resolution of the expansion for one draw.
 struct ExpandLevel {
   uint32_t segments_per_gap = 1;  // 1 .. the maximum of the look; by need: at most
   uint32_t followers = 0;         // per triangle, at most FollowerDesc::per_triangle
@@ -28,10 +28,10 @@ struct ExpandLevel {
 class StrandCurves {
  public:
   StrandCurves() = default;
-  /// Without triangles there are no followers, and no code for them is compiled.
+  /// Prepares the curves; without triangles there are no followers and no code for them is compiled.
   StrandCurves(const SceneAsset& asset, const FollowerDesc& followers, CurveMethod curve);
   gl::Variant variant() const;
-  /// For the program that is in use.
+  /// Sets the inputs of the active program.
   void set(const gl::Program& program, const KeyStrands& keys, const ExpandLevel& level) const;
   uint64_t size_bytes() const { return root_triangle_.size_bytes(); }
 

@@ -1,5 +1,5 @@
-// Strand pass: a camera-facing quad per expanded segment, shaded by the model that the look names, covered by
-// a fixed pattern instead of sorted blending. All calls from the context's thread.
+// Strand pass: draws a camera-facing quad per expanded segment, shaded by the look's model. A fixed coverage
+// pattern replaces sorted blending. All calls from the context's thread.
 #pragma once
 
 #include <memory>
@@ -15,30 +15,31 @@
 
 namespace strandcast {
 
-/// Segments that are drawn: all, or those with little or much hair behind them, as sample_choice.comp marks
-/// them. strand.vert has the same numbers.
+/// Which segments are drawn: all, or those with little or much hair behind them, as sample_choice.comp marks
+/// them. strand.vert uses the same numbers.
 enum class StrandDepth : int { All, Shallow, Deep };
 
-/// Quads of expanded segments with a program: for every pass that draws strands, seen from wherever.
+/// Draws expanded segments as quads with a program, from any view point; used by every pass that draws
+/// strands.
 class StrandDraw {
  public:
   static constexpr const char* kShadedStage = "render/strand.vert";
   static constexpr const char* kShadedFragment = "render/strand.frag";
   static constexpr uint32_t kCornersPerSegment = 4;
   static constexpr uint32_t kIndicesPerSegment = 6;
-  /// Segments per draw such that 16-bit indices reach all corners.
+  /// Segments per draw, chosen so that 16-bit indices reach all corners.
   static constexpr uint32_t kSegmentsPerDraw = 65'536 / kCornersPerSegment;
   StrandDraw() = default;
   static Result<StrandDraw> make(const RenderSetup& setup, const RenderScene& scene,
                                  const std::string& fragment_stage, gl::Variant variant = {},
                                  const std::string& vertex_stage = kShadedStage);
-  /// Program, buffers and what render/strand.vert has to know, for a target of this size. The target is bound
-  /// by the caller.
+  /// Activates the program and buffers, and sets the inputs of render/strand.vert for a target of this size.
+  /// The caller binds the target.
   void begin(const RenderScene& scene, const ExpandedStrands& expanded, const RenderTurn& turn,
              glm::uvec2 target_px);
-  /// Program and buffers alone, for another vertex stage.
+  /// Activates program and buffers only, for another vertex stage.
   void bind(const ExpandedStrands& expanded);
-  /// All segments that are expanded now; those that are chosen of them, where the camera draws and some are.
+  /// Draws all expanded segments, or only the chosen ones if the camera draws and segments were chosen.
   void draw(const RenderScene& scene, const ExpandedStrands& expanded) const;
   const gl::Program& program() const { return program_; }
   static uint64_t size_bytes();
@@ -51,16 +52,16 @@ class StrandDraw {
   bool is_chosen_ = false;
 };
 
-/// What programs with shaders/render/strand_light.glsl are compiled with and told, evaluated per vertex
-/// unless they say otherwise.
+/// Variant and uniforms of programs with shaders/render/strand_light.glsl. Light is evaluated per vertex
+/// unless the program says otherwise.
 gl::Variant strand_light_variant(const RenderScene& scene);
 void set_strand_light(const RenderScene& scene, const gl::Program& program, const RenderTurn& turn);
 
-/// A declaration of a pass that runs when there are strands.
+/// Declares a pass that runs if there are strands.
 gl::PassDeclaration strand_pass(const RenderScene& scene, std::string name, gl::Resources reads,
                                 gl::Resources writes);
 
-/// Draws the strands of each batch with a fragment stage of its own, as the camera sees them.
+/// Draws the strands of each batch as the camera sees them, with a fragment stage of its own.
 class StrandDrawPass : public RenderPass {
  public:
   StrandDrawPass(RenderScene& scene, ExpandedStrands& expanded, gl::PassDeclaration declaration,
@@ -82,7 +83,7 @@ class StrandDrawPass : public RenderPass {
   std::string fragment_stage_;
 };
 
-/// Between two walks: what the first one drew is read in the second.
+/// Makes the pass between two walks, after which the second walk can read what the first one drew.
 std::unique_ptr<RenderPass> make_ready_pass(const RenderScene& scene, std::string name, gl::Resources reads,
                                             gl::Resources writes);
 std::unique_ptr<RenderPass> make_strand_pass(RenderScene& scene, ExpandedStrands& expanded);

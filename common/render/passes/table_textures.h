@@ -1,6 +1,5 @@
-// Lookup tables on the GPU, and the density of the hair: what single methods of shading read. Allocated by
-// the passes that write them, when a look names such a method. All calls that touch GL from the context's
-// thread.
+// Lookup tables and hair density on the GPU, for certain shading methods. The passes that write them allocate
+// them if a look names such a method. All calls that touch GL come from the context's thread.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +13,10 @@
 
 namespace strandcast {
 
-/// Texture of half floats in the shape of a scatter::LookupTable, filtered linearly.
+/// Uploads a table as a texture of half floats with the shape of the table and linear filtering.
 gl::Texture upload_table(const std::string& label, const scatter::LookupTable& table);
 
-/// M and N of a smooth fibre (shaders/shared/lobe_tables.h), for Marschner's model.
+/// Lobes M and N of a smooth fibre (shaders/shared/lobe_tables.h), for Marschner's model.
 class LobeTables final : public gl::Resource {
  public:
   LobeTables() : Resource("lobe tables") {}
@@ -31,7 +30,7 @@ class LobeTables final : public gl::Resource {
   gl::Texture azimuthal_;
 };
 
-/// What such a fibre scatters forward and back, for dual scattering.
+/// Forward and backward scattering of a smooth fibre, for dual scattering.
 class ScatterTables final : public gl::Resource {
  public:
   ScatterTables() : Resource("scatter tables") {}
@@ -43,14 +42,14 @@ class ScatterTables final : public gl::Resource {
   gl::Texture averages_;
 };
 
-/// Strands crossed per metre in the cells of the light volume, for normals of the hair as a surface.
+/// Strands crossed per metre in each cell of the light volume, for normals of the hair as a surface.
 class DensityTexture final : public gl::Resource {
  public:
   DensityTexture() : Resource("hair density") {}
-  /// Allocates when the volume has another size than the last.
+  /// Uploads the density; reallocates if the volume's size has changed.
   void upload(const LightVolume& volume);
   const gl::Texture& density() const { return texture_; }
-  /// Follows the hair: 0 before the first upload.
+  /// Returns the texture's bytes, which depend on the extent of the hair; 0 before the first upload.
   uint64_t size_bytes() const override { return texture_.size_bytes(); }
 
  private:
@@ -58,7 +57,7 @@ class DensityTexture final : public gl::Resource {
   glm::ivec3 size_{0};
 };
 
-/// Longitudinal shifts and widths that a look asks for, rad.
+/// Returns the longitudinal shifts and widths that a look states, rad.
 std::array<scatter::LobeShape, 3> lobe_shapes_of(const LookDesc& look);
 
 }  // namespace strandcast

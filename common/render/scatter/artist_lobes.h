@@ -1,6 +1,6 @@
-// Models of shading that were made to look right and to be cheap, in double precision, written from their
-// equations: Kajiya and Kay 1989 and TressFX's two highlights, Sadeghi et al. 2010, Karis 2016. Directions
-// are unit vectors that point away from the strand. Pure functions, any thread.
+// Shading models designed for their looks and low cost, in double precision, written from their equations:
+// Kajiya and Kay 1989 with TressFX's two highlights, Sadeghi et al. 2010, Karis 2016. Directions are unit
+// vectors that point away from the strand. Pure functions, any thread.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace strandcast::scatter {
 
-/// A light and an eye as seen from a strand with this tangent (root to tip).
+/// A light and an eye relative to a strand with this tangent (root to tip).
 struct StrandView {
   glm::dvec3 tangent{1.0, 0.0, 0.0};
   glm::dvec3 to_light{0.0, 1.0, 0.0};
@@ -25,8 +25,8 @@ StrandAngles angles_of(const StrandView& view);
 
 double kajiya_kay_diffuse(const StrandView& view);
 double kajiya_kay_specular(const StrandView& view, double power);
-/// The highlight on a cone of reflection that is turned by `turn` towards the tip (TressFX 4.1: -2 and +3
-/// times its cone angle of 10 degrees).
+/// Highlight on a reflection cone that is tilted by `turn` towards the tip (TressFX 4.1: -2 and +3 times its
+/// cone angle of 10 degrees).
 double turned_highlight(const StrandView& view, double turn, double power);
 
 struct ArtistLobes {
@@ -36,10 +36,10 @@ struct ArtistLobes {
   double glint = 0.4;                     // I_g, at most 0.5
   double glint_phi = 35.0 * kDegree;      // where the strand's glint is seen, 30 .. 45 degrees
 };
-/// R, TT and TRT of Sadeghi et al. 2010 without colours and weights.
+/// Lobes R, TT and TRT of Sadeghi et al. 2010 without colours and weights.
 std::array<double, 3> sadeghi_lobes(const ArtistLobes& lobes, const StrandAngles& angles);
 
-/// Karis 2016: R, TT and TRT with the colours of what they passed, without longitudinal part.
+/// Karis 2016: azimuthal parts of R, TT and TRT, including absorption in the fibre.
 struct KarisAzimuthal {
   double r = 0.0;
   glm::dvec3 tt{0.0};

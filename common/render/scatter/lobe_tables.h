@@ -1,5 +1,5 @@
-// Lookup tables for the shaders, from the double-precision fibre: half floats in the shape that
-// shaders/shared/lobe_tables.h states. Pure functions, any thread, some milliseconds.
+// Lookup tables for the shaders, computed from the double-precision fibre; half floats in the shape that
+// shaders/shared/lobe_tables.h states. Pure functions, any thread, some milliseconds each.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace strandcast::scatter {
 
-/// (depth x height x width x 4) half floats.
+/// Table of (depth x height x width x 4) half floats.
 struct LookupTable {
   glm::uvec3 size{0};
   std::vector<uint64_t> texels;
@@ -18,7 +18,7 @@ struct LookupTable {
 
 LookupTable make_longitudinal_table(const std::array<LobeShape, 3>& shapes);
 LookupTable make_azimuthal_table(const CausticTerms& caustic);
-/// Shifts and widths relative to those of `shapes[0]`.
+/// Makes the table of fibre averages; shifts and widths are relative to those of `shapes[0]`.
 LookupTable make_average_table(const std::array<LobeShape, 3>& shapes, const CausticTerms& caustic);
 
 }  // namespace strandcast::scatter

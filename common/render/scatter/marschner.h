@@ -10,7 +10,8 @@
 
 namespace strandcast::scatter {
 
-/// The caustics of TRT, which diffraction and rough scales wash out (section 5.2.2 and table 1 there).
+/// Treatment of TRT's caustics, which diffraction and surface roughness smooth (section 5.2.2 and table 1 of
+/// the paper).
 struct CausticTerms {
   double power = 2.5;           // k_G, 0.5 .. 5
   double width = 15 * kDegree;  // w_c, 10 .. 25 degrees
@@ -31,30 +32,32 @@ struct LobeShape {
   double width = 0.0;  // rad
 };
 std::array<LobeShape, 3> lobe_shapes(double width_r, double shift_r);
-/// Area 1 over the outgoing angle: a Gaussian of area 1 in the half angle has an area of about 2 there.
+/// Longitudinal Gaussian with area 1 over the outgoing angle; an area of 1 in the half angle would be about 2
+/// there.
 double longitudinal(const LobeShape& shape, double theta_half);
 
-/// The cubic that stands for the exit azimuth: Phi(p, gamma), and the entries gamma that leave at `phi`.
+/// Cubic approximation of the exit azimuth Phi(p, gamma), and the entry angles gamma whose light leaves at
+/// `phi`.
 double cubic_exit(size_t p, double index_in_section, double gamma);
 std::vector<double> exit_roots(size_t p, double index_in_section, double phi);
 
-/// A part of N_p: strength * exp(-absorption * path).
+/// One term of N_p: strength * exp(-absorption * path).
 struct Way {
   double strength = 0.0;
   double path = 0.0;  // radii
 };
 using Ways = std::vector<Way>;
 double sum_of(const Ways& ways, double absorption);
-/// What azimuthal() and azimuthal_trt() sum, whatever `fibre` absorbs.
+/// Terms that azimuthal() and azimuthal_trt() sum, independent of the absorption of `fibre`.
 Ways azimuthal_ways(size_t p, const SmoothFibre& fibre, double theta_diff, double phi);
 Ways azimuthal_trt_ways(const SmoothFibre& fibre, double theta_diff, double phi);
 
-/// N_p of the plain model, infinite on caustics.
+/// Azimuthal function N_p of the plain model; infinite on caustics.
 double azimuthal(size_t p, const SmoothFibre& fibre, double theta_diff, double phi);
-/// The same with the exact law of refraction instead of the cubic.
+/// Azimuthal function with the exact law of refraction instead of the cubic.
 double azimuthal_exact(size_t p, const SmoothFibre& fibre, double theta_diff, double phi);
 
-/// Where two entries of TRT fall together. Only below eta' = 2.
+/// Azimuth at which two entries of TRT coincide. Exists only for eta' < 2.
 struct Caustic {
   bool exists = false;
   double gamma = 0.0;
@@ -62,14 +65,14 @@ struct Caustic {
   double phi = 0.0;
 };
 Caustic trt_caustic(double index_in_section);
-/// N_TRT with the caustics taken out and put back as smooth lobes.
+/// Azimuthal function N_TRT with the caustics removed and replaced by smooth lobes.
 double azimuthal_trt(const SmoothFibre& fibre, double theta_diff, double phi);
 
-/// Index that an elliptic section has for TRT, `eccentricity` 0.85 .. 1, seen under the mean azimuth
-/// phi_half.
+/// Effective refractive index of an elliptic section for TRT at the mean azimuth phi_half; `eccentricity`
+/// 0.85 .. 1.
 double elliptic_index(double index, double eccentricity, double phi_half);
 
-/// R, TT and TRT with caustics, times cos theta_i: what a unit of light along a direction becomes.
+/// Lobes R, TT and TRT with caustics, times cos theta_i: the reflected part of a unit of light.
 std::array<double, 3> marschner_lobes(const SmoothFibre& fibre, const std::array<LobeShape, 3>& shapes,
                                       double theta_in, double theta_out, double phi);
 

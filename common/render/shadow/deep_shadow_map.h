@@ -1,6 +1,6 @@
-// Deep shadow map in double precision: of each texel of the light's map, where on its ray how much is taken
-// off the light, of every strand, without layers or cells. The truth that the other methods are held against.
-// Any thread, no GL.
+// Deep shadow map in double precision: for each texel of the light's map, the exact steps of light lost to
+// every strand on its ray, without layers or cells. Reference for the other shadow methods. Any thread, no
+// GL.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace strandcast {
 
-/// From here on, along the ray of one texel, the optical depth is `depth`.
+/// A step of optical depth: from `at_m` on along the ray of a texel, it is `depth`.
 struct ShadowStep {
   float at_m = 0.0f;
   float depth = 0.0f;
@@ -20,18 +20,19 @@ struct ShadowStep {
 
 class DeepShadowMap {
  public:
-  /// `strand_opacity`: optical depth of a strand that covers all of a texel.
+  /// Makes an empty map; `strand_opacity` is the optical depth of a strand that covers a whole texel.
   DeepShadowMap(const LightFrame& frame, double strand_opacity);
 
-  /// Segments as two vertices each, with the width of their strands at the root. What is not a number is left
-  /// out.
+  /// Adds segments, two vertices each, with the strands' width at the root. Non-finite segments are ignored.
   void add(std::span<const ExpandedVertex> vertices, double width_m, double tip_scale);
-  /// After the last add(), before the first question.
+  /// Completes the map after the last add(), before the first lookup.
   void finish();
 
-  /// Between a point and the light: of the four texels round it, each by its own steps, then mixed.
+  /// Returns the optical depth between a point and the light, interpolated from the steps of the four
+  /// surrounding texels.
   double optical_depth(const glm::vec3& point_m) const;
-  /// Steps of one texel, in order; those that together change the light by less than `tolerance` are one.
+  /// Returns the steps of one texel in order; steps that together change the light by less than `tolerance`
+  /// are merged.
   std::vector<ShadowStep> steps(uint32_t x, uint32_t y, double tolerance) const;
 
  private:

@@ -1,5 +1,5 @@
-// Density of the drawn strands in a cube of cells: how much a ray towards the light loses per metre. Filled
-// by shaders/render/density.comp. All calls from the context's thread.
+// DensityVolume: density of drawn strands in a cube of cells, as the loss of a ray towards the light per
+// metre. Filled by shaders/render/density.comp. All calls from the context's thread.
 #pragma once
 
 #include "common/gl/objects.h"
@@ -12,14 +12,14 @@ namespace strandcast {
 class DensityVolume final : public ShadowMap {
  public:
   DensityVolume() : ShadowMap("density volume") {}
-  /// Once per draw: allocates, and empties all cells.
+  /// Starts a draw: allocates and clears all cells.
   void begin(const RenderScene& scene, const RenderTurn& turn);
-  /// Adds what is expanded now; `program` is of density.comp.
+  /// Adds the currently expanded strands; `program` must be density.comp.
   void add(const gl::Program& program, const RenderScene& scene, const ExpandedStrands& expanded) const;
-  /// Makes what was added the texture that is looked up.
+  /// Copies the sums to the texture that is looked up.
   void finish() const;
   void set_uniforms(const gl::Program& program, uint32_t first_unit) const override;
-  /// The density alone, for who looks along other rays.
+  /// Sets the uniforms of the density only, for lookups along other rays.
   void set_density_uniforms(const gl::Program& program, uint32_t unit) const;
   uint64_t size_bytes() const override { return cell_.size_bytes() + texture_.size_bytes(); }
 
@@ -31,7 +31,7 @@ class DensityVolume final : public ShadowMap {
   FittedSphere skull_;
 };
 
-/// The passes that fill it, with a walk of their own.
+/// Adds the passes that fill the volume, with a walk of their own.
 void add_density_passes(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes,
                         DensityVolume& volume);
 

@@ -1,5 +1,5 @@
-// Where hair lies as the light sees it: a square map across the light, and the depth along it. Pure
-// functions, any thread.
+// LightFrame: bounds of the hair as the light sees it: a square map across the light, and depth along it.
+// Pure functions, any thread.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 namespace strandcast {
 
 struct LightFrame {
-  /// x and y: texels of the map; z: metres along the light's way from where the hair begins.
+  /// Transform to the map: x and y in texels, z in metres along the light from where the hair begins.
   glm::mat4 map_from_head{1.0f};
   uint32_t texels = 1;  // along each side of the map
   float texels_per_m = 1.0f;
@@ -18,12 +18,12 @@ struct LightFrame {
   glm::vec3 in_map(const glm::vec3& point_m) const;
 };
 
-/// Around the points and `margin_m` more on all sides. Steps of size and place are whole, so that nothing
-/// shimmers when the hair moves a little. Points that are not numbers, or absurdly far, do not count.
+/// Fits a frame around the points with `margin_m` on all sides. Size and position change in whole steps, so
+/// that small motion of the hair causes no shimmer. Non-finite or absurdly distant points are ignored.
 LightFrame fit_light_frame(std::span<const glm::vec3> position_m, const glm::vec3& to_light, uint32_t texels,
                            float margin_m);
 
-/// The same, as a cube of cells with the axes of head space.
+/// Bounds of the hair as a cube of cells along the axes of head space.
 struct HairCube {
   glm::vec3 origin_m{0.0f};
   float side_m = 1.0f;

@@ -1,5 +1,5 @@
-// Maps of the hair as the light sees it: what deep opacity maps, opacity shadow maps, the hybrid and deep
-// shadow maps have in common. All calls from the context's thread.
+// LightMap: common part of the shadow methods that draw the hair as the light sees it: deep opacity maps,
+// opacity shadow maps, the hybrid and deep shadow maps. All calls from the context's thread.
 #pragma once
 
 #include <memory>
@@ -12,11 +12,11 @@
 
 namespace strandcast {
 
-/// A map with the frame of the draw that is under way.
+/// A map with the light frame of the current draw.
 class LightMap : public ShadowMap {
  public:
   LightMap(std::string name, uint32_t texels) : ShadowMap(std::move(name)), texels_(texels) {}
-  /// Called once per draw, before strands are drawn into it: allocates, and forgets the last draw.
+  /// Starts a draw before strands are drawn into the map: allocates and clears it.
   virtual void begin() = 0;
   void fit(const RenderScene& scene, const RenderTurn& turn);
   const LightFrame& frame() const { return frame_; }
@@ -24,7 +24,7 @@ class LightMap : public ShadowMap {
   void set_uniforms(const gl::Program& program, uint32_t first_unit) const override;
 
  protected:
-  /// Textures and numbers of the method.
+  /// Sets the textures and parameters of the method.
   virtual void set_method_uniforms(const gl::Program& program, uint32_t first_unit) const = 0;
 
  private:
@@ -33,19 +33,19 @@ class LightMap : public ShadowMap {
   FittedSphere skull_;  // radius 0: none
 };
 
-/// The skull under the hair for shaders/render/shadow.glsl; its radius is 0 where there is none.
+/// Returns the skull under the hair for shaders/render/shadow.glsl; its radius is 0 if there is none.
 FittedSphere shadowing_skull(const RenderScene& scene);
 void set_skull_uniforms(const gl::Program& program, const FittedSphere& skull);
 
-/// In front of the first walk: the light of the draw, and the map's frame.
+/// Makes the pass in front of the first walk, which sets the draw's light and the map's frame.
 std::unique_ptr<RenderPass> make_light_frame_pass(RenderScene& scene, LightMap& map);
 
-/// Strands as the light sees them, with a fragment stage that includes render/shadow_map.glsl.
+/// Draws strands as the light sees them, with a fragment stage that includes render/shadow_map.glsl.
 class LightDraw {
  public:
   static Result<LightDraw> make(const RenderSetup& setup, const RenderScene& scene,
                                 const std::string& fragment_stage, gl::Variant variant = {});
-  /// The target is bound by the caller.
+  /// Draws the expanded strands; the caller binds the target.
   void draw(const RenderScene& scene, const LightMap& map, const ExpandedStrands& expanded);
   const gl::Program& program() const { return strands_.program(); }
 

@@ -1,6 +1,6 @@
-// How much of the light reaches a strand through the others: each method of common/scene/shadow_methods.h
-// adds its passes, and only what is chosen is compiled and allocated. What a method knows of the hair it
-// hands to shaders/render/shadow.glsl, for strands and head alike. `volume` is the light pass.
+// Shadow methods: how much light reaches a strand through other strands. Each method of
+// common/scene/shadow_methods.h adds its passes; only the chosen one is compiled and allocated. It provides
+// its data to shaders/render/shadow.glsl, for strands and head alike. The method `volume` is the light pass.
 #pragma once
 
 #include "common/gl/pass_plan.h"
@@ -11,19 +11,20 @@
 
 namespace strandcast {
 
-/// What a method other than `volume` and `none` keeps.
+/// Data of a shadow method other than `volume` and `none`.
 class ShadowMap : public gl::Resource {
  public:
   using Resource::Resource;
-  /// For shaders that include render/light.glsl; takes texture units from `first_unit` on.
+  /// Sets the uniforms of a shader that includes render/light.glsl; uses texture units from `first_unit` on.
   virtual void set_uniforms(const gl::Program& program, uint32_t first_unit) const = 0;
 };
 
-/// Texture units of a ShadowMap: behind the light volume's, at most kShadowUnits.
+/// Texture units of a ShadowMap: after the light volume's unit, at most kShadowUnits.
 inline constexpr uint32_t kFirstShadowUnit = 1;
 inline constexpr uint32_t kShadowUnits = 6;
 
-/// A method fills scene.light with the light itself; those with a map make it scene.shadow.
+/// Add the passes of the scene's method. A method either fills scene.light itself or sets its map as
+/// scene.shadow.
 void add_shadow_passes(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
 
 void add_none(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
@@ -33,9 +34,9 @@ void add_density_rays(RenderScene& scene, ExpandWalks& walks, RenderPassList& pa
 void add_deep_shadow(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
 void add_hybrid(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
 
-/// How far drawn strands may stray from the key strands.
+/// Returns the largest distance of drawn strands from the key strands.
 float shadow_margin_m(const RenderScene& scene);
-/// Towards the light of the look, unit, head space; from above when it has no direction.
+/// Returns the unit direction towards the look's light in head space; from above if it has no direction.
 glm::vec3 to_light_in_head(const RenderScene& scene, const RenderTurn& turn);
 
 }  // namespace strandcast

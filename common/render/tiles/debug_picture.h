@@ -1,5 +1,5 @@
-// Debug views that are no picture of strands (common/render/debug_view.h): drawn over the picture, or in its
-// place. Slow and simple. No GL.
+// Debug views that do not draw strands (common/render/debug_view.h), over the picture or in its place. Slow
+// and simple. No GL.
 #pragma once
 
 #include "common/base/worker_pool.h"
@@ -10,10 +10,10 @@
 
 namespace strandcast {
 
-/// The density of hair in the plane through the point looked at, square to the view.
+/// Draws the density of hair in the plane through the camera's target, perpendicular to the view.
 void draw_density(const LightLatticeView& lattice, const View& view, WorkerPool& workers, Image& image);
 
-/// Tints each tile by how many segments it has, and draws its border.
+/// Tints each tile by its number of segments and draws its border.
 void mark_tiles(const TileLists<TileSegment>& segments, const TileGrid& grid, Image& image);
 
 }  // namespace strandcast

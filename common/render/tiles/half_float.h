@@ -1,4 +1,4 @@
-// IEEE halves as the tile renderer stores them.
+// Conversion of IEEE half floats, as the tile renderer stores them.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 
 namespace strandcast {
 
-/// Exact for every finite half.
+/// Converts a half float; exact for every finite value.
 inline float float_of_half(uint16_t half) {
   constexpr float kFloatScale = 5.19229686e33f;  // 2^112: the difference of the two biases
   const uint32_t bits = (static_cast<uint32_t>(half) & 0x7fffu) << 13;

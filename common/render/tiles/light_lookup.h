@@ -1,4 +1,4 @@
-// Look-ups in the light lattice and the look, for kernels (common/simd/variants.h). Everything is inlined.
+// Lookups in the light lattice and in the look, for kernels (common/simd/variants.h). Everything is inlined.
 #pragma once
 
 #include <cstring>
@@ -18,7 +18,7 @@ STRANDCAST_LANES law::HairLights hair_lights(const ShadingNumbers& n, const Ligh
   return {lights.to_key, n.key_color, lights.to_rim, n.rim_color, lights.has_rim, lights.up, n.ambient};
 }
 
-/// Where a point lies in a lattice: cells of its lower corner, and the way to the next ones.
+/// Position in a lattice: offset of the cell's lower corner, and weights towards the next ones.
 struct LatticePlace {
   int32_t offset[simd::kLanes];
   simd::Float fx, fy, fz;
@@ -48,7 +48,7 @@ STRANDCAST_LANES simd::Float high_halves(simd::UintBits v) {
   return __builtin_convertvector((simd::IntBits)(v >> 16), simd::FloatBits);
 }
 
-/// Optical depths towards the lights at points of head space, trilinear.
+/// Returns optical depths towards the lights at points of head space, interpolated trilinearly.
 STRANDCAST_LANES law::LightDepth light_depth_at(const LightLatticeView& view, law::vec3 point) {
   using namespace simd;
   const Float scale = 1.0f / view.cell_m;

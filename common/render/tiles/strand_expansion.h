@@ -1,6 +1,6 @@
-// From simulated strands to the points that are drawn: curves through the vertices of key strands, and
-// followers between three of them (shaders/lib/strand_style.glsl). What is the same from picture to picture
-// is found once. No GL.
+// Expands simulated strands to the points that are drawn: curves through the vertices of key strands, and
+// followers between three of them (shaders/lib/strand_style.glsl). What does not change between pictures is
+// computed once. No GL.
 #pragma once
 
 #include <cstdint>
@@ -19,13 +19,13 @@ namespace strandcast {
 
 class StrandExpansion {
  public:
-  /// `mean_length_m`: of a key strand at rest.
+  /// Prepares an asset; `mean_length_m` is that of a key strand at rest.
   StrandExpansion(const SceneAsset& asset, float mean_length_m);
 
-  /// Lengths and numbers of the look's style.
+  /// Sets the lengths and counts of the look's style.
   void set_look(const LookDesc& look);
   uint32_t key_count() const { return key_count_; }
-  /// `position_m`: (vertex_count x key_count) vertex-major, head space.
+  /// Computes the points. `position_m`: (vertex_count x key_count), vertex-major, head space.
   void expand(const std::vector<glm::vec3>& position_m, const StrandDetail& detail, WorkerPool& workers,
               simd::InstructionSet set, StrandPoints& points);
   uint64_t size_bytes() const;

@@ -1,5 +1,5 @@
-// From points of strands in head space to what is drawn: pixels, depth, width, joints and light, once per
-// point (shaders/lib/hair_light.glsl). No GL.
+// Shades points of strands: from head space to pixels, depth, width, joints and light, once per point
+// (shaders/lib/hair_light.glsl). No GL.
 #pragma once
 
 #include "common/base/worker_pool.h"
@@ -24,7 +24,7 @@ struct ShadeInput {
   DebugView debug_view = DebugView::None;
 };
 
-/// Points in head space become points on the screen, in place.
+/// Turns points in head space into shaded points on the screen, in place.
 void shade_points(const ShadeInput& input, WorkerPool& workers, simd::InstructionSet set,
                   StrandPoints& points);
 

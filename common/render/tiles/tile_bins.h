@@ -1,5 +1,5 @@
-// Which segments, and which triangles of the head, touch which tile of a picture. Lists are in the order of
-// the segments, whatever the number of threads. No GL.
+// TileBins: lists of the segments, and of the head's triangles, that touch each tile of a picture. Lists are
+// in the order of the segments for any number of threads. No GL.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace strandcast {
 
-/// Pairs of a segment and a tile in one picture, at most; more, and strands are left out evenly.
+/// Largest number of (segment, tile) pairs in one picture; beyond it strands are evenly left out.
 inline constexpr size_t kMaxTilePairs = size_t{1} << 23;
 
 struct TileGrid {
@@ -22,13 +22,14 @@ struct TileGrid {
   uint32_t count() const { return columns() * rows(); }
 };
 
-/// A segment in a tile: the depths of its two ends, summed, and its first point.
+/// A segment in a tile: the sum of the depths of its ends, and its first point.
 struct TileSegment {
   float depth;
   uint32_t point;
 };
 
-/// Tile i has item[first[i]] up to item[first[i + 1]]; `first` has one entry more than there are tiles.
+/// Lists of all tiles: tile i has item[first[i]] up to item[first[i + 1]], exclusive. `first` has one entry
+/// more than there are tiles.
 template <class Item>
 struct TileLists {
   std::vector<uint32_t> first;
@@ -44,9 +45,10 @@ struct BinCounts {
 
 class TileBins {
  public:
-  /// Segments by the index of their first point. Behind `near_m` nothing is drawn.
+  /// Sorts segments, by the index of their first point, into tiles. Segments nearer than `near_m` are not
+  /// drawn.
   BinCounts bin_segments(const StrandPoints& points, const TileGrid& grid, float near_m, WorkerPool& workers);
-  /// Boxes (low x, low y, high x, high y) in pixels; an empty one is in no tile.
+  /// Sorts boxes (low x, low y, high x, high y; pixels) into tiles; an empty box is in no tile.
   void bin_boxes(const std::vector<glm::vec4>& boxes, const TileGrid& grid);
 
   const TileLists<TileSegment>& segments() const { return segments_; }

@@ -1,5 +1,5 @@
-// Blending of a tile's segments front to back, for the kernel of tile_raster.cpp: what a segment needs is
-// found for eight of them at once, then each is blended into the blocks of pixels that it can reach.
+// Blends a tile's segments front to back, for the kernel of tile_raster.cpp. The set-up of a segment is
+// computed for eight of them at once; then each is blended into the pixel blocks that it can reach.
 // Everything is inlined.
 #pragma once
 
@@ -25,7 +25,7 @@ inline constexpr float kOpaque = 1.0f / 300.0f;
 // Strands this far behind the skin are still in front of it: roots stand in it.
 inline constexpr float kSkinDepthM = 0.0005f;
 
-/// Of one tile, per pixel.
+/// Colour and opacity of one tile's pixels.
 struct TilePixels {
   simd::Float red[kBlocks];
   simd::Float green[kBlocks];
@@ -46,7 +46,7 @@ struct TileHead {
 };
 inline constexpr float kNothingHidden = 1e30f;
 
-/// Where whole blocks are covered, and how far back the head reaches.
+/// Finds the blocks that the head covers entirely, and how far back the head reaches.
 STRANDCAST_LANES void find_hidden(TileHead& head) {
   constexpr float kRounding = 1e-5f;  // of a depth between two ends
   constexpr float kNoHead = 1e29f;    // from here on depths are of nothing
@@ -71,7 +71,7 @@ STRANDCAST_LANES simd::Float block_rows() {
   return simd::FloatBits{0.5f, 0.5f, 1.5f, 1.5f, 2.5f, 2.5f, 3.5f, 3.5f};
 }
 
-/// The seven halves of a point as floats, in their order.
+/// Returns the seven half floats of a point as floats, in their order.
 STRANDCAST_LANES simd::Float values_of(const StrandPoint& point) {
   using HalfBits = uint16_t __attribute__((vector_size(16)));
   HalfBits half;
@@ -82,8 +82,8 @@ STRANDCAST_LANES simd::Float values_of(const StrandPoint& point) {
   return (simd::FloatBits)((simd::UintBits)size | (bits & 0x8000u) << 16);
 }
 
-/// Eight segments, as they are blended. Distances are straight functions of a pixel's middle (x, y), counted
-/// from the tile's corner: x * [0] + y * [1] + [2].
+/// Eight segments prepared for blending. Distances are linear functions of a pixel's centre (x, y), relative
+/// to the tile's corner: x * [0] + y * [1] + [2].
 struct SegmentBatch {
   using Row = float[simd::kLanes];
   Row across[3];    // from the line, px
@@ -100,7 +100,7 @@ struct SegmentBatch {
   float step[simd::kLanes][8];       // from there to the second
 };
 
-/// How far a mitre leans along a segment, per distance from it.
+/// Returns the slant of a mitre along a segment, per distance from it.
 STRANDCAST_LANES simd::Float lean_of(law::vec2 mitre, law::vec2 way) {
   constexpr float kLeast = 1e-3f;
   constexpr float kMost = 1e3f;
@@ -205,20 +205,21 @@ STRANDCAST_LANES void place_segments(const StrandPoint* points, const uint64_t* 
   store_lanes(select(is_level, kWholeTile, reach / max(steepness, kLevel) + kSlack), out.room);
 }
 
-/// Blocks from the one that holds the first middle of a pixel at or above `low` ...
+/// Returns the first block whose last pixel centre is at or above `low`, for blocks of `side` pixels.
 STRANDCAST_LANES int first_block(float low, int side) {
   // The last middle of a block lies half a pixel before its end.
   const float at = (low + 0.5f) * (1.0f / static_cast<float>(side));
   return at > 0.0f ? static_cast<int>(at) : 0;
 }
-/// ... to the one that holds the last at or below `high`; negative for none.
+/// Returns the last block that has a pixel centre at or below `high`, for blocks of `side` pixels; negative
+/// for none.
 STRANDCAST_LANES int last_block(float high, int side, int blocks) {
   const float at = (high - 0.5f) * (1.0f / static_cast<float>(side));
   if (at >= static_cast<float>(blocks)) return blocks - 1;
   return at >= 0.0f ? static_cast<int>(at) : -1;
 }
 
-/// Blends one segment of a batch under what lies in front of it.
+/// Blends one segment of a batch under what is already in front of it.
 STRANDCAST_LANES void blend_segment(const SegmentBatch& s, uint32_t i, TileHead* head, TilePixels& pixels) {
   using simd::Bool;
   using simd::Float;
@@ -281,7 +282,8 @@ STRANDCAST_LANES void blend_segment(const SegmentBatch& s, uint32_t i, TileHead*
   }
 }
 
-/// Closes the blocks that are opaque; true while any is open. `head`: where all that comes lies behind it.
+/// Marks opaque blocks as closed and returns whether any is still open. `head` is given if all later segments
+/// lie behind it; else null.
 STRANDCAST_LANES bool close_opaque_blocks(const TileHead* head, TilePixels& pixels) {
   uint32_t any = 0;
   for (int y = 0; y < kBlocksDown; ++y) {

@@ -1,5 +1,5 @@
-// TileFrame: what the stages of the tile renderer hand to one another, for one picture. Made once, reused; no
-// GL.
+// TileFrame: data that the stages of the tile renderer exchange for one picture. Allocated once and reused;
+// no GL.
 #pragma once
 
 #include <array>
@@ -13,10 +13,10 @@
 
 namespace strandcast {
 
-/// Tiles are squares of so many pixels: part of what a picture is, as they decide where strands are sorted.
+/// Side of a tile in pixels. It affects the picture, because strands are sorted per tile.
 inline constexpr uint32_t kTilePx = 32;
 
-/// A point of a drawn strand. Two of them in a row, of one strand, are a segment.
+/// A point of a drawn strand. Two successive points of one strand are a segment.
 struct StrandPoint {
   float x, y, z;  // m, head space; once shaded: pixels from the top left, and metres along the view
   uint32_t unused;
@@ -26,7 +26,7 @@ struct StrandPoint {
 static_assert(sizeof(StrandPoint) == 32);
 enum StrandPointHalf : uint32_t { kMitreX, kMitreY, kWidthPx, kOpacity, kRed, kGreen, kBlue };
 
-/// Drawn strands: `first_point` has one entry more than there are strands.
+/// Points of drawn strands; `first_point` has one entry more than there are strands.
 struct StrandPoints {
   std::vector<uint32_t> first_point;
   // Per strand: its number among all that could be drawn, and its lock; randomness hangs on these.

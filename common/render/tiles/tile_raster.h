@@ -1,5 +1,5 @@
-// One tile of a picture: the head by ordinary triangles, strands in front of it blended front to back with
-// exact coverage, the background behind all, as sRGB. No GL; one thread per tile.
+// Draws one tile of a picture as sRGB: the head as triangles, strands in front of it blended front to back
+// with exact coverage, the background behind. No GL; one thread per tile.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace strandcast {
 
-/// The head of one picture.
+/// The head in one picture.
 struct HeadPicture {
   const Mesh* mesh = nullptr;
   const std::vector<float>* cover = nullptr;  // per vertex: 0 bare skin .. 1 under hair
@@ -22,10 +22,10 @@ struct HeadPicture {
   float shadow_lift_m = 0.0f;     // how far above the skin the hair's shadow is looked up
 };
 
-/// Projects the mesh and finds its boxes.
+/// Projects the mesh and computes the boxes of its triangles.
 void place_head(const View& view, WorkerPool& workers, HeadPicture& head);
 
-/// What all tiles of a picture share.
+/// Inputs shared by all tiles of a picture.
 struct TileInput {
   const StrandPoints* points;
   const TileBins* bins;
@@ -40,13 +40,13 @@ struct TileInput {
   const float* linear = nullptr;  // of each value of sRGB, for the backdrop
 };
 inline constexpr uint32_t kSrgbSteps = 4096;
-/// A table for TileInput::srgb.
+/// Returns the table for TileInput::srgb.
 std::vector<uint8_t> make_srgb_table();
-/// A table for TileInput::linear: what lies in the middle of the steps that become this value, so that what
-/// nothing covers stays as it is.
+/// Returns the table for TileInput::linear. Each entry is the middle of the linear range that rounds to an
+/// sRGB value, so that uncovered pixels keep their value.
 std::vector<float> make_linear_table(const std::vector<uint8_t>& srgb);
 
-/// Of one worker, reused from tile to tile.
+/// Memory of one worker, reused from tile to tile.
 struct TileScratch {
   std::vector<uint64_t> order;
   std::vector<uint64_t> sorted;

@@ -1,6 +1,6 @@
-// The renderer without OpenGL: strands are expanded, lit and shaded once per point, sorted into tiles and
-// blended there front to back, on all processors (shaders/README.md says how it and the OpenGL renderer
-// agree). The same pixels for every number of threads and every instruction set.
+// Tile renderer: draws without OpenGL on all processors. Strands are expanded, lit and shaded once per point,
+// sorted into tiles and blended there front to back. shaders/README.md says how it and the OpenGL renderer
+// agree. The pixels are the same for any number of threads and every instruction set.
 #pragma once
 
 #include <memory>
@@ -19,7 +19,7 @@ struct TileOptions {
   bool is_finest = false;  // all followers and segments of the look, whatever the size of the picture
 };
 
-/// BadInput for an asset that does not fit together.
+/// Makes a renderer; BadInput for an inconsistent asset.
 Result<std::unique_ptr<Renderer>> make_tile_renderer(const SceneAsset& asset, const LookDesc& look,
                                                      const TileOptions& options = {});
 

@@ -1,5 +1,5 @@
-// Colour targets of the picture's size that methods of transparency add up in. All calls from the context's
-// thread.
+// PixelTarget: colour targets of the picture's size in which transparency methods accumulate. All calls from
+// the context's thread.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -16,15 +16,15 @@ namespace strandcast {
 
 class PixelTarget final : public gl::Resource {
  public:
-  /// A colour target for each format.
+  /// Declares a colour target for each format.
   PixelTarget(std::string name, std::vector<uint32_t> formats)
       : Resource(std::move(name)), formats_(std::move(formats)) {}
 
-  /// Allocates for a picture of this size, unless it has that size already.
+  /// Allocates for a picture of this size unless it already has it.
   Status resize(glm::uvec2 size_px);
-  /// All of target `index`.
+  /// Fills target `index` with `value`.
   void clear(size_t index, float value) const;
-  /// Makes it what is drawn into: without depth, nothing switched on.
+  /// Binds the targets for drawing without depth; other state is off.
   void begin() const;
   const gl::Texture& texture(size_t index) const { return textures_[index]; }
   uint64_t size_bytes() const override;
@@ -36,7 +36,7 @@ class PixelTarget final : public gl::Resource {
   glm::uvec2 size_px_{0};
 };
 
-/// Adds what is drawn from now on; the state of targets is set by their begin().
+/// Enables additive blending for the following draws; begin() of a target resets it.
 void begin_adding();
 
 }  // namespace strandcast

@@ -1,7 +1,7 @@
-// How strands that cover a part of a pixel are put in front of one another, and how edges get smooth: each
-// method of common/scene/shadow_methods.h is a file of this folder that adds its passes, and only what is
-// chosen is compiled and allocated. All but `hashed` fill the strand layer, which the resolve pass lays over
-// the scene.
+// Transparency and antialiasing methods: how strands that cover part of a pixel are ordered, and how edges
+// become smooth. Each method of common/scene/shadow_methods.h is a file of this folder that adds its passes;
+// only the chosen one is compiled and allocated. All but `hashed` fill the strand layer, which the resolve
+// pass blends over the scene.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@
 
 namespace strandcast {
 
-/// A method adds the walks that it takes over the strands, and what it draws in each.
+/// Function that adds a method's walks over the strands and the passes that draw in each.
 using AddStrandPasses = void (*)(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
 
 void add_hashed(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
@@ -24,21 +24,21 @@ void add_three_depths(RenderScene& scene, ExpandWalks& walks, RenderPassList& pa
 void add_weighted(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
 void add_moments(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
 
-/// The other ways to smooth edges, which go with `hashed`.
+/// Alternative antialiasing methods, which require `hashed`.
 void add_msaa4(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
 void add_density_samples(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
-/// Samples of the scene that a method draws into.
+/// Returns the scene's sample layout for a method.
 SampleLayout sample_layout(AntialiasingMethod method);
 
-/// The method of the scene.
+/// Adds the passes of the scene's method.
 void add_transparency_passes(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
 
-/// Strands with a fragment stage that includes render/blended.glsl, one invocation per pixel, for the target
-/// that is bound.
+/// Prepares drawing strands to the bound target with a fragment stage that includes render/blended.glsl, one
+/// invocation per pixel.
 void begin_blended(StrandDraw& strands, const RenderScene& scene, const ExpandedStrands& expanded,
                    const RenderTurn& turn);
 
-/// A triangle over all of the target that is bound.
+/// A triangle that covers the whole bound target.
 class FullScreen {
  public:
   static Result<FullScreen> make(const RenderSetup& setup, const std::string& fragment_stage,
@@ -51,7 +51,7 @@ class FullScreen {
   gl::VertexArray no_attributes_;
 };
 
-/// Lays what a method has drawn of the strands over the scene.
+/// Blends the strands that a method has drawn over the scene.
 class LayerBlendPass : public RenderPass {
  public:
   LayerBlendPass(RenderScene& scene, std::string name, gl::Resources reads, std::string fragment_stage)
@@ -62,7 +62,7 @@ class LayerBlendPass : public RenderPass {
   Status run(RenderTurn& turn) override;
 
  protected:
-  /// Binds what the method has drawn.
+  /// Binds the textures that the method has drawn.
   virtual void bind(const gl::Program& program) const = 0;
 
  private:

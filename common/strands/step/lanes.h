@@ -1,6 +1,6 @@
-// What the predictor does with all vertices, a block of strands at a time: from its floats to the lattice,
-// and back from what was decoded. Private to common/strands/step; the same bits from every instruction set.
-// Places without a strand keep what they have.
+// Vectorised work of the predictor on all vertices, a block of strands at a time: from its floats to the
+// lattice, and back from decoded positions. Private to common/strands/step; the same bits from every
+// instruction set. Places without a strand keep their values.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace strandcast::step {
 
-/// Rows of a matrix.
+/// A rotation matrix by rows.
 using Turn = std::array<std::array<float, 3>, 3>;
 
 struct ExpectWork {
@@ -46,7 +46,7 @@ struct CorrectWork {
 };
 void correct_blocks(simd::InstructionSet set, const CorrectWork& work);
 
-/// Strands are where they were decoded.
+/// Sets the strands to their decoded positions.
 struct PlaceWork {
   const tangent::Layout& layout;
   const tangent::Planes<int32_t>& decoded;
@@ -58,7 +58,8 @@ struct PlaceWork {
 };
 void place_blocks(simd::InstructionSet set, const PlaceWork& work);
 
-/// Velocities since they were there, under another pose of the head; none for what jumped.
+/// Computes velocities from decoded positions under an earlier pose of the head; strands that jumped get
+/// zero.
 struct StartWork {
   const tangent::Layout& layout;
   const tangent::Planes<int32_t>& before;
@@ -81,7 +82,7 @@ struct TurnWork {
 };
 void turn_blocks(simd::InstructionSet set, const TurnWork& work);
 
-/// Material axes without twist along strands as they lie.
+/// Computes twist-free material axes along the current strands.
 struct AxesWork {
   const StrandBlocks& rod_edge;
   const StrandBlocks& rod_strand;
@@ -94,7 +95,7 @@ struct AxesWork {
 };
 void axes_blocks(simd::InstructionSet set, const AxesWork& work);
 
-/// Vectors become whole numbers of steps beside what they are about.
+/// Rounds vectors, as differences from a reference, to whole multiples of a step.
 struct SettleWork {
   StrandBlocks& vectors;
   const StrandBlocks* about = nullptr;    // null: 0
@@ -106,7 +107,7 @@ struct SettleWork {
   uint32_t block_end = 0;
 };
 void settle_blocks(simd::InstructionSet set, const SettleWork& work);
-/// The most steps that any becomes.
+/// Largest multiple of the step that a difference may become.
 inline constexpr float kMostSteps = 524288.0f;
 
 }  // namespace strandcast::step

@@ -1,4 +1,4 @@
-// Integers of states and models, coded with tables that are chosen by the size of those before. Header only;
+// Codes integers of states and models with tables chosen by the size of the preceding integers. Header only;
 // private to common/strands/step. One object per stream and side.
 #pragma once
 

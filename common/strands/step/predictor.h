@@ -1,7 +1,7 @@
-// Predictor: strands as a decoder knows them, moved by the solver that the stream announces. Encoder and
-// decoder of the "step" codec both have one; they do the same with the same numbers and so expect every
-// vertex in the same place, bit for bit. What was decoded then corrects positions and velocities. Strands lie
-// in the order of places (tangent/layout.h), in blocks of 16. Private to common/strands; one thread.
+// Predictor: predicts strands by running the solver that the stream announces from the last decoded state.
+// Encoder and decoder of the "step" codec each have one. Both compute with the same numbers, so they predict
+// every vertex with the same bits. Decoded positions then correct positions and velocities. Strands lie in
+// coding order (tangent/layout.h), in blocks of 16. Private to common/strands; one thread.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +22,7 @@
 
 namespace strandcast::step {
 
-/// What both sides know of the strands before the first frame. All of it outlives the predictor.
+/// What both sides know of the strands before the first frame. All of it must outlive the predictor.
 struct PredictorGround {
   const tangent::Layout& layout;
   std::span<const glm::vec3> rest_in_head_m;  // (vertex_count x strand_count), strand fastest
@@ -30,35 +30,36 @@ struct PredictorGround {
   simd::InstructionSet set;
 };
 
-/// More are not predicted by steps: it takes up to 200 bytes of memory for each.
+/// Largest number of vertices that are predicted by steps; each takes up to 200 bytes of memory.
 inline constexpr size_t kMostStepVertices = 2'000'000;
 
 class Predictor {
  public:
-  /// Unsupported where there is no rest shape or this build has no such kernel.
+  /// Makes a predictor. Unsupported if there is no rest shape or this build lacks the model's kernel.
   static Result<std::unique_ptr<Predictor>> make(StepModel model, const PredictorGround& ground);
 
   const StepModel& model() const { return model_; }
   void set_scene(const StepScene& scene);
 
-  /// Strands are where they were decoded, under this pose of the head, and move as from where they were
-  /// `seconds` before (0: not at all).
+  /// Decoded positions with the pose of the head. start() sets the strands to `now`; their velocities follow
+  /// from `before`, `seconds` earlier (0: strands are at rest).
   struct Decoded {
     const tangent::Planes<int32_t>& lattice;
     Pose world_from_head;
   };
   void start(const Decoded& now, const Decoded& before, double seconds, float quantum_m);
 
-  /// Where strands were decoded last, from where the next steps are taken.
+  /// Decoded positions from which the next steps start.
   struct Origin {
     const tangent::Planes<int32_t>& lattice;
     float quantum_m;
   };
-  /// One step each; `end_time_s` of the last one.
+  /// Simulates one step per tick; `end_time_s` is the end of the last one.
   void advance(const Origin& origin, std::span<const StepTick> ticks, double end_time_s);
-  /// Where strands are, on the lattice; 0 where there is no strand.
+  /// Writes the predicted positions as lattice values; 0 where a place holds no strand.
   void expect(float quantum_m, tangent::Planes<int32_t>& lattice) const;
-  /// They were expected there, and are here. `seconds` that the frame took.
+  /// Predicted and decoded positions of a frame that spans `seconds`; correct() moves the strands to the
+  /// decoded ones.
   struct Correction {
     const tangent::Planes<int32_t>& expected;
     const tangent::Planes<int32_t>& decoded;
@@ -67,22 +68,23 @@ class Predictor {
   };
   void correct(const Correction& correction);
 
-  /// For joiners: goes on with the numbers that write_state() says and no others. Positions are those
-  /// decoded.
+  /// Rounds the state to the numbers that write_state() writes, so that joiners continue from the same state.
+  /// Positions are set to the decoded ones.
   void settle(const tangent::Planes<int32_t>& decoded, float quantum_m);
-  /// After settle().
+  /// Appends the state for joiners; call settle() first.
   void write_state(std::vector<std::byte>& bytes) const;
-  /// The other side of it, under this pose of the head; BadInput for what is no state. place() follows.
+  /// Reads what write_state() wrote, under this pose of the head. BadInput for malformed bytes. Call place()
+  /// afterwards.
   Status read_state(ByteReader& bytes, const Pose& world_from_head);
-  /// Once it is known where the strands of read_state() were decoded.
+  /// Completes read_state() with the decoded positions of the strands.
   void place(const tangent::Planes<int32_t>& decoded, float quantum_m);
 
-  /// What may be put back after a frame that failed its checks.
+  /// Saves the state, so that restore() can undo a frame that failed its checks.
   void save();
   void restore();
 
  private:
-  /// A plane of the state beside positions, as joiners are told of it.
+  /// A plane of the state besides positions, which write_state() writes for joiners.
   struct StatePlane {
     PlaneRole role;
     float step;           // of x, y and z
@@ -122,7 +124,7 @@ class Predictor {
         });
   }
 
-  /// What changes from frame to frame.
+  /// State that changes from frame to frame.
   struct State {
     std::array<std::unique_ptr<StrandBlocks>, kPlaneRoleCount> planes;
     HeadPath head;

@@ -1,5 +1,6 @@
-// RodPlanes: what direct_rod's kernel reads of a rod at rest, as it follows from the rest shape of a strand
-// that bends to it by itself: what a model is told against. Pure functions; private to common/strands/step.
+// RodPlanes: inputs of direct_rod's kernel for a rod at rest, derived from the rest shape of a strand that
+// bends to it without external forces. Models are coded as differences from them. Pure functions; private to
+// common/strands/step.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,7 @@
 
 namespace strandcast::step {
 
-/// As in StepModel; what of a strand's stiffness is not known from its shape is 0.
+/// Planes as in StepModel; stiffness values that do not follow from the shape are 0.
 struct RodPlanes {
   std::vector<glm::vec4> edge;    // (vertex_count x strand_count)
   std::vector<glm::vec4> strand;  // (kRodStrandRows x strand_count)

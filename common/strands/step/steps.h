@@ -1,5 +1,5 @@
-// Steps: what the "step" codec adds to a chain of "tangent": whether a frame is predicted by steps of the
-// announced solver or by motion, and the bytes that say so. One class for each side. Private to
+// Steps: the part that the "step" codec adds to a chain of "tangent" frames. It decides whether a frame is
+// predicted by solver steps or by motion, and codes that decision. One class for each side. Private to
 // common/strands; one thread.
 #pragma once
 
@@ -19,10 +19,10 @@
 
 namespace strandcast::step {
 
-/// What both sides know.
+/// State and functions that encoder and decoder share.
 class Steps {
  public:
-  /// After an anchor: goes on with what joiners are told.
+  /// After an anchor: rounds the state to the one that joiners receive.
   void settle(const tangent::History& history);
 
  protected:
@@ -30,10 +30,10 @@ class Steps {
   PredictorGround ground(const tangent::Layout& layout) const {
     return {layout, rest_in_head_m_, workers_, set_};
   }
-  /// Takes the steps; expected_ is where they lead.
+  /// Simulates the ticks and stores the predicted positions in expected_.
   void step(std::span<const StepTick> ticks, const Moment& now, const tangent::Layout& layout,
             tangent::History& history);
-  /// The frame is history: `frame.lattice` holds what `history.lattice` was before.
+  /// Takes over a finished frame; `frame.lattice` holds what `history.lattice` held before.
   void follow(const Moment& now, const tangent::Frame& frame, const tangent::History& history);
 
   WorkerPool& workers_;
@@ -54,14 +54,14 @@ class EncoderSteps : public Steps {
  public:
   EncoderSteps(WorkerPool& workers, simd::InstructionSet set) : Steps(workers, set) {}
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m);
-  /// A chain begins: nobody knows anything.
+  /// Begins a chain with an empty state.
   void restart(const SnapshotInfo& snapshot, const tangent::Layout& layout);
-  /// Decides how the frame is predicted. Gives its flags, which append_bytes() follow on the wire.
+  /// Decides how the frame is predicted. Returns its flags; append_bytes() writes the bytes that follow them.
   uint8_t begin(const SnapshotInfo& snapshot, const tangent::Layout& layout, tangent::History& history,
                 const tangent::Planes<int32_t>& target);
   void append_bytes(std::vector<std::byte>& body) const;
   void finish(const SnapshotInfo& snapshot, const tangent::Frame& frame, const tangent::History& history);
-  /// For a joiner, after settle().
+  /// Appends the state for a joiner; call settle() first.
   void append_state(std::vector<std::byte>& body);
 
  private:
@@ -95,7 +95,7 @@ class DecoderSteps final : public Steps, public StepReader {
   void take_over(const Moment& now, const tangent::History& history) override;
 
  private:
-  /// What a keyframe says of steps.
+  /// State read from a keyframe.
   struct Joined {
     std::unique_ptr<Predictor> predictor;  // nullptr: nothing is predicted by steps yet
     StepScene scene;

@@ -1,6 +1,5 @@
-// The bytes of what a "step" frame says beside its integers: the model, the scene and the ticks. What is
-// written is rounded; both sides go on with what was read. Layout in proto/WIRE.md. Private to
-// common/strands.
+// Bytes of a "step" frame besides its integers: the model, the scene and the ticks. Written values are
+// rounded, and both sides continue with the rounded ones. Layout in proto/WIRE.md. Private to common/strands.
 #pragma once
 
 #include <cstddef>
@@ -15,43 +14,44 @@
 
 namespace strandcast::step {
 
-/// Largest count among a kernel's constants: rounds, solves and the like. A seed may be anything.
+/// Upper limit of the counts among a kernel's constants, such as rounds and solves. A seed has no limit.
 inline constexpr uint32_t kMostRounds = 256;
-/// What a peer may ask for in a frame: ticks times substeps times rounds times vertices. A processor takes
-/// about a second for as many; 100,000 x 16 with 10 rounds in 16 substeps are as many.
+/// Upper limit of the work that a peer may request in a frame: ticks x substeps x rounds x vertices. It takes
+/// a processor about a second, for example 100,000 x 16 vertices with 10 rounds in 16 substeps.
 inline constexpr uint64_t kMostVertexRounds = uint64_t{1} << 28;
 uint64_t vertex_rounds(const StepModel& model, const StepScene& scene, size_t tick_count);
 
-/// The model for the first `strand_count` of its strands, whose rest shape this is: (vertex_count x
-/// strand_count), strand fastest.
+/// Appends the model for the first `strand_count` strands, whose rest shape has (vertex_count x strand_count)
+/// points, strand fastest.
 void write_model(const StepModel& model, std::span<const glm::vec3> rest_in_head_m, uint32_t strand_count,
                  std::vector<std::byte>& bytes);
-/// From untrusted bytes, for strands of these counts: BadInput for a kernel that is not known, for numbers
-/// that are none, and for counts that no kernel may run with.
+/// Reads a model for these counts from untrusted bytes. BadInput for an unknown kernel, for values that are
+/// not finite, and for counts that no kernel may run with.
 Result<StepModel> read_model(ByteReader& bytes, std::span<const glm::vec3> rest_in_head_m,
                              uint32_t strand_count, uint32_t vertex_count);
 
 void write_scene(const StepScene& scene, std::vector<std::byte>& bytes);
 Result<StepScene> read_scene(ByteReader& bytes);
 
-/// Wind as it is on the wire.
+/// Wind as coded on the wire, in whole steps.
 using WindSteps = std::array<int32_t, 3>;
 WindSteps wind_steps(const glm::dvec3& wind_mps);
 glm::dvec3 wind_of(const WindSteps& steps);
-/// A point of a body likewise.
+/// A point of a body as coded on the wire, in whole steps.
 using PointSteps = std::array<int32_t, 3>;
 
-/// What ticks are told beside, of the tick before.
+/// Values of the preceding tick; ticks are coded as differences from them.
 struct TickBase {
   WindSteps wind{};
   std::vector<PointSteps> body;  // empty: not known
   std::optional<BustTurn> bust = {};
 };
 
-/// Ticks up to a frame, under this scene; `base` becomes that of the last one, whose pose is the frame's.
+/// Appends the ticks up to a frame under this scene. `base` becomes that of the last tick, whose pose is the
+/// frame's.
 void write_ticks(std::span<const StepTick> ticks, const StepScene& scene, TickBase& base,
                  std::vector<std::byte>& bytes);
-/// The last tick of a frame.
+/// Tick, time and pose that a frame ends with.
 struct FrameTick {
   uint64_t tick = 0;
   Pose world_from_head;

@@ -1,4 +1,4 @@
-// The codecs "tangent" and "step" as rows of the codec table need it (common/strands/strand_codec.h).
+// Makers of the codecs "tangent" and "step" for the codec table (common/strands/strand_codec.h).
 #pragma once
 
 #include <memory>
@@ -11,21 +11,21 @@ namespace strandcast::tangent {
 
 std::unique_ptr<StrandEncoder> make_encoder(WorkerPool& workers);
 std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, WorkerPool& workers);
-/// The codec "step": the same, predicted by steps of the solver where they are known (common/strands/step).
+/// Codec "step": the "tangent" codec, predicted by solver steps where they are known (common/strands/step).
 std::unique_ptr<StrandEncoder> make_step_encoder(WorkerPool& workers);
 std::unique_ptr<StrandDecoder> make_step_decoder(const StrandStreamLimits& limits, WorkerPool& workers);
-/// For one instruction set of those that the processor has: the same bytes and states with all of them.
+/// Makes a codec for one of the processor's instruction sets; bytes and states are the same with all of them.
 std::unique_ptr<StrandEncoder> make_encoder(WorkerPool& workers, simd::InstructionSet set);
 std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, WorkerPool& workers,
                                             simd::InstructionSet set);
-/// Of "step" where there are `steps`, else of "tangent".
+/// Makes a decoder for "step" if `steps` is given, else for "tangent".
 std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, WorkerPool& workers,
                                             simd::InstructionSet set,
                                             std::unique_ptr<step::StepReader> steps);
 std::unique_ptr<StrandEncoder> make_step_encoder(WorkerPool& workers, simd::InstructionSet set);
 std::unique_ptr<StrandDecoder> make_step_decoder(const StrandStreamLimits& limits, WorkerPool& workers,
                                                  simd::InstructionSet set);
-/// As lattice_step_m() of strand_codec.h.
+/// Does for these codecs what lattice_step_m() of strand_codec.h does.
 float lattice_step_m(float bound_m);
 
 }  // namespace strandcast::tangent

@@ -1,6 +1,5 @@
-// Layout: what the "tangent" codec knows of a groom before the first frame, computed alike on both
-// sides from the rest shape: the order in which strands are coded, the slices, who is whose neighbour, and
-// rest lengths. Private to common/strands/tangent.
+// Layout: what the "tangent" codec knows of a groom before the first frame: coding order of strands, slices,
+// neighbours and rest lengths. Both sides compute it from the rest shape. Private to common/strands/tangent.
 #pragma once
 
 #include <array>
@@ -12,7 +11,7 @@
 
 namespace strandcast::tangent {
 
-/// Places are worked on in blocks of this many, side by side in vector registers.
+/// Number of places in a block, which vector registers hold side by side.
 inline constexpr uint32_t kBlockSize = 8;
 inline constexpr uint32_t kNoStrand = UINT32_MAX;
 
@@ -36,11 +35,11 @@ struct Layout {
   size_t plane_size() const { return static_cast<size_t>(vertex_count) * stride; }
 };
 
-/// `rest_in_head_m`: (vertex_count x strand_count), strand fastest, or empty: strands then have no known
-/// lengths and no neighbours.
+/// Computes the layout. `rest_in_head_m`: (vertex_count x strand_count), strand fastest, or empty; strands
+/// then have no known lengths and no neighbours.
 ///
-/// Slices hold every 8th strand along a curve through the roots, then those halfway between, and so on, so
-/// that the first n slices are an even thinning of the groom.
+/// The first slice holds every 8th strand along a curve through the roots, the next those halfway between,
+/// and so on. So the first n slices are an even thinning of the groom.
 Layout make_layout(uint32_t strand_count, uint32_t vertex_count, std::span<const glm::vec3> rest_in_head_m);
 
 }  // namespace strandcast::tangent

@@ -1,15 +1,15 @@
-// Geometry of the "tangent" codec: where a vertex is expected, and the integers that tell how far it is from
-// there. Both sides compute the same floats: only + - * / and square roots in a fixed order, without
-// contraction. Private to common/strands/tangent. Functions touch only their own slice of the arrays, so
-// slices of one frame may be worked on side by side.
+// Geometry of the "tangent" codec: predicted positions of vertices, and the integers that correct them.
+// Both sides compute the same floats: only + - * / and square roots in a fixed order, without contraction.
+// Private to common/strands/tangent. Functions touch only their own slice of the arrays, so slices of one
+// frame may be processed in parallel.
 //
-// Prediction: the last decoded position plus a weighted sum of what both sides know (features listed in
-// row.h), brought to the known length from the decoded vertex before it. Two integers correct it
-// in the plane across the segment, a third one, rarely needed, its length. All lengths are in lattice steps.
+// A prediction is the last decoded position plus a weighted sum of features (listed in row.h). It is then
+// moved to the known distance from the decoded vertex before it. Two integers correct it in the plane across
+// the segment; a third one, rarely needed, corrects its length. All lengths are in lattice steps.
 //
-// Where time goes: 10,000 x 16, turning, one thread of a Zen 5 at 3.8 GHz, shares of CPU time by perf; floors
-// are operations and bytes counted by hand (two eight-lane multiplications and additions a cycle, four
-// instructions a cycle, 32 bytes a cycle from the second-level cache).
+// Cost of 10,000 x 16 on a turning head, one thread of a Zen 5 at 3.8 GHz, shares of CPU time by perf. Floors
+// are operations and bytes counted by hand: two eight-lane multiplications and additions a cycle, four
+// instructions a cycle, 32 bytes a cycle from the second-level cache.
 //   encode 7.5 ms                         ms   floor  which is
 //   read snapshots (take_row)            0.3   0.15  480,000 values gathered, one a cycle
 //   fit of the motion                    1.8   0.6   435 sums over 36,864 samples; samples lie in many lines
@@ -56,7 +56,7 @@ using Planes = std::array<std::vector<T>, 3>;  // one for each axis, (vertex_cou
 using MotionWeights = std::array<std::array<int16_t, kMotionFeatureCount>, kMotionClassCount>;
 
 using FloatWeights = std::array<float, kMotionFeatureCount>;
-/// The weights of a class as they are used.
+/// Weights of one class in the form in which they are used.
 struct MotionClass {
   FloatWeights weights{};
   std::array<std::array<float, 4>, 3> head{};  // the steps of the head, weighted
@@ -64,7 +64,7 @@ struct MotionClass {
 
 using ShapeWeights = std::array<std::array<int16_t, kShapeFeatureCount>, kShapeClassCount>;
 
-/// What both sides remember of the frames so far.
+/// State of both sides after the frames so far.
 struct History {
   float quantum_m = 0.0f;
   HeadMotion head;
@@ -77,18 +77,18 @@ struct History {
   bool has_motion = false;  // any of velocities, residual_before and drift is not 0
 
   void reset(const Layout& layout);
-  /// Forgets all but where the strands are and the pose: what a keyframe tells a late joiner.
+  /// Forgets everything except strand positions and pose, which are all that a keyframe gives a late joiner.
   void forget_motion();
 };
 
-/// An escaped vertex: position less the last one (of an anchor: less its parent's), in steps of a cubic
-/// lattice.
+/// A vertex coded directly: its position less its last one (in an anchor: less its parent's), in steps of a
+/// cubic lattice.
 struct Escape {
   size_t at = 0;  // place in a plane
   std::array<int32_t, 3> step{};
 };
 
-/// The integers of one frame, folded (fold_sign).
+/// Integers of one frame, folded to be unsigned (fold_sign).
 struct Codes {
   std::vector<uint32_t> first;  // (vertex_count x stride) first coordinate across the segment
   std::vector<uint32_t> second;
@@ -98,11 +98,11 @@ struct Codes {
   void resize(const Layout& layout);
 };
 
-/// One frame, coded after a history.
+/// One frame, coded relative to a history.
 ///
-/// An *anchor* is a frame that can also be told without a history: its integers count from where the shape of
-/// the strands lets expect a vertex. Who has the history is told how far they are from those that the motion
-/// lets expect.
+/// An *anchor* is a frame that can also be decoded without a history: its integers count from the position
+/// that the shape of the strands predicts. Decoders with the history receive the differences from the
+/// integers that the motion predicts.
 struct Frame {
   HeadMotion head;
   MotionWeights weights{};
@@ -122,11 +122,12 @@ struct Frame {
   std::vector<int32_t> zero_lattice;
 
   void resize(const Layout& layout);
-  /// Once `head` and `weights` are those of the frame.
+  /// Prepares the weights for use; call it once `head` and `weights` are those of the frame.
   void apply_weights();
 };
 
-/// Smaller grooms are coded on the calling thread: a part is to take some tenths of a millisecond.
+/// Workers for a groom. Small grooms use the calling thread only, since a part should take some tenths of a
+/// millisecond.
 inline WorkerPool::Terms encode_terms(const Layout& layout, WorkerPool& workers) {
   return workers.at(Priority::Encoding, layout.plane_size() >= kManyVertices ? kMaxWorkers : 1);
 }
@@ -134,25 +135,25 @@ inline WorkerPool::Terms decode_terms(const Layout& layout, WorkerPool& workers)
   constexpr size_t kManyDecoded = 40'000;
   return workers.at(Priority::Encoding, layout.plane_size() >= kManyDecoded ? kMaxWorkers : 1);
 }
-/// work(part) for all parts below `count`, each once, in any order.
+/// Calls work(part) once for every part below `count`, in any order.
 template <class Work>
 void for_each_part(const WorkerPool::Terms& terms, uint32_t count, const Work& work) {
   terms.for_ranges(count, 1, [&](size_t part, size_t) { work(static_cast<uint32_t>(part)); });
 }
 
-/// How many classes of weights a frame of this groom has.
+/// Returns the number of weight classes in a frame of this groom.
 uint32_t motion_class_count(const Layout& layout);
 
-/// Weights and length blend that suit `target` (planes of lattice positions) best, by least squares over a
+/// Fits the weights and the length blend to `target` (planes of lattice positions) by least squares over a
 /// sample of strands.
 void fit_motion(simd::InstructionSet set, const Layout& layout, const History& history,
                 const Planes<int32_t>& target, WorkerPool& workers, Frame& frame);
 
-/// Weights that suit the shape of `target` best.
+/// Fits the weights of the shape prediction to `target`.
 ShapeWeights fit_shape(const Layout& layout, float quantum_m, const Planes<int32_t>& target,
                        WorkerPool& workers);
 
-/// A slice of one frame; `frame` is filled.
+/// Inputs of the work on one slice of a frame; `frame` is filled.
 struct SliceWork {
   const Layout& layout;
   const History& history;
@@ -165,22 +166,23 @@ struct QuantiseWork {
 };
 
 // Kernels for every instruction set, all with the same bits (common/simd/variants.h).
-/// Encoder: fills the integers of a slice such that every vertex ends within the bound of `target`, and what
-/// they decode to. Of an anchor it fills both kinds of integers.
+/// Encoder: chooses the integers of a slice so that every vertex decodes within the bound of `target`, and
+/// stores the decoded positions. For an anchor it fills both kinds of integers.
 void quantise_slice(simd::InstructionSet set, const QuantiseWork& work);
 void quantise_anchor(simd::InstructionSet set, const QuantiseWork& work);
-/// The same after a step of the solver, whose positions the history holds, without weights (step_row.h).
+/// Encodes a slice like quantise_slice(), but from the solver's step: its positions are in the history and no
+/// weights are used (step_row.h).
 void quantise_step(simd::InstructionSet set, const QuantiseWork& work);
-/// Decoder: positions, velocities and residuals of a slice from its integers.
+/// Decoder: computes positions, velocities and residuals of a slice from its integers.
 void place_slice(simd::InstructionSet set, const SliceWork& work);
 void place_anchor(simd::InstructionSet set, const SliceWork& work);
 void place_step(simd::InstructionSet set, const SliceWork& work);
-/// Decoder: positions of a slice of an anchor from the integers for who has no history.
+/// Decoder: computes positions of an anchor's slice without a history.
 void place_shape(simd::InstructionSet set, const SliceWork& work);
 
-/// The frame becomes history.
+/// Makes the frame part of the history.
 void remember(History& history, Frame& frame);
-/// One of quantise_step() or place_step(): of the motion only what was corrected is known afterwards.
+/// Does so for a frame of quantise_step() or place_step(), where only the corrections are kept as motion.
 void remember_step(History& history, Frame& frame);
 
 }  // namespace strandcast::tangent

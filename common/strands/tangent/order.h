@@ -1,5 +1,5 @@
-// Between snapshots, in the order of strands, and planes, in that of places, in which the "tangent" codec
-// works. Private to common/strands/tangent.
+// Converts between snapshots, in strand order, and the planes of the "tangent" codec, in coding order.
+// Private to common/strands/tangent.
 #pragma once
 
 #include <cstdint>
@@ -17,17 +17,17 @@ struct RowTaking {
   size_t axis;
   uint32_t vertex;
 };
-/// One row of a snapshot into planes, limited to what decodes to valid lattice values. A kernel for every
-/// instruction set.
+/// Copies one row of a snapshot into planes, clamped to values that decode to valid lattice values. A kernel
+/// for every instruction set.
 void take_row(simd::InstructionSet set, const RowTaking& of);
 
 struct HashedLattice {
   uint64_t state_hash = 0;
   bool is_valid = false;  // within +-kMaxLattice
 };
-/// What a snapshot with these positions has for a hash (state_hash).
+/// Returns the state_hash() of a snapshot with these positions.
 uint64_t hash_planes(const Layout& layout, const Planes<int32_t>& planes, const SnapshotInfo& info);
-/// The same, and the positions into `snapshot`, which has room for them.
+/// Returns the same hash and writes the positions into `snapshot`, which must have room for them.
 HashedLattice give_planes(const Layout& layout, const Planes<int32_t>& planes, Snapshot& snapshot);
 
 }  // namespace strandcast::tangent

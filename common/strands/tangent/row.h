@@ -1,9 +1,9 @@
-// MotionRow: where the vertices of one row (one vertex index, all strands) are expected, eight strands at a
-// time; what encoder and decoder of the "tangent" codec share. Private to common/strands/tangent.
+// MotionRow: predicts the vertices of one row (one vertex index, all strands), eight strands at a time.
+// Encoder and decoder of the "tangent" codec share it. Private to common/strands/tangent.
 //
-// What a vertex costs: 240 floating-point operations (2 x 3 x 25 of them for the prediction), two divisions
-// and two roots; 135 bytes from and to memory (30 planes, the integers). What all of a frame costs stands in
-// motion.h.
+// Cost of a vertex: 240 floating-point operations (2 x 3 x 25 of them for the prediction), two divisions and
+// two roots; 135 bytes from and to memory (30 planes, the integers). motion.h states the cost of a whole
+// frame.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ using namespace simd::raw;
 
 static_assert(kBlockSize == kLaneCount);
 
-/// What a feature is a value of; "then" is the last frame, "before" the one before that.
+/// Quantity of a feature; "then" is the last frame, "before" the one before that.
 enum class MotionQuantity : uint8_t {
   Now,  // change of position in this frame
   Then,
@@ -31,7 +31,7 @@ enum class MotionQuantity : uint8_t {
 };
 enum class MotionStrand : uint8_t { Own, Neighbour, SecondNeighbour };
 
-/// A vector, whose weight is the same for all axes; nothing where there is no such vertex.
+/// A vector feature with one weight for all axes; it is zero where no such vertex exists.
 struct MotionFeature {
   MotionQuantity quantity;
   int8_t tipward = 0;  // vertices from the own one towards the tip: the parent has -1
@@ -93,18 +93,19 @@ inline constexpr float kTinySquared = 1e-12f;
 inline constexpr float kLargestEdge = 4e6f;     // in steps; rounding by adding needs it
 inline constexpr float kRounder = 12582912.0f;  // 1.5 * 2^23: floats there are whole numbers
 
-/// Nearest whole numbers, ties to even, limited to +-kLargestEdge; -kLargestEdge for NaN.
+/// Rounds to nearest, ties to even, clamped to +-kLargestEdge; NaN gives -kLargestEdge.
 STRANDCAST_LANES IntLanes nearest_lanes(const Lanes& value) {
   const Lanes low = value > -kLargestEdge ? value : Lanes{} - kLargestEdge;
   const Lanes within = low < kLargestEdge ? low : Lanes{} + kLargestEdge;
   return to_integers((within + kRounder) - kRounder);
 }
 
-/// Which weights serve a row. Near the root and at the tip strands move by laws of their own.
+/// Returns the weight class of a row. Rows near the root and at the tip have classes of their own, because
+/// they move differently.
 uint32_t motion_class(const Layout& layout, uint32_t v);
 
-/// Rows of floats that features of one axis lie in, those of neighbours at the neighbour's place; absent ones
-/// are zeros. What is "now" of the own row is there once its block is stored.
+/// Rows of floats that hold the features of one axis, those of neighbours at the neighbour's place. Absent
+/// features point to zeros. "Now" of the own row is valid once its block is stored.
 using FeatureRows = std::array<const float*, kHeadFeature>;
 FeatureRows feature_rows(const Layout& layout, const History& history, const Frame& frame, size_t axis,
                          uint32_t v);
@@ -113,8 +114,8 @@ struct LastAndBase {
   const int32_t* last;
   const int32_t* base;
 };
-/// sum = (last - base) + weighted features, for as many places; whole blocks. A pass of its own: nothing in
-/// it waits for other places, while the rest of a prediction is one long chain for each block.
+/// Computes (last - base) + weighted features for sum.size() places, which are whole blocks. It is a separate
+/// pass because it waits for no other place; the rest of the prediction is one dependent chain per block.
 STRANDCAST_LANES void sum_rows(const FeatureRows& rows, const FloatWeights& weights,
                                const LastAndBase& positions, std::span<float> sum) {
   for (size_t i = 0; i < sum.size(); i += kLaneCount) {
@@ -125,14 +126,14 @@ STRANDCAST_LANES void sum_rows(const FeatureRows& rows, const FloatWeights& weig
   }
 }
 
-/// The integers of a block.
+/// Integers of a block's vertices.
 struct CodeLanes {
   IntLanes first{};
   IntLanes second{};
   IntLanes length{};
 };
 
-/// As fold_sign() and unfold_sign().
+/// fold_sign() and unfold_sign() over lanes.
 STRANDCAST_LANES UintLanes fold_lanes(const IntLanes& value) {
   const UintLanes negated = 0u - (UintLanes)value;
   return (negated << 1) ^ (0u - (negated >> 31));
@@ -147,12 +148,12 @@ STRANDCAST_LANES CodeLanes sum_of(const CodeLanes& a, const CodeLanes& b) {
           wrapping_sums(a.length, b.length)};
 }
 
-/// Escaped vertices.
+/// Lattice position of an escaped vertex, and the escape that codes it.
 using Lattice = std::array<int32_t, 3>;
 Escape make_escape(size_t at, const Lattice& target, const Lattice& from);
 Lattice escaped(const Escape& escape, const Lattice& from);
 
-/// Positions of a block one by one.
+/// Positions of a block, addressable vertex by vertex.
 struct BlockPositions {
   int32_t axis[3][kLaneCount];
 
@@ -168,7 +169,8 @@ struct BlockPositions {
   }
 };
 
-/// Where the vertices of a block are expected: `length` along `along` from `base`, and two directions across.
+/// Predicted position of a block's vertices: `length` along the direction `along` from `base`, with two
+/// directions across.
 struct Expected {
   IntLaneVectors base;
   LaneVectors along;
@@ -176,7 +178,7 @@ struct Expected {
   LaneVectors second;
   Lanes length;
 
-  /// Along `edge` and as long.
+  /// Sets direction and length to those of `edge`.
   STRANDCAST_LANES void aim(const LaneVectors& edge) {
     const Lanes squared = dots(edge, edge);
     length = square_roots(squared);
@@ -188,8 +190,8 @@ struct Expected {
     find_frames();
   }
 
-  /// Fills the directions across `along`: an orthonormal basis without branches (Duff et al. 2017, Building
-  /// an Orthonormal Basis, Revisited).
+  /// Computes the directions across `along`: an orthonormal basis without branches (Duff et al. 2017,
+  /// Building an Orthonormal Basis, Revisited).
   STRANDCAST_LANES void find_frames() {
     const auto& [x, y, z] = along.axis;
     const Lanes one = Lanes{} + 1.0f;
@@ -204,7 +206,7 @@ struct Expected {
     second.axis[2] = -y;
   }
 
-  /// What would be the integers of an edge, were they not whole; false where they cannot tell it.
+  /// Coordinates of an edge before rounding; `is_possible` is false where integers cannot express the edge.
   struct Coordinates {
     Lanes first;
     Lanes second;
@@ -227,7 +229,7 @@ struct Expected {
                      (sizes_of(of.length) < kFarthest);
     return of;
   }
-  /// The integers that come nearest to what `other` expects from the same base.
+  /// Returns the integers nearest to the position that `other` predicts from the same base.
   STRANDCAST_LANES CodeLanes codes_of(const Expected& other) const {
     LaneVectors edge;
     for (size_t axis = 0; axis < 3; ++axis) edge.axis[axis] = other.along.axis[axis] * other.length;
@@ -239,7 +241,7 @@ struct Expected {
     return codes;
   }
 
-  /// Positions, limited to where rounding holds, that the integers tell.
+  /// Returns the positions that integers decode to, clamped to the range where rounding holds.
   STRANDCAST_LANES IntLaneVectors placed(const CodeLanes& codes) const {
     const Lanes across = to_floats(codes.first) * kTangentStep;
     const Lanes also = to_floats(codes.second) * kTangentStep;
@@ -256,8 +258,8 @@ struct Expected {
   }
 };
 
-/// For each quantity of the past the own feature that lies nearest to the tip: no row nearer to the root has
-/// read it.
+/// For each quantity of the past, the own feature nearest to the tip; rows nearer to the root have not read
+/// it.
 inline constexpr auto kFarthestFeatures = [] {
   std::array<size_t, 5> farthest{};
   for (size_t k = 0; k < kOwnFeatureCount; ++k) {
@@ -270,7 +272,7 @@ inline constexpr auto kFarthestFeatures = [] {
   return farthest;
 }();
 
-/// Of one row, for all slices. Only pointers and numbers, which stores into planes cannot have changed.
+/// One row of all slices. It holds only pointers and numbers, which stores into planes cannot change.
 class MotionRow {
  public:
   MotionRow(const Layout& layout, const History& history, Frame& frame, uint32_t v)
@@ -301,11 +303,10 @@ class MotionRow {
   }
 
   uint32_t vertex() const { return vertex_; }
-  /// Of a place in this row, in a plane.
+  /// Index into a plane of a place in this row.
   size_t at(size_t place) const { return begin_ + place; }
 
-  /// The part of the prediction that comes from whole rows, for `count` places; before their blocks are
-  /// expected.
+  /// Sums the whole-row features for `count` places; call it before their blocks are predicted.
   STRANDCAST_LANES void sum_features(size_t begin, size_t count) const {
     for (size_t axis = 0; axis < 3; ++axis) {
       FeatureRows rows = features_[axis];
@@ -314,8 +315,8 @@ class MotionRow {
     }
   }
 
-  /// Fetches what the next row reads first around a place: it lies in too many pieces for the processor to
-  /// guess.
+  /// Prefetches what the next row reads around a place; its data is too scattered for the hardware
+  /// prefetcher.
   STRANDCAST_LANES void prefetch_next(size_t place) const {
     constexpr size_t kPlacesInLine = 16;
     if (place % kPlacesInLine != 0) return;
@@ -325,7 +326,7 @@ class MotionRow {
     }
   }
 
-  /// Blocks of a slice come in order.
+  /// Predicts the block at `place`; blocks of a slice come in order.
   STRANDCAST_LANES void expect(size_t place, Expected& expected) const {
     LaneVectors last;
     for (size_t axis = 0; axis < 3; ++axis) last.axis[axis] = to_floats(load_lanes(last_[axis] + place));
@@ -343,7 +344,7 @@ class MotionRow {
     if (vertex_ != 0) expected.length = known_length(place);
   }
 
-  /// Stores positions and what follows from them.
+  /// Stores the positions of a block and the values derived from them.
   STRANDCAST_LANES void store(const Expected& expected, size_t place, const IntLaneVectors& position) const {
     for (size_t axis = 0; axis < 3; ++axis) {
       const IntLanes now = position.axis[axis];
@@ -359,7 +360,7 @@ class MotionRow {
     }
   }
 
-  /// Last positions of the vertices of a block, which escapes count from.
+  /// Returns the last positions of a block's vertices, which escapes count from.
   STRANDCAST_LANES IntLaneVectors last(size_t place) const {
     return {load_lanes(last_[0] + place), load_lanes(last_[1] + place), load_lanes(last_[2] + place)};
   }
@@ -377,7 +378,7 @@ class MotionRow {
     constexpr size_t kWhich = strand == MotionStrand::Neighbour ? 0 : 1;
     store_lanes(sum, neighbour_sum_[kWhich][axis] + place);
   }
-  /// Not of roots.
+  /// Returns the known lengths of the segments that end at this place, in lattice steps. Not for roots.
   STRANDCAST_LANES Lanes known_length(size_t place) const {
     const Lanes rest = load_lanes(rest_length_m_ + place) / quantum_m_;
     if (length_blend_ == 0.0f) return rest;
@@ -410,9 +411,8 @@ class MotionRow {
   const float* rest_length_m_;
 };
 
-/// Goes through the vertices of a slice block by block, from the roots on: work(row, place, moved) gets the
-/// row of the block, its first place, and where the motion lets expect its vertices, and stores what they
-/// become.
+/// Visits a slice block by block, roots first: work(row, place, moved). `moved` is the position that the
+/// motion predicts; `work` stores the final one.
 template <class Work>
 STRANDCAST_LANES void for_each_block(const SliceWork& of, Work work) {
   const size_t begin = of.layout.slice_begin[of.slice];

@@ -1,6 +1,6 @@
-// ShapeRow: where the vertices of one row are expected from the shape of the strands alone, eight strands at
-// a time: from the edges nearer to the root, the neighbours and the rest shape, without any frame before.
-// What keyframes of the "tangent" codec are predicted by. Private to common/strands/tangent.
+// ShapeRow: predicts the vertices of one row from the shape of the strands alone, eight strands at a time. It
+// uses edges nearer to the root, neighbours and the rest shape, but no earlier frame. Keyframes of the
+// "tangent" codec are predicted this way. Private to common/strands/tangent.
 #pragma once
 
 #include "common/strands/tangent/row.h"
@@ -17,7 +17,7 @@ namespace strandcast::tangent {
 //  13 parent's bend                       14 neighbour's bend                 15 second neighbour's bend
 using ShapeFeatures = std::array<LaneVectors, kShapeFeatureCount>;
 
-/// Which weights serve a row.
+/// Returns the weight class of a row.
 inline uint32_t shape_class(uint32_t v) {
   return std::min(v, kShapeClassCount - 1);
 }
@@ -28,8 +28,8 @@ STRANDCAST_LANES LaneVectors difference(const LaneVectors& a, const LaneVectors&
   return {a.axis[0] - b.axis[0], a.axis[1] - b.axis[1], a.axis[2] - b.axis[2]};
 }
 
-/// `x` turned by the smallest rotation that takes the direction of `from` to that of `to`; zero where there
-/// is none.
+/// Rotates `x` by the smallest rotation from the direction of `from` to that of `to`; returns zero where
+/// there is none.
 STRANDCAST_LANES LaneVectors turned(const LaneVectors& x, const LaneVectors& from, const LaneVectors& to) {
   constexpr float kTiny = 1.0f;
   constexpr float kLargest = 1e15f;
@@ -59,7 +59,7 @@ STRANDCAST_LANES LaneVectors turned(const LaneVectors& x, const LaneVectors& fro
   return result;
 }
 
-/// Edges at given places.
+/// Reads edges at given places.
 struct Edges {
   const Layout& layout;
   float quantum_m;
@@ -88,14 +88,14 @@ struct Edges {
 
 class ShapeRow {
  public:
-  /// `position` is known for earlier rows and for earlier blocks of this one.
+  /// Makes the row v; `position` is known for earlier rows and for earlier blocks of this one.
   ShapeRow(const Layout& layout, float quantum_m, const Planes<int32_t>& position, uint32_t v)
       : layout_(layout), quantum_m_(quantum_m), position_(position), v_(v) {}
 
   ShapeFeatures features(size_t place) const;
   Expected expect(size_t place, const ShapeWeights& weights) const;
   size_t at(size_t place) const { return v_ * static_cast<size_t>(layout_.stride) + place; }
-  /// Of the vertices before, or the origin.
+  /// Returns the positions of the preceding vertices, or the origin for roots.
   IntLaneVectors base(size_t place) const;
 
  private:

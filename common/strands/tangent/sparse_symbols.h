@@ -1,6 +1,6 @@
-// Entropy coding of frames whose integers are nearly all 0, as those that steps predict: for each block of
-// eight strands' vertices whether any of it is not 0, and the integers of those blocks only, all slices in
-// one run of symbols. Private to common/strands/tangent; any thread.
+// Entropy coding of frames whose integers are nearly all 0, as after solver steps. Each block of eight
+// vertices has a flag for any non-zero integer, and only flagged blocks have integers. All slices share one
+// run of symbols. Private to common/strands/tangent; any thread.
 #pragma once
 
 #include <array>
@@ -21,13 +21,13 @@ struct SparseTables {
 };
 SparseTables make_first_sparse_tables();
 
-/// Vertices of each block that were not 0, (vertex_count x blocks).
+/// Number of non-zero vertices of each block, (vertex_count x blocks).
 using BlockCounts = std::vector<uint8_t>;
 inline size_t block_count_of(const Layout& layout) {
   return layout.plane_size() / kBlockSize;
 }
 
-/// What both directions have in common; `now` is filled.
+/// Inputs of writing and reading; `now` is filled.
 struct SparseContext {
   const Layout& layout;
   const SymbolSizes& then;
@@ -37,7 +37,8 @@ struct SparseContext {
   SparseTables& tables;
 };
 void write_sparse(const SparseContext& context, const Codes& codes, ValueWriter& writer);
-/// From untrusted bytes: any bytes give some integers, and escapes take bytes.
+/// Reads integers from untrusted bytes. Any bytes give some integers, and every escape takes bytes, so memory
+/// stays bounded.
 void read_sparse(const SparseContext& context, ValueReader& reader, Codes& codes);
 
 }  // namespace strandcast::tangent

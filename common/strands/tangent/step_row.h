@@ -1,18 +1,16 @@
-// StepRow: where the vertices of one row are expected when a step of the solver has told where (the history's
-// positions are those of the step): there, moved by a share of what the vertex before was off by. Beside
-// MotionRow it knows no neighbours and no fitted weights, so blocks do not wait for each other. Private to
-// common/strands/tangent.
+// StepRow: predicts the vertices of one row from a solver step, whose positions the history holds. A
+// prediction adds a share of the preceding vertex's error. Unlike MotionRow it uses no neighbours and no
+// fitted weights, so blocks do not wait for each other. Private to common/strands/tangent.
 //
-// What a vertex costs: 90 floating-point operations, two divisions and two roots; 76 bytes from and to
-// memory.
+// Cost of a vertex: 90 floating-point operations, two divisions and two roots; 76 bytes from and to memory.
 #pragma once
 
 #include "common/strands/tangent/row.h"
 
 namespace strandcast::tangent {
 
-/// Of what the vertex nearer to the root is off by, and of what was corrected in the frame before: measured
-/// as best on the built-in motions with both a chain and a rod, and nearly alike.
+/// Shares of the parent vertex's error and of the last frame's correction. These values gave the fewest bytes
+/// on the built-in motions with a chain and with a rod; the optimum is flat.
 inline constexpr float kParentShare = 0.73f;
 inline constexpr float kCorrectedShare = -0.25f;
 
@@ -57,7 +55,7 @@ class StepRow {
     }
   }
 
-  /// What escapes count from.
+  /// Returns the positions that escapes count from.
   STRANDCAST_LANES IntLaneVectors last(size_t place) const {
     return {load_lanes(expected_[0] + place), load_lanes(expected_[1] + place),
             load_lanes(expected_[2] + place)};
@@ -74,7 +72,7 @@ class StepRow {
   std::array<float*, 3> residual_;
 };
 
-/// As for_each_block() of row.h.
+/// Visits a slice like for_each_block() of row.h.
 template <class Work>
 STRANDCAST_LANES void for_each_step_block(const SliceWork& of, Work work) {
   const size_t begin = of.layout.slice_begin[of.slice];

@@ -1,5 +1,5 @@
-// Which tables the integers of a vertex are coded with: by the sizes of integers near by. What both kinds of
-// frames share (symbols.h, sparse_symbols.h). Private to common/strands/tangent.
+// Chooses the tables that code a vertex's integers by the sizes of nearby integers. Shared by symbols.h and
+// sparse_symbols.h. Private to common/strands/tangent.
 #pragma once
 
 #include <algorithm>
@@ -24,8 +24,8 @@ constexpr uint32_t size_class(uint32_t sum) {
   return width < 3 ? sum : std::min(4 * (width - 2) + ((sum >> (width - 3)) & 3u), kSizeCount - 1);
 }
 
-/// Of sums with no more than kSizeBits bits: which tables for both coordinates, and the first of those for
-/// the length.
+/// Lookup from a sum of at most kSizeBits bits to its table class: for both coordinates, and the first class
+/// for the length.
 template <class Class>
 constexpr auto classes_of(Class class_of) {
   std::array<uint8_t, 1u << kSizeBits> classes{};
@@ -37,12 +37,13 @@ inline constexpr auto kLengthClasses = classes_of([](uint32_t sum) {
   return kLengthSums * (sum < 8 ? 0u : sum < 32 ? 1u : 2u);
 });
 
-/// Of what is folded (fold_sign).
+/// Returns the magnitude of a folded integer (fold_sign).
 STRANDCAST_LANES uint32_t magnitude(uint32_t folded) {
   return (folded >> 1) + (folded & 1u);
 }
 
-/// Which tables to use and how many low bits to leave out of them. Sums are mostly so small that no bits are.
+/// Table class for a sum of nearby magnitudes, and the number of low bits that are coded plainly. Most sums
+/// are so small that this number is 0.
 template <bool has_shift>
 struct Size {
   uint32_t size;
@@ -54,14 +55,14 @@ struct Size {
     size = kSizeClasses[near >> shift];
     length = kLengthClasses[near >> shift];
   }
-  /// Of the second coordinate.
+  /// Returns the table of the second coordinate, given the first.
   STRANDCAST_LANES uint32_t second_table(uint32_t first) const {
     const uint32_t first_size = magnitude(first) >> shift;
     return size * kFirstSizes + (first_size < kFirstSizes ? first_size : kFirstSizes - 1);
   }
 };
 
-/// work(size) for a sum.
+/// Calls work(size) with the size class of a sum.
 template <class Work>
 STRANDCAST_LANES void with_size(uint32_t near, Work work) {
   if (near < kSizeClasses.size()) [[likely]]
@@ -70,7 +71,7 @@ STRANDCAST_LANES void with_size(uint32_t near, Work work) {
     work(Size<true>(near));
 }
 
-/// Twice the magnitude of what is folded, limited.
+/// Returns twice the magnitude of a folded integer, clamped.
 STRANDCAST_LANES uint32_t doubled(uint32_t folded) {
   constexpr uint32_t kLimit = 2 * kLargestSize;
   return ((folded < kLimit ? folded : kLimit) + 1u) & ~1u;
@@ -84,7 +85,7 @@ STRANDCAST_LANES uint8_t length_size(uint32_t length) {
   return static_cast<uint8_t>(((length < kLimit ? length : kLimit) + 1u) >> 1);
 }
 
-/// The tables of a slice by what they are for.
+/// Tables of a slice by purpose.
 struct TableSet {
   SymbolTable* first;
   SymbolTable* second;
@@ -94,7 +95,7 @@ struct TableSet {
       : first(tables.data()), second(first + kSizeCount), length(second + kSizeCount * kFirstSizes) {}
 };
 
-/// A row and the sizes around it. Only pointers, to be kept in registers.
+/// A row and the sizes around it. Holds only pointers, so that it fits into registers.
 struct SymbolRow {
   const uint16_t* known;        // sum of sizes that do not wait for others of the row
   const uint8_t* known_length;  // likewise of lengths
@@ -108,7 +109,7 @@ struct SymbolRow {
   }
 };
 
-/// Sizes of the frame before and of this one.
+/// Sizes of the preceding frame and of this one.
 class SizeRows {
  public:
   SizeRows(const Layout& layout, const SymbolSizes& then, SymbolSizes& now)
@@ -120,7 +121,8 @@ class SizeRows {
         known_(layout.stride, 0),
         known_length_(layout.stride, 0) {}
 
-  /// Row v, with what is known of `count` places from `begin` on. The sizes of their lengths are 0.
+  /// Begins row v: sums the known sizes of `count` places from `begin` on and sets the sizes of their lengths
+  /// to 0.
   STRANDCAST_LANES SymbolRow begin_row(uint32_t v, size_t begin, size_t count) {
     const size_t stride = layout_.stride;
     uint16_t* const across = now_.across.data() + v * stride;

@@ -1,5 +1,5 @@
-// Entropy coding of the "tangent" codec: the integers of a frame, with tables chosen by the integers coded
-// near by. No floats decide about a table, so this pass needs nothing of the geometry. Private to
+// Entropy coding of the "tangent" codec: codes the integers of a frame with tables chosen by nearby integers.
+// No floats affect the choice of a table, so this pass is independent of the geometry. Private to
 // common/strands/tangent. Functions touch only their own slice of the arrays.
 #pragma once
 
@@ -21,10 +21,10 @@ using Tables = std::array<SymbolTable, kTableCount>;
 
 Tables make_first_tables();
 
-/// The mean of the tables that the slices of a frame ended with: the next frame starts from it.
+/// Returns the mean of the tables that the slices of a frame ended with; the next frame starts from it.
 Tables mean_tables(std::span<const Tables> tables);
 
-/// Sizes of the integers of one frame, (vertex_count x stride).
+/// Clamped magnitudes of the integers of one frame, (vertex_count x stride).
 struct SymbolSizes {
   std::vector<uint16_t> across;
   std::vector<uint8_t> length;
@@ -32,12 +32,12 @@ struct SymbolSizes {
   void reset(const Layout& layout);
 };
 
-/// Weights of the first classes, each told by how far it is from that of the class before.
+/// Writes the weights of the first classes, each as differences from the class before.
 void write_weights(uint32_t class_count, const MotionWeights& weights, ValueWriter& writer);
-/// The inverse, from untrusted bytes: any bytes give some weights.
+/// Inverse of write_weights() for untrusted bytes; any bytes give some weights.
 void read_weights(uint32_t class_count, MotionWeights& weights, ValueReader& reader);
 
-/// A slice to be written; `then` are the sizes of the frame before, `now` is filled.
+/// Inputs for writing a slice: `then` holds the sizes of the preceding frame, `now` is filled.
 struct SymbolWriting {
   const Layout& layout;
   uint32_t slice;
@@ -50,13 +50,14 @@ struct SymbolWriting {
 /// Writes a slice's integers and escapes. A kernel for every instruction set.
 void write_symbols(simd::InstructionSet set, const SymbolWriting& of);
 
-/// A slice to be read.
+/// Inputs for reading a slice.
 struct SliceSymbols {
   uint32_t slice;
   Tables& tables;
   ValueReader& reader;
 };
-/// As many are read side by side: a symbol waits for the one before it in its slice, but for no other slice.
+/// Number of slices that are read side by side: a symbol depends on the preceding one of its slice, but on no
+/// other slice.
 inline constexpr uint32_t kMostSlicesAtOnce = 4;
 struct SymbolReading {
   const Layout& layout;
@@ -65,8 +66,8 @@ struct SymbolReading {
   SymbolSizes& now;
   std::span<SliceSymbols> slices;  // one to kMostSlicesAtOnce
 };
-/// The inverse, from untrusted bytes: any bytes give some integers; escapes take bytes, so there are no more
-/// than there is room for. A kernel for every instruction set.
+/// Inverse of write_symbols() for untrusted bytes. Any bytes give some integers; escapes take bytes, so their
+/// number is bounded. A kernel for every instruction set.
 void read_symbols(simd::InstructionSet set, const SymbolReading& of);
 
 }  // namespace strandcast::tangent
