@@ -1,5 +1,5 @@
-// Which strand codec a scene gets that names none: "step", which takes the fewest bits, unless this
-// machine cannot encode so many vertices as often as the scene steps, with room left for the simulation.
+// Chooses the strand codec of a scene that names none. It is "step", which takes the fewest bits, unless this
+// machine cannot encode the scene's vertices at its rate with time left for the simulation.
 #pragma once
 
 #include <cstddef>
@@ -11,12 +11,12 @@
 
 namespace strandcast {
 
-/// Any two processors encode so few in time: nothing is measured.
+/// Number of vertices that any two processors can encode in time; up to it nothing is measured.
 inline constexpr size_t kAlwaysFewestBitsVertices = 64'000;
-/// Of the processors' time between two states, what encoding may take.
+/// Largest share of the processors' time between two states that encoding may take.
 inline constexpr double kEncodeShare = 2.0 / 3.0;
 
-/// States of strands that a scene publishes.
+/// Returns how many states of strands a scene publishes per second.
 double states_per_second(const SceneDesc& scene);
 
 struct CodecChoice {
@@ -24,7 +24,7 @@ struct CodecChoice {
   std::string reason;  // a sentence for log and --explain
 };
 
-/// What decides, measured.
+/// Measured costs that decide the choice.
 struct EncodeCost {
   double cpu_ms = 0.0;  // processor time of all threads for one state with "tangent"
   unsigned processors = 1;
@@ -32,8 +32,8 @@ struct EncodeCost {
 };
 CodecChoice choose_codec(const EncodeCost& cost);
 
-/// For a scene and what it loaded: its own codec when it names one, else the choice by size or, above
-/// kAlwaysFewestBitsVertices, by encoding some states of it, which takes about half a second.
+/// Returns a scene's own codec if it names one. Otherwise chooses by size or, above
+/// kAlwaysFewestBitsVertices, by encoding some states, which takes about half a second.
 Result<CodecChoice> choose_codec(const SceneDesc& scene, const SceneAsset& asset);
 
 }  // namespace strandcast

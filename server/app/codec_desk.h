@@ -1,5 +1,5 @@
-// CodecDesk: by which of the codecs that are served each session gets its strands, when it joins and when
-// that turns out wrong. Network thread.
+// CodecDesk: chooses which of the served codecs codes each session's strands, when the session joins and when
+// the choice turns out wrong. Network thread.
 #pragma once
 
 #include <map>
@@ -12,7 +12,7 @@
 
 namespace strandcast {
 
-/// What is simulated, as far as it decides who can predict it.
+/// Properties of the simulation that decide which viewers can predict it.
 struct SimulatedModel {
   std::string solver;
   double solver_cost = 1.0;  // as ViewerCodecFacts
@@ -30,10 +30,11 @@ class CodecDesk {
   };
   explicit CodecDesk(Served served) : served_(std::move(served)) {}
 
-  /// What a session that joins gets. One that gets strands and may get another codec later is remembered; a
-  /// relay gets what it asks for.
+  /// Chooses the codec of a joining session. A session that gets strands and may change codec later is
+  /// remembered; a relay gets the codec that it asks for.
   ViewerCodec admit(SessionId session, const Hello& hello, const SimulatedModel& model);
-  /// Call often: looks whether this session can still afford its codec.
+  /// Measurements of a session. Pass them often: the desk checks whether the session can still afford its
+  /// codec.
   struct Look {
     const LinkState& link;
     const ViewerReport& report;

@@ -1,5 +1,5 @@
-// ControlBudget: how many commands and changes each controller may send. What they cost the simulation is
-// bounded there (SimLoop). Plain logic on given times; network thread.
+// ControlBudget: limits how many commands and changes each controller may send. SimLoop bounds their cost for
+// the simulation. Plain logic on given times; network thread.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,14 @@
 
 namespace strandcast {
 
-/// Commands and changes of one controller: so many a second,
+/// Sustained number of commands and changes per second of one controller.
 inline constexpr double kControlsPerS = 60.0;
-/// and so many at once, after a time of quiet.
+/// Number of commands and changes that a controller may send at once after a quiet time.
 inline constexpr double kControlBurst = 120.0;
 
 class ControlBudget {
  public:
-  /// False when this one is too many.
+  /// Counts one command or change; returns false if it exceeds the limit.
   bool take(SessionId session, int64_t time_ns);
   void remove(SessionId session) { buckets_.erase(session); }
 

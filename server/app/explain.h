@@ -1,4 +1,5 @@
-// What `strandcast-server` prints about itself: solvers, and for a scene its facts, passes, memory and times.
+// Texts that `strandcast-server` prints about itself: its solvers, and a scene's facts, passes, memory and
+// times.
 #pragma once
 
 #include <filesystem>
@@ -13,7 +14,7 @@
 
 namespace strandcast {
 
-/// Every solver with its parameters, ranges and source.
+/// Lists every solver with its parameters, ranges and source.
 std::string list_solvers();
 
 struct MeasureConfig {
@@ -28,16 +29,16 @@ struct Measured {
   gl::PassReports passes;
 };
 
-/// Plans the passes of a server with these viewers, makes those that run, on an executor and a renderer of
-/// its own, and runs them a few times.
+/// Plans the passes of a server with these viewers and runs the needed ones a few times, on an executor and a
+/// renderer of its own.
 Result<Measured> measure_passes(const SceneDesc& scene, const SceneContent& content,
                                 const RuntimeFacts& facts, const MeasureConfig& config);
 
-/// What the scene's solver says of the groom, a sentence each.
+/// Returns what the scene's solver states about the groom, one sentence each.
 Result<std::vector<std::string>> explain_groom(const SceneDesc& scene, const Groom& groom);
 
-/// Facts with reasons, what its solver says of the groom, what simulated where it was measured, then the
-/// passes: kept, not requested or unread, with bytes and milliseconds.
+/// Returns the facts with reasons, the solver's notes on the groom, and the device that simulated if it was
+/// measured. The passes follow: kept, not requested or unread, with bytes and milliseconds.
 Result<std::string> explain_scene(const SceneDesc& scene, const SceneAsset& asset, const RuntimeFacts& facts,
                                   const Measured& measured, const std::vector<std::string>& groom_notes = {});
 

@@ -1,6 +1,6 @@
-// FrameStages: when each state was where on its way through the server: its newest motion sample received,
-// the state simulated and published, its first strand frame encoded. Histograms for /metrics, and a trace as
-// CSV where one is asked for, keyed by tick like that of viewers. Bounded. Any thread.
+// FrameStages: records when each state passed the stages of the server: arrival of its newest motion sample,
+// simulation, publication, encoding of its first strand frame. Provides histograms for /metrics and, on
+// request, a CSV trace keyed by tick like that of viewers. Bounded memory. Any thread.
 #pragma once
 
 #include <cstdint>
@@ -21,9 +21,10 @@
 
 namespace strandcast {
 
-/// States whose frame may still come, or that were not told yet.
+/// Largest number of states whose times are incomplete or were not taken yet.
 inline constexpr size_t kMaxOpenStates = kMaxStateTimes;
-/// A state whose frame has not come after so long is told without it; one that is older is told no more.
+/// A state that was not encoded within the first time is reported without its frame; a state older than the
+/// second is dropped.
 inline constexpr int64_t kFramePatienceNs = 250'000'000;
 inline constexpr int64_t kToldStateNs = 2'000'000'000;
 inline constexpr uint64_t kMaxTraceLines = 10'000'000;
@@ -31,27 +32,28 @@ inline constexpr uint64_t kMaxTraceLines = 10'000'000;
 class FrameStages {
  public:
   FrameStages() = default;
-  /// Writes what is left of the trace.
+  /// Writes the remaining lines of the trace.
   ~FrameStages();
   FrameStages(const FrameStages&) = delete;
   FrameStages& operator=(const FrameStages&) = delete;
 
-  /// From now on each state is a line of this file. Before the first state.
+  /// Writes a line per state to this file from now on; call it before the first state.
   Status open_trace(const std::filesystem::path& path);
 
-  /// When the motion sample of a state was made, by its arrival; 0 = not known. Before the first state.
+  /// Sets the function that maps the arrival time of a motion sample to the time when the sample was made; 0
+  /// = not known. Call it before the first state.
   void set_source_times(std::function<int64_t(int64_t arrival_ns)> times) {
     source_times_ = std::move(times);
   }
 
   void note_state(const SnapshotInfo& state, int64_t time_ns);
-  /// Of the state of this simulation time; the first frame of it counts.
+  /// Notes that the state of this simulation time was encoded; only its first frame counts.
   void note_encoded(int64_t sim_time_ns, int64_t time_ns);
 
-  /// Those that were not taken yet, oldest first: all that is known of them.
+  /// Returns the times of the states that were not taken yet, oldest first.
   std::vector<StateTime> take_states(int64_t time_ns);
 
-  /// Lines for /metrics.
+  /// Returns the lines for /metrics.
   std::string metrics() const;
 
  private:

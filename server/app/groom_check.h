@@ -1,5 +1,5 @@
-// `strandcast-server --check`: a scene's hair and head as loaded, for a person to see whether they lie right,
-// without simulation, streams or network.
+// `strandcast-server --check`: draws a scene's hair and head as loaded, so that a person can see whether they
+// fit. No simulation, streams or network.
 #pragma once
 
 #include <filesystem>
@@ -13,14 +13,13 @@
 
 namespace strandcast {
 
-/// Balls as a mesh that can be drawn, and capsules as rows of balls.
+/// Makes a drawable mesh of spheres, and rows of spheres along capsules.
 Mesh mesh_of_balls(const std::vector<SphereCollider>& balls);
 std::vector<SphereCollider> balls_along(const std::vector<BodyCapsule>& capsules);
 
-/// Draws the scene at rest from the front, its left side and above, without head, with the head, and the head
-/// with what collides; leaves groom.png and groom.txt in the folder, which is made. Returns the text: what
-/// was guessed and why, and how head, colliders and hair agree. Needs a GL device; errors name file or
-/// folder.
+/// Draws the scene at rest from the front, left and above: hair alone, with the head, and with the colliders.
+/// Creates the folder and writes groom.png and groom.txt to it. Returns the text: guesses with reasons, and
+/// how well head, colliders and hair agree. Needs a GL device; errors name the file or folder.
 Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::path& folder,
                                 const MeasureConfig& config);
 

@@ -1,5 +1,5 @@
-// What the files of a server's heads are called: of several heads each writes its own recording and its own
-// trace, beside those of the first. Pure functions, any thread.
+// Names of the files of a server's heads: each of several heads writes its own recording and trace beside
+// those of the first. Pure functions, any thread.
 #pragma once
 
 #include <filesystem>
@@ -8,12 +8,12 @@
 
 namespace strandcast {
 
-/// What stands behind the name of a file of each head, given their names: nothing for the first, "-ben" for
-/// one called ben. Letters, digits and + - _ alone, whatever a head is called, and each its own, also where a
-/// disk takes large letters for small ones.
+/// Returns the suffix of each head's files, given the heads' names: empty for the first, "-ben" for one named
+/// ben. Suffixes contain only letters, digits and + - _. They are distinct even on file systems that ignore
+/// case.
 std::vector<std::string> head_file_endings(const std::vector<std::string>& heads);
 
-/// "takes/run.mcap" with "-ben": "takes/run-ben.mcap".
+/// Inserts a suffix before the extension: "takes/run.mcap" with "-ben" gives "takes/run-ben.mcap".
 std::filesystem::path with_file_ending(const std::filesystem::path& path, const std::string& ending);
 
 }  // namespace strandcast

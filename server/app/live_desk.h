@@ -1,8 +1,7 @@
-// LiveDesk: what a server does with its live inputs: opens their sockets, hands what comes to each LiveSource
-// and what that makes of it to the inputs and to readers of inputs, writes the log, and answers commands.
-// Heads that ask for the same protocol, port and host share its socket: each follows a subject of its own.
-// Made only where a scene asks for live inputs. What is marked so from any thread, the rest on the
-// receiver's.
+// LiveDesk: runs a server's live inputs. It opens their sockets, passes received bytes to each LiveSource and
+// the results to the inputs and their readers, writes the log and answers commands. Heads that use the same
+// protocol, port and host share a socket, and each follows its own subject. Exists only if a scene has live
+// inputs. Functions run on the receiver's thread unless marked as callable from any thread.
 #pragma once
 
 #include <functional>
@@ -20,24 +19,25 @@
 
 namespace strandcast {
 
-/// Ids of live inputs among the sources of motion; sessions count from 1.
+/// First source id of live inputs among the sources of motion; session ids count from 1.
 inline constexpr uint64_t kFirstLiveSourceId = uint64_t{1} << 63;
 
-/// Every input on its own: BadInput and NotFound name the field. Opens nothing.
+/// Checks every input separately; BadInput and NotFound name the field. Opens nothing.
 Status check_live(const std::vector<LiveDesc>& live);
-/// A line for each: who is heard, whom the head follows, and how its numbers are taken. Opens nothing.
+/// Returns a line per input: the accepted senders, the subject that the head follows, and how its data is
+/// interpreted. Opens nothing.
 Result<std::vector<std::string>> explain_live(const std::vector<LiveDesc>& live,
                                               const std::vector<AddressRange>& allowed);
 
 class LiveDesk : public LiveHandler {
  public:
-  /// Who else hears of what drives the head; on the receiver's thread.
+  /// Observer of the motion that drives the head; called on the receiver's thread.
   struct Listener {
     std::function<void(uint64_t source_id, const MotionSamples&, int64_t arrival_ns)> on_motion;
     std::function<void(uint64_t source_id, const WindSamples&, int64_t arrival_ns)> on_wind;
   };
 
-  /// The live inputs of one head, and where they go.
+  /// The live inputs of one head, and the receivers of their data.
   struct Target {
     std::vector<LiveDesc> live;
     InputHub* inputs = nullptr;  // outlives the desk
@@ -45,7 +45,7 @@ class LiveDesk : public LiveHandler {
     std::string head = {};  // its name, for the log and errors; empty where there is one
   };
 
-  /// Opens the sockets.
+  /// Opens the sockets of all targets.
   static Result<std::unique_ptr<LiveDesk>> open(std::vector<Target> targets,
                                                 const std::vector<AddressRange>& allowed);
   ~LiveDesk() override;
@@ -55,9 +55,9 @@ class LiveDesk : public LiveHandler {
 
   // From any thread; of one head, by its number among the targets.
   std::vector<LiveInputStatus> status(size_t head = 0) const;
-  /// As it runs: subjects as they were chosen.
+  /// Returns the live inputs as they run, with the chosen subjects.
   std::vector<LiveDesc> live(size_t head = 0) const;
-  /// What became of it, in one sentence.
+  /// Carries out a command; the notice says in one sentence what happened.
   Notice obey(const LiveCommand& command, size_t head = 0);
 
   bool on_bytes(size_t socket, const std::string& sender, std::span<const std::byte> bytes,

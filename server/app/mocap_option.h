@@ -1,4 +1,4 @@
-// What strandcast-server's --mocap means. Pure functions.
+// Parses strandcast-server's option --mocap. Pure functions.
 #pragma once
 
 #include <string>
@@ -17,15 +17,15 @@ struct MocapOptions {
   double scale = 1.0;  // LiveDesc::scale
 };
 
-/// BadInput says what is meant instead.
+/// Parses one value of --mocap. BadInput explains the accepted forms.
 Result<LiveDesc> parse_mocap(const std::string& text);
 
-/// The scene with these inputs instead of its own, where any are given. `overrides` of live are applied
-/// behind.
+/// Returns the scene with the given inputs instead of its own; unchanged if there are none. `overrides` of
+/// live inputs are applied afterwards.
 Result<SceneDesc> with_mocap(const SceneDesc& scene, const MocapOptions& options,
                              const std::vector<std::string>& overrides);
 
-/// Whether an override is of live, and so waits for the inputs that the command line names.
+/// Returns whether an override concerns live inputs, so that it must be applied after --mocap.
 bool is_live_override(const std::string& assignment);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// Gathers what ModePolicy needs from where it is measured, with stated guesses for what nobody has measured
-// yet. Pure arithmetic, any thread.
+// Gathers the inputs of ModePolicy from the places that measure them, and states guesses for what nobody has
+// measured yet. Pure arithmetic, any thread.
 #pragma once
 
 #include <string>
@@ -23,7 +23,7 @@ struct ModeSources {
   double picture_rate_hz = 15.0;  // at most
 };
 
-/// Before the first picture: what drawing takes, by pixels, and the bytes of one, both as measured with the
+/// Guesses used before the first picture: time to draw it per pixel, and its bytes, both measured with the
 /// built-in scene.
 inline constexpr double kGuessedSoftwareMsPerPixel = 60.0 / (640.0 * 360.0);
 inline constexpr double kGuessedHardwareMs = 10.0;

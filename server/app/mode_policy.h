@@ -1,6 +1,6 @@
-// ModePolicy: strands or pictures for one viewer. Predicts from measured numbers how many different pictures
-// per second the person would see and how late, and takes the better mode, with hysteresis and a dwell. Pure
-// logic on given times: no clock, no I/O, one thread.
+// ModePolicy: chooses strands or pictures for one viewer. From measurements it predicts how many different
+// pictures per second the person would see, and how late. It takes the better mode, with hysteresis and a
+// minimum dwell time. Pure logic on given times: no clock, no I/O, one thread.
 #pragma once
 
 #include <cstddef>
@@ -13,23 +13,23 @@
 
 namespace strandcast {
 
-/// More than this many different pictures per second are worth nothing.
+/// Rate beyond which more different pictures per second have no value.
 inline constexpr double kMostUsefulHz = 60.0;
-/// A picture this late is worth half of one that is not late.
+/// Delay at which a picture has half the value of one without delay.
 inline constexpr double kHalfWorthMs = 250.0;
-/// Frames must be worth so many times as much as strands; strands only as much as frames, because they need
-/// no server to turn the view and every viewer shares them.
+/// Factor by which pictures must be better than strands to be chosen. Strands need only be as good, because
+/// every viewer shares them and turning the view needs no server.
 inline constexpr double kFramesGain = 1.5;
-/// And so many times, about three times as fast, while what a server without a GPU takes for pictures is only
-/// guessed: it may be as busy as this viewer, and a change for a guess that is wrong would be undone.
+/// The same factor while the picture costs of a server without a GPU are only guessed. Such a server may be
+/// as busy as the viewer, and a change made on a wrong guess would be undone.
 inline constexpr double kGuessedFramesGain = 8.0;
-/// The other mode must look better for so long without a break.
+/// Time for which the other mode must look better without interruption.
 inline constexpr int64_t kWishNs = 1'000'000'000;
-/// Time between two changes; doubles when a change is undone within twice of it.
+/// Shortest time between two changes; it doubles if a change is undone within twice that time.
 inline constexpr int64_t kFirstDwellNs = 5'000'000'000;
 inline constexpr int64_t kLongestDwellNs = 80'000'000'000;
 
-/// What is known; numbers that are 0 are unknown and limit nothing.
+/// Measurements that decide; a number that is 0 is unknown and limits nothing.
 struct ModeFacts {
   struct StrandClassFacts {
     double bytes_per_s = 0.0;
@@ -51,7 +51,7 @@ struct ModeFacts {
   double round_trip_ms = 0.0;
 };
 
-/// What a person would see.
+/// Prediction of what a person would see in one mode.
 struct ModePrediction {
   enum class Limit { Stream, Link, Viewer, Server };
   double rate_hz = 0.0;
@@ -59,7 +59,7 @@ struct ModePrediction {
   Limit limit = Limit::Stream;  // of the rate
   size_t strand_class = 0;      // the one the link can take, or the last
 
-  /// Useful pictures per second, late ones counted for less.
+  /// Returns useful pictures per second, weighted by lateness.
   double worth() const;
 };
 ModePrediction predict_strands(const ModeFacts& facts);
@@ -73,12 +73,12 @@ struct ModeChoice {
 
 class ModePolicy {
  public:
-  /// The mode to be in, which may be the present one. Call often; a choice counts as made only with
+  /// Returns the best mode, which may be the present one; call it often. A change counts only after
   /// note_change().
   ModeChoice choose(StreamMode present, const ModeFacts& facts, int64_t time_ns);
-  /// A change of mode was made, chosen here or not.
+  /// Notes that the mode was changed, by this policy or otherwise.
   void note_change(int64_t time_ns);
-  /// A choice could not be carried out.
+  /// Notes that a choice could not be carried out.
   void note_failure(int64_t time_ns);
   int64_t dwell_ns() const { return dwell_ns_; }
 

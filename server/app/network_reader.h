@@ -1,5 +1,5 @@
-// NetworkReader: all sessions as one reader of the stream. What each of them wants is a demand of its own;
-// the network sends a frame on to those whom it concerns. Any thread.
+// NetworkReader: all sessions of the network as one reader of the stream. Each session has a demand of its
+// own; the network forwards a frame to the sessions that it concerns. Any thread.
 #pragma once
 
 #include <functional>
@@ -18,9 +18,11 @@ namespace strandcast {
 class NetworkReader : public StreamReader {
  public:
   using OnClasses = std::function<void(const std::vector<StrandClass>&, const std::string& reason)>;
-  /// Makes the message of another asset, for who joins from now on too; null: there is none.
+  /// Function that makes the asset message after a change of shape; sessions that join later get it too. A
+  /// null message means that none fits.
   using OnShape = std::function<EncodedFramePtr(const SceneAsset&)>;
-  /// `head`: of those of the network, that the stream is of. The others are called before any viewer is told.
+  /// Makes the reader of a stream; `head` is its number in the network. The callbacks run before any message
+  /// goes to a viewer.
   NetworkReader(NetServer& net, FrameStages& stages, size_t head, OnClasses on_classes, OnShape on_shape)
       : net_(net),
         stages_(stages),
@@ -49,7 +51,7 @@ class NetworkReader : public StreamReader {
   void on_pictures_failed(const Error& error) override {
     net_.broadcast(Notice{true, "No frames can be drawn: " + error.to_string()}, head_);
   }
-  /// The network thread tells every viewer first.
+  /// The network thread tells every viewer before the new classes are used.
   void on_stream_change(const std::vector<StrandClass>& classes, std::shared_ptr<void> until_told) override {
     constexpr const char* kReason = "the stream was changed";
     on_classes_(classes, kReason);

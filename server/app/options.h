@@ -1,4 +1,4 @@
-// Command line of strandcast-server.
+// Parses the command line of strandcast-server.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace strandcast {
 
-/// Another server whose stream is passed on.
+/// Another server whose stream this one relays.
 struct UpstreamOptions {
   Address address;
   std::filesystem::path token_path;       // of the relay's own token; empty: none
@@ -45,10 +45,10 @@ struct ServerOptions {
   ServerConfig config;                      // all but scene and tokens
 };
 
-/// BadInput names the option; `help` is set for --help and --version.
+/// Parses the options. BadInput names the option; `help` is set for --help and --version.
 Result<ServerOptions> parse_options(int argc, const char* const* argv);
 
-/// The scene with its overrides.
+/// Loads the scene and applies its overrides.
 Result<ServerConfig> load_config(const ServerOptions& options);
 
 }  // namespace strandcast

@@ -1,4 +1,5 @@
-// ParameterWatch: sessions that want to hear when a parameter changes, and what they know. Any thread.
+// ParameterWatch: sessions that subscribe to changes of parameters, and the values that they know. Any
+// thread.
 #pragma once
 
 #include <map>
@@ -14,10 +15,11 @@ namespace strandcast {
 
 class ParameterWatch {
  public:
-  /// From now on this session hears of those whose path begins so; it knows these.
+  /// Subscribes a session to the parameters whose path begins with `prefix`; it already knows `parameters`.
   void add(SessionId session, const std::string& prefix, const std::vector<ParameterInfo>& parameters);
   void remove(SessionId session);
-  /// What is other, for each session that has not heard of it; at most kMaxListedParameters in a list.
+  /// Returns for each session the values that changed since it was last told; at most kMaxListedParameters in
+  /// a list.
   std::vector<std::pair<SessionId, ParameterList>> news(const std::vector<ParameterInfo>& parameters);
   bool is_empty() const;
 

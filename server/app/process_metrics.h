@@ -1,11 +1,11 @@
-// What the process takes of the machine, by the names that Prometheus' own clients use. Linux; any thread.
+// Resource use of the process, under the names that Prometheus' own clients use. Linux; any thread.
 #pragma once
 
 #include <string>
 
 namespace strandcast {
 
-/// Lines for /metrics; what cannot be read is left out.
+/// Returns the lines for /metrics; values that cannot be read are omitted.
 std::string format_process_metrics();
 
 }  // namespace strandcast

@@ -1,6 +1,6 @@
-// RecordDesk: the recording of one head: the one that --record begins with it, and those that who controls
-// begins and ends in the folder of --record-dir, one at a time. What may wait for the disk is done by a
-// thread of its own, which is there with such a folder only.
+// RecordDesk: the recordings of one head: the one that --record starts with it, and those that controllers
+// start and stop in the folder of --record-dir, one at a time. Work that may wait for the disk runs on a
+// thread of its own, which exists only with such a folder.
 #pragma once
 
 #include <condition_variable>
@@ -20,20 +20,20 @@
 
 namespace strandcast {
 
-/// A recording by command begins where so much is free on the disk, and ends where half of it is left.
+/// Free disk space that a recording by command needs to begin; it ends when half of that is left.
 inline constexpr uint64_t kMinFreeRecordBytes = 1u << 30;
-/// So many recordings may lie in the folder.
+/// Largest number of recordings in the folder.
 inline constexpr size_t kMaxRecordings = 1000;
 inline constexpr size_t kMaxRecordingNameChars = 60;
 
 inline constexpr const char* kNoRecordings =
     "Nobody begins or ends recordings on this server: start it with --record-dir DIR.";
 
-/// On the disk of this folder; nothing where it cannot be said.
+/// Returns the free bytes on the disk of this folder; empty if unknown.
 std::optional<uint64_t> free_bytes_of(const std::filesystem::path& folder);
 
-/// Where recordings by command go. Heads of one server have copies, and begin their files one behind the
-/// other, so that they keep its limits together.
+/// Folder of recordings by command. Heads of one server have copies and begin their files in turn, so that
+/// they keep its limits together.
 struct RecordFolder {
   std::filesystem::path path;
   std::function<std::optional<uint64_t>(const std::filesystem::path&)> free_bytes = free_bytes_of;
@@ -41,16 +41,16 @@ struct RecordFolder {
   std::shared_ptr<std::mutex> beginning = std::make_shared<std::mutex>();
 };
 
-/// The file of a recording that is called so: letters, digits, space and . _ - + as they are on every system,
-/// with .mcap behind; BadInput says what a name may be.
+/// Returns the file name of a recording: its name plus .mcap. A name may contain letters, digits, space and .
+/// _ - + as every file system accepts them; BadInput explains this.
 Result<std::string> recording_file_name(const std::string& name);
-/// Of one that nobody has given a name: "builtin-20261126T151259Z.mcap".
+/// Returns the file name of an unnamed recording, for example "builtin-20261126T151259Z.mcap".
 std::string recording_file_name(const std::string& scene, int64_t unix_time_s);
 
 class RecordDesk {
  public:
   using Reply = StateSource::Reply;
-  /// What is recorded; all of it outlives stop().
+  /// Parts of the head that are recorded; all of them must outlive stop().
   struct Stream {
     StreamHub& hub;
     StateSource& source;
@@ -59,31 +59,32 @@ class RecordDesk {
     std::string scene_name;
   };
 
-  /// Makes the file of the recording that begins with the server. The errors of Recorder::make(), or NotFound
-  /// where there is no such folder.
+  /// Makes the desk, and the file of a recording that starts with the server. Returns the errors of
+  /// Recorder::make(), or NotFound if the folder is missing.
   static Result<std::unique_ptr<RecordDesk>> make(const std::optional<RecordConfig>& first,
                                                   const std::optional<RecordFolder>& folder);
-  /// stop(), if it was not called.
+  /// Calls stop() if it was not called.
   ~RecordDesk();
   RecordDesk(const RecordDesk&) = delete;
   RecordDesk& operator=(const RecordDesk&) = delete;
 
-  /// Of the recording that begins with the server; null without one.
+  /// Returns the tap of the recording that starts with the server; null without one.
   StepTap* first_tap() { return recorder_.get(); }
-  /// Before the source starts.
+  /// Connects the desk to the stream; call it before the source starts.
   Status attach(Stream stream);
-  /// Behind its start.
+  /// Begins recording; call it after the source has started.
   void begin();
-  /// Ends what is recorded. The source has stopped, so that nothing comes any more.
+  /// Ends the recording. The source must have stopped already.
   void stop();
 
   // From any thread; return at once.
-  /// The answer comes on another thread, unless it is refused at once.
+  /// Starts or stops a recording. The reply comes on another thread, unless the command is refused at once.
   void obey(const RecordCommand& command, Reply reply);
-  /// For people: "take 5.mcap: 12.5 s, 3.2 MB", or how it ended by itself; empty = nothing is recorded.
+  /// Describes the recording for a person: "take 5.mcap: 12.5 s, 3.2 MB", or why it ended; empty = nothing is
+  /// recorded.
   std::string text() const;
   void add(const ServerStatus& status);
-  /// Nothing while nothing is recorded.
+  /// Returns the counters of the recording; empty if nothing is recorded.
   std::optional<RecordCounters> counters() const;
 
  private:

@@ -1,4 +1,4 @@
-// RecordDesks: the recordings of all heads of a server, for who looks at all of them. Any thread.
+// RecordDesks: the recordings of all heads of a server together. Any thread.
 #pragma once
 
 #include <string>
@@ -15,13 +15,14 @@ class RecordDesks {
     RecordDesk* desk;  // outlives this
   };
 
-  /// Of several heads.
+  /// Makes the group from the desks of several heads.
   explicit RecordDesks(std::vector<Of> all) : all_(std::move(all)) {}
 
-  /// Begins a recording of each head, or ends those that there are. One answer, with what each desk said; an
-  /// error where one was.
+  /// Starts or stops recording on every head. Replies once, with the answers of all desks; an error if one
+  /// desk failed.
   void obey(const RecordCommand& command, const RecordDesk::Reply& reply) const;
-  /// Of all that are recorded, as RecordDesk::text(); says which heads are not, where some are.
+  /// Describes the recordings of all heads like RecordDesk::text(); names the heads that are not recorded if
+  /// some are.
   std::string text() const;
 
  private:

@@ -1,6 +1,6 @@
-// ServedHead: one head of a server: its scene, inputs, source of states, the hub of its stream, and what the
-// application does with its sessions. A server has one to kMaxHeads behind one port; none knows of the
-// others. Threads as in ARCHITECTURE.md; functions from the server's own thread unless said otherwise.
+// ServedHead: one head of a server: its scene, inputs, source of states, stream hub, and the application's
+// part of its sessions. A server has one to kMaxHeads behind one port, and no head knows of the others.
+// Threads as in ARCHITECTURE.md; functions are called on the server's own thread unless stated otherwise.
 #pragma once
 
 #include <atomic>
@@ -22,22 +22,22 @@ namespace strandcast {
 
 class ServedHead {
  public:
-  /// Asked once pictures are wanted, of what else they show.
+  /// Returns the other heads that pictures show; called once pictures are wanted.
   using OtherHeads = std::function<std::vector<PaintedHead>()>;
-  /// Loads the scene of `config`, which has one head. `number`: among those of the server; `others`: empty
-  /// where there are none.
+  /// Loads the scene of `config`, which has one head. `number`: the head's index in the server; `others`:
+  /// empty if there are none.
   static Result<std::unique_ptr<ServedHead>> load(const ServerConfig& config, size_t number,
                                                   OtherHeads others);
-  /// stop(), if it was not called.
+  /// Calls stop() if it was not called.
   ~ServedHead();
   ServedHead(const ServedHead&) = delete;
   ServedHead& operator=(const ServedHead&) = delete;
 
-  /// Null where nothing is recorded, nor can be.
+  /// Returns the recordings; null if recording is not possible.
   RecordDesk* records() { return records_.get(); }
-  /// What its live inputs move.
+  /// Returns the inputs that live sources drive.
   LiveDesk::Target live_target();
-  /// What the server knows that its heads do not.
+  /// Parts of the server that heads share.
   struct Whole {
     LiveDesk* live = nullptr;                         // null: no head has live inputs
     std::vector<std::string> heads;                   // names of all where there are several
@@ -45,22 +45,22 @@ class ServedHead {
     std::function<std::string()> metrics;             // likewise
     const RecordDesks* records = nullptr;             // of all heads, where there are several that record
   };
-  /// Makes what its sessions speak to.
+  /// Makes the handler of this head's sessions.
   NetHead admit(Whole whole);
-  /// Lets the simulation run, for sessions of `net`, which outlives stop().
+  /// Starts the simulation for the sessions of `net`, which must outlive stop().
   Status start(NetServer& net);
-  /// Behind the network and the live inputs.
+  /// Ends the head; call it after the network and the live inputs have stopped.
   void stop();
-  /// Twice a second, by one thread: says to its viewers how it runs.
+  /// Sends the status to the head's viewers; called twice a second by one thread.
   void tell_status();
 
   // From any thread once it was admitted.
   const std::string& name() const { return config_.scene.name; }
   StreamHub& hub() { return *hub_; }
   PaintedHead painted() { return {hub_.get(), source_->asset()}; }
-  /// As it runs; nothing where it is no scene.
+  /// Returns the scene as it runs; empty if the source has no scene.
   std::optional<SceneDesc> scene() const;
-  /// All but those of the network.
+  /// Returns all counters except those of the network.
   ServerCounters counters() const;
   gl::PassReports passes() const;
   std::string stage_metrics() const { return stages_.metrics(); }

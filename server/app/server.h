@@ -1,5 +1,5 @@
-// Server: everything wired together: inputs, a source of states, the hub of the stream with its readers, the
-// network. Several may live in one process. Threads and what they hand over: ARCHITECTURE.md.
+// Server: connects all parts: inputs, a source of states, the stream hub with its readers, and the network.
+// Several servers may live in one process. Threads and the data that they exchange: ARCHITECTURE.md.
 #pragma once
 
 #include <cstdint>
@@ -22,9 +22,9 @@
 namespace strandcast {
 
 struct ServerConfig;
-/// For people: "anna, ben".
+/// Returns the heads' names for a person, for example "anna, ben".
 std::string names_of_heads(const SceneDesc& scene);
-/// The scene's simulation.
+/// Makes the source that simulates the scene.
 Result<std::unique_ptr<StateSource>> simulation_source(const ServerConfig& config, InputHub& inputs);
 
 struct ServerConfig {
@@ -39,16 +39,16 @@ struct ServerConfig {
   std::filesystem::path trace_path;                    // CSV of what each state took; empty = none
   std::function<MakePicturePainter(PainterConfig)> make_painter =
       device_picture_painter;  // of the frame thread, where the scene has one head
-  /// Whether that painter takes processor cores: how large pictures may be, and what they are guessed to
-  /// take.
+  /// Returns whether the painter uses processor cores; this decides the largest picture size and the guessed
+  /// drawing time.
   std::function<bool(const RenderDeviceConfig&)> is_drawn_by_processors = strandcast::is_drawn_by_processors;
-  /// What feeds the stream of a head, whose scene alone it is given; its states have the scene's codec, bound
-  /// and rate.
+  /// Makes the source of a head's stream from the configuration of that head alone. Its states must have the
+  /// scene's codec, bound and rate.
   std::function<Result<std::unique_ptr<StateSource>>(const ServerConfig&, InputHub&)> make_source =
       simulation_source;
-  /// For viewers that cannot decode the scene's codec, instead of what that names itself.
+  /// Codec for viewers that cannot decode the scene's codec, instead of that codec's own fallback.
   std::optional<std::string> fallback_codec;
-  /// Who may send to the scene's live inputs besides this machine.
+  /// Addresses, besides this machine, that may send to the scene's live inputs.
   std::vector<AddressRange> live_allowed;
   std::optional<RecordConfig> record;         // from the first state on
   std::optional<RecordFolder> record_folder;  // who controls may record into it
@@ -75,31 +75,31 @@ struct ServerCounters {
 
 class Server {
  public:
-  /// Loads the scene, opens the port and GL, and serves. Every error is one sentence for a person.
+  /// Loads the scene, opens the port and GL, and starts serving. Every error is one sentence for a person.
   static Result<std::unique_ptr<Server>> start(const ServerConfig& config);
-  /// stop(), if it was not called.
+  /// Calls stop() if it was not called.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
   uint16_t port() const;
   // Of one head, by its number; the scene's own is the first.
-  /// For readers besides the network's sessions: a recorder, a relay.
+  /// Returns the stream of a head, for readers other than network sessions, such as a recorder or a relay.
   StreamHub& hub(size_t head = 0);
   ServerCounters counters(size_t head = 0) const;
-  /// What all threads of the first head run now, and what they do not.
+  /// Returns the passes of all threads of the first head, including those that do not run.
   gl::PassReports passes() const;
-  /// As NetServer::reload_tls().
+  /// Does what NetServer::reload_tls() does.
   Status reload_tls();
-  /// As NetServer::set_tokens().
+  /// Does what NetServer::set_tokens() does.
   Status set_tokens(std::vector<AccessToken> tokens);
-  /// True once an admin has asked for the end: the owner calls stop().
+  /// Returns true once an admin has requested the shutdown; the owner must then call stop().
   bool is_shut_down_wanted() const;
-  /// Why the simulation ended by itself; nothing while all is well.
+  /// Returns why the simulation ended by itself; empty while it runs.
   std::optional<Error> failure() const;
-  /// Says goodbye to all viewers and ends all threads; at most about net.limits.close_ms and one step.
+  /// Says goodbye to all viewers and ends all threads. Takes at most about net.limits.close_ms and one step.
   void stop();
-  /// Returns after stop(), when an admin wants the end, or when the simulation ended by itself.
+  /// Returns after stop(), when an admin requests the shutdown, or when the simulation ends by itself.
   void wait();
 
  private:

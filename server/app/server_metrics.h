@@ -1,4 +1,4 @@
-// What /metrics says about simulation, encoders and viewers. Pure functions, any thread.
+// Metrics of simulation, encoders and viewers for /metrics. Pure functions, any thread.
 #pragma once
 
 #include <string>
@@ -8,17 +8,17 @@
 
 namespace strandcast {
 
-/// Prometheus text.
+/// Formats the counters as Prometheus text.
 std::string format_server_metrics(const ServerCounters& counters, const char* version);
 
-/// Prometheus text about one head.
+/// Prometheus text of one head.
 struct HeadMetrics {
   std::string head;    // its name
   std::string before;  // what there is about the process
   std::string after;
 };
-/// All of it as one text. Of one head as it is; of several each family once, its lines with the label "head",
-/// but for what is the process's own.
+/// Joins the texts of all heads. A single head's text stays unchanged. With several, each metric family
+/// appears once and its lines get the label "head", except for metrics of the process.
 std::string join_metrics(const std::vector<HeadMetrics>& heads, const std::string& process);
 
 }  // namespace strandcast

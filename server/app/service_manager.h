@@ -1,6 +1,6 @@
-// ServiceManager: what systemd, or whoever speaks as it does, gives this process and is told of it: a
-// listening socket (LISTEN_FDS), readiness, a line of status and a heartbeat (NOTIFY_SOCKET, WATCHDOG_USEC).
-// Where nobody asks it does nothing. One thread.
+// ServiceManager: talks to systemd, or a manager with the same protocol. It receives a listening socket
+// (LISTEN_FDS) and reports readiness, a status line and a heartbeat (NOTIFY_SOCKET, WATCHDOG_USEC). Does
+// nothing without a manager. One thread.
 #pragma once
 
 #include <cstdint>
@@ -12,28 +12,28 @@
 
 namespace strandcast {
 
-/// The name that a unit gives the server's socket (FileDescriptorName=).
+/// Name of the server's socket in a unit file (FileDescriptorName=).
 inline constexpr std::string_view kServiceSocketName = "strandcast";
 
 class ServiceManager {
  public:
-  /// As the environment of this process says.
+  /// Makes a manager connection from the environment of this process.
   static ServiceManager of_environment();
   ~ServiceManager();
   ServiceManager(ServiceManager&& other) noexcept;
   ServiceManager(const ServiceManager&) = delete;
   ServiceManager& operator=(const ServiceManager&) = delete;
 
-  /// Whether somebody is told anything.
+  /// Returns whether a manager listens to notifications.
   bool is_there() const { return socket_ >= 0; }
-  /// The server answers from now on.
+  /// Reports that the server answers from now on.
   void tell_ready(const std::string& status);
-  /// For people who ask how it goes; sent where it is another one than before.
+  /// Reports a status line for people; sent only if it has changed.
   void tell_status(const std::string& status);
-  /// The end has begun.
+  /// Reports that shutdown has begun.
   void tell_stopping();
-  /// A heartbeat, at half the time after which the manager would restart the process; none while the
-  /// simulation has been at one turn of its loop for longer than that, `busy_ns`.
+  /// Sends a heartbeat at half the manager's watchdog timeout. Sends none while the simulation has been in
+  /// one turn of its loop (`busy_ns`) for longer than the timeout.
   void beat(int64_t time_ns, int64_t busy_ns);
 
  private:
@@ -47,16 +47,16 @@ class ServiceManager {
   std::string status_;
 };
 
-/// A socket that was opened for us and listens. Its owner closes it.
+/// A listening socket that the manager opened. The receiver closes it.
 struct PassedSocket {
   int descriptor = -1;
   std::string address;  // numeric
   uint16_t port = 0;
 };
 
-/// The one that is called kServiceSocketName, or the only one of a manager that gives no names; nothing where
-/// none was passed to this process. BadInput where that is no listening TCP socket, or none or several have
-/// the name. Takes the variables out of the environment.
+/// Returns the socket named kServiceSocketName, or the only one if the manager gives no names; empty if none
+/// was passed. BadInput if it is not a listening TCP socket, or if not exactly one has the name. Removes the
+/// variables from the environment.
 Result<std::optional<PassedSocket>> take_passed_socket();
 
 }  // namespace strandcast

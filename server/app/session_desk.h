@@ -1,6 +1,5 @@
-// SessionDesk: what the application does with sessions: lets them in, gives each a demand on the stream,
-// passes on what they send, and changes them between strands and frames. Network thread, unless said
-// otherwise.
+// SessionDesk: the application's side of sessions: admits them, gives each a demand on the stream, forwards
+// their messages, and changes them between strands and pictures. Network thread, unless stated otherwise.
 #pragma once
 
 #include <atomic>
@@ -28,15 +27,15 @@
 
 namespace strandcast {
 
-/// 16 hex digits, others at every start of a server or a relay.
+/// Returns 16 hex digits that differ at every start of a server or relay.
 std::string make_start_id();
 
-/// The message of an asset. LimitExceeded where none is large enough.
+/// Makes the message of an asset. LimitExceeded if the asset is too large for a message.
 Result<EncodedFramePtr> make_asset_frame(const SceneAsset& asset);
 
 class SessionDesk : public NetHandler {
  public:
-  /// What outlives it. `asset` is the message for who gets strands.
+  /// Objects that must outlive the desk. `asset` is the message for viewers of strands.
   struct Parts {
     const SceneDesc& scene;
     StreamHub& hub;
@@ -49,30 +48,31 @@ class SessionDesk : public NetHandler {
     LiveDesk* live = nullptr;             // null: no live inputs
     size_t head = 0;                      // number of this one among those of the server
     std::vector<std::string> heads = {};  // names of all where there are several
-    /// The scene with all heads, as it runs; nothing where it is none.
+    /// Returns the scene with all heads as it runs; empty if there is no scene.
     std::function<std::optional<SceneDesc>()> whole_scene = {};
     RecordDesk* records = nullptr;             // null: nothing is recorded here
     const RecordDesks* all_records = nullptr;  // of all heads, where there are several
   };
   explicit SessionDesk(Parts parts);
 
-  /// Before `net` starts; it outlives the sessions.
+  /// Connects the desk to the network before `net` starts; `net` must outlive the sessions.
   void connect(NetServer& net);
-  /// Lines for /metrics besides the network's own; from any thread.
+  /// Sets the function that returns further lines for /metrics; any thread may call it.
   void set_metrics(std::function<std::string()> metrics) { metrics_ = std::move(metrics); }
 
   // From any thread.
   uint32_t viewer_count() const { return viewers_.viewer_count(); }
   bool is_shut_down_wanted() const { return is_shut_down_wanted_; }
-  /// The message of the newest.
+  /// Returns the message of the newest asset.
   EncodedFramePtr asset() const;
-  /// To every session, what it sees of what is recorded filled in; call about twice a second.
+  /// Sends the status to every session, with the recording's state that the session may see; call it about
+  /// twice a second.
   void tell_status(ServerStatus status);
-  /// To those who asked for them; likewise.
+  /// Sends the states' times to sessions that requested them; call it about twice a second.
   void tell_state_times();
-  /// To relays, where something else is simulated; likewise.
+  /// Sends relays the list of streams if the simulated strands have changed; call it about twice a second.
   void tell_streams();
-  /// Parameters that are other, to who watches them; call after each change.
+  /// Sends changed parameters to the sessions that watch them; call it after each change.
   void tell_parameters();
 
   Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) override;

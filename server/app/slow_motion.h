@@ -1,5 +1,5 @@
-// Slow motion: the simulation takes longer than the time that it simulates. When that lasts a person is told,
-// with the settings that cost least to look at and what each of them gains. Pure logic: times are passed in.
+// Detects slow motion: the simulation takes longer than the time that it simulates. If it lasts, viewers are
+// told which settings are least visible and how much each of them saves. Pure logic: times are passed in.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace strandcast {
 
 struct ServerCounters;
 
-/// Simulated per real time below this, for so long, is slow motion.
+/// Slow motion begins when simulated time per real time stays below this factor for this long.
 inline constexpr double kSlowFactor = 0.95;
 inline constexpr int64_t kSlowNs = 2'000'000'000;
 
@@ -20,8 +20,8 @@ class SlowMotionWatch {
  public:
   enum class Change { None, Began, Ended };
 
-  /// Takes the factor of now. Slow motion also ends only when the factor was back for kSlowNs; a pause ends
-  /// it without a word.
+  /// Updates with the current factor. Slow motion ends after the factor was back to normal for kSlowNs; a
+  /// pause ends it without a report.
   Change update(double realtime_factor, bool is_paused, int64_t time_ns);
   bool is_slow() const { return is_slow_; }
 
@@ -31,7 +31,7 @@ class SlowMotionWatch {
   int64_t turned_ns_ = 0;
 };
 
-/// Where the time of one simulation step goes, ms, on all threads together.
+/// Time of one simulation step by its parts, ms, summed over all threads.
 struct StepWork {
   double simulate_ms = 0.0;  // all substeps
   double publish_ms = 0.0;   // reading back and rounding
@@ -41,7 +41,7 @@ struct StepWork {
 
   double total_ms() const { return simulate_ms + publish_ms + encode_ms + picture_ms; }
 };
-/// Of a scene as it runs, with its substeps and rates of now.
+/// Returns the work of a scene as it runs, with its current substeps and rates.
 StepWork work_per_step(const SceneDesc& scene, const ServerCounters& now);
 
 struct WayOut {
@@ -50,19 +50,20 @@ struct WayOut {
   bool is_live = false;  // strandcast-ctl set does it, else it needs a start with --set
 };
 inline constexpr size_t kShownWaysOut = 2;
-/// A setting that saves less than this share of the work is no way out.
+/// Smallest share of the work that a setting must save to be suggested.
 inline constexpr double kLeastSaved = 0.05;
 
-/// The strand model that costs least, as sim_bench measures it at 10,000 x 32 on two cores, without a GPU.
+/// The cheapest strand model, and its cost as sim_bench measures it at 10,000 x 32 on two cores without a
+/// GPU.
 inline constexpr const char* kCheapestSolver = "dftl";
 inline constexpr double kCheapestSolverMsPerVertex = 4.5 / 320'000;
 
-/// The first kShownWaysOut settings that save something: those that alone bring real time back, then others,
-/// in each those that are seen least first.
+/// Returns the first kShownWaysOut suggestions. Settings that suffice alone for real time come first, then
+/// the others; within each group the least visible come first.
 std::vector<WayOut> ways_out(const SceneDesc& scene, const StepWork& work);
 
-/// "Slow motion: the simulation runs at 0.57 of real time; ...", for log and viewers; without the factor
-/// where it is real time again and not yet for long.
+/// Returns the text for log and viewers: "Slow motion: the simulation runs at 0.57 of real time; ...". The
+/// factor is omitted if real time was reached again, but not for long yet.
 std::string slow_motion_text(double realtime_factor, const SceneDesc& scene, const StepWork& work);
 
 }  // namespace strandcast

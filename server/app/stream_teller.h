@@ -1,5 +1,4 @@
-// StreamTeller: tells relays which streams of strands there are, when they join and when there are others.
-// Any thread.
+// StreamTeller: tells relays the list of strand streams when they join and when it changes. Any thread.
 #pragma once
 
 #include <functional>
@@ -12,12 +11,12 @@ namespace strandcast {
 
 class StreamTeller {
  public:
-  /// Before anybody joins; `net` outlives the sessions.
+  /// Sets the network before any session joins; `net` must outlive the sessions.
   void connect(NetServer& net) { net_ = &net; }
   StreamList list() const;
-  /// All relays hear of it where it is another one then; before any frame that is published later.
+  /// Edits the list. If it has changed, all relays are told before any frame that is published later.
   void change(const std::function<void(StreamList&)>& edit);
-  /// From now on a relay, which is sent the list behind its Welcome.
+  /// Adds a relay, which is sent the list after its Welcome.
   void add(SessionId session);
   void remove(SessionId session);
 

@@ -1,6 +1,6 @@
-// Which codecs strands are served by, and which of them a viewer gets: one whose decoder runs the
-// simulation's own steps only where that is affordable, else its fallback. Chosen when the viewer joins, and
-// again when its decoding turns out too slow or other steps are simulated. Pure logic.
+// Chooses which of the served codecs a viewer gets. A codec that predicts, so that its decoder runs the
+// simulation's own steps, is used only where that is affordable; other viewers get its fallback. Chosen when
+// the viewer joins, and again when decoding turns out too slow or the simulated steps change. Pure logic.
 #pragma once
 
 #include <cstddef>
@@ -15,24 +15,25 @@
 
 namespace strandcast {
 
-/// Of one core of the viewer, what predicting may take.
+/// Largest share of one core of the viewer that prediction may take.
 inline constexpr double kPredictionShare = 0.5;
-/// A link that carries the fallback so many times over needs no fewer bytes.
+/// Factor by which a link must exceed the fallback's bytes for the fallback to be used, since fewer bytes
+/// then bring nothing.
 inline constexpr double kWideLink = 4.0;
 
-/// Decoding by a codec that predicts may take so much of the time between two states that come,
+/// Largest share of the time between received states that a predicting decoder may take.
 inline constexpr double kSlowDecodeShare = 1.2 * kPredictionShare;
-/// and more for less than so long; then the viewer gets the fallback.
+/// Time for which decoding may exceed that share; then the viewer gets the fallback.
 inline constexpr int64_t kSlowDecodeNs = 4'000'000'000;
-/// After a change of what is simulated, viewers report for so long what was before: their medians are of the
-/// last kStageWindow states.
+/// Time after a change of the simulation during which viewers still report old medians, which cover the last
+/// kStageWindow states.
 inline constexpr int64_t kSettledDecodeNs = 10'000'000'000;
 
-/// The codec of this name, and behind it its fallback where both take states on the same lattice: one state
-/// is published for both. At most kMaxServedCodecs. NotFound for an unknown name.
+/// Returns the named codec, followed by its fallback if both use states on the same lattice, because one
+/// state is published for both. At most kMaxServedCodecs. NotFound for an unknown name.
 Result<std::vector<StrandCodecInfo>> served_codecs(const StrandCodecInfo& codec, float bound_m);
 
-/// What decides; what is 0 is unknown.
+/// Facts that decide the choice; 0 means unknown.
 struct ViewerCodecFacts {
   std::string wish;               // as in Hello
   double step_ns = 0.0;           // as in Hello, or in a ViewerReport since; 0 = it cannot predict
@@ -49,29 +50,29 @@ struct ViewerCodec {
   size_t codec = 0;    // of those served
   std::string reason;  // a sentence for the viewer and the log
 };
-/// `served`: as served_codecs() gives them.
+/// Chooses a viewer's codec; `served` must come from served_codecs().
 ViewerCodec choose_viewer_codec(const std::vector<StrandCodecInfo>& served, const ViewerCodecFacts& facts);
 
-/// How one viewer gets on with its codec; what is 0 is unknown.
+/// A viewer's decoding cost with its codec; 0 means unknown.
 struct DecodeLoad {
   double decode_ms = 0.0;  // of a state, as in its newest ViewerReport
   double states_hz = 0.0;  // that come; 0 = it gets no strands now
 };
 
-/// Who gets which of `served`: a sentence for --explain.
+/// Returns a sentence for --explain about which viewers get which of the `served` codecs.
 std::string explain_viewer_codecs(const std::vector<StrandCodecInfo>& served);
 
-/// Follows one viewer: from a codec that predicts it goes to the fallback when it decodes too slowly, unless
-/// it asked for that codec. It comes back only after another solver, or another number of substeps, is
-/// simulated, when all is chosen anew; so it is when it has learnt to predict.
+/// Follows one viewer. If a predicting codec decodes too slowly, the viewer goes to the fallback, unless it
+/// asked for that codec. It is chosen anew only when another solver or another number of substeps is
+/// simulated, or when the viewer has become able to predict.
 class ViewerCodecWatch {
  public:
-  /// What was chosen when it joined, and by which facts.
+  /// Starts with the choice that was made when the viewer joined, and its facts.
   ViewerCodecWatch(ViewerCodecFacts facts, size_t codec) : facts_(std::move(facts)), codec_(codec) {}
 
-  /// As of the last choice.
+  /// Returns the facts of the last choice.
   const ViewerCodecFacts& facts() const { return facts_; }
-  /// Call often. `facts` of now; the codec from now on, if it is another.
+  /// Checks the choice; call it often with current `facts`. Returns the new codec if it changes.
   std::optional<ViewerCodec> look(const std::vector<StrandCodecInfo>& served, const ViewerCodecFacts& facts,
                                   const DecodeLoad& load, int64_t time_ns);
 

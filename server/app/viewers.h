@@ -1,5 +1,5 @@
-// Viewers: chooses which of strands and pictures each session gets, and demands it of the stream. What it
-// gets stands in its Subscription and nowhere else. Network thread; the count may be read from any thread.
+// Viewers: chooses strands or pictures for each session and sets its demand on the stream. A session's choice
+// is stored only in its Subscription. Network thread; the count may be read from any thread.
 #pragma once
 
 #include <atomic>
@@ -18,13 +18,13 @@
 
 namespace strandcast {
 
-/// At most one ModeRequest of a viewer is carried out in this time.
+/// Shortest time between two changes that a viewer requests by ModeRequest.
 inline constexpr int64_t kModeRequestNs = 1'000'000'000;
-/// A change whose first frame does not come in this time is given up.
+/// Time after which a change is abandoned if its first frame has not come.
 inline constexpr int64_t kModeChangeNs = 20'000'000'000;
 
 RenderSize scene_picture_size(const SceneDesc& scene);
-/// The scene's camera and quality at this size, in the best codec of those that are decodable.
+/// Returns the scene's camera and quality at this size, in the best of the `decodable` codecs.
 PictureView make_scene_view(const SceneDesc& scene, const RenderSize& size, PictureCodecs decodable);
 
 class Viewers {
@@ -34,60 +34,63 @@ class Viewers {
     std::string reason;  // of the mode, for a person
     RenderSize size;
   };
-  /// What a viewer of frames gets.
+  /// Pictures that a viewer gets: its class and its step on the quality ladder.
   struct Pictures {
     PictureClass picture_class = 0;
     PictureView view;
   };
 
-  /// `desk` outlives this.
+  /// Makes an empty set; `desk` must outlive it.
   Viewers(const SceneDesc& scene, DemandDesk& desk) : scene_(scene), desk_(desk) {}
 
-  /// Of those who join from now on, until they say their own.
+  /// Sets the camera of viewers that join from now on, until they send their own.
   void set_scene_camera(const CameraDesc& camera) { scene_.camera = camera; }
-  /// A Source gets a place too, without any stream. Unavailable while too many pictures are drawn for others,
-  /// BadInput for a size that cannot be drawn.
-  /// `subscription` is filled in, and outlives the session's place here.
+  /// Adds a session; a Source gets an entry without any stream. Fills in `subscription`, which must outlive
+  /// the entry. Unavailable while too many pictures are drawn for others, BadInput for a size that cannot be
+  /// drawn.
   Result<Place> add(SessionId session, ReaderId reader, Subscription& subscription, const Hello& hello);
-  /// Its reader is the caller's to remove; 0 for an unknown session.
+  /// Removes a session and returns its reader, which the caller must remove; 0 for an unknown session.
   ReaderId remove(SessionId session);
-  /// Where a session comes from, for describe().
+  /// Notes a session's address for describe().
   void note_address(SessionId session, const std::string& address);
-  /// For the log: number, role, name and address.
+  /// Describes a session for the log: number, role, name and address.
   std::string describe(SessionId session) const;
-  /// Of a viewer of strands it is kept for later. NotFound for a session that views nothing.
+  /// Sets a viewer's camera; for a viewer of strands it is stored for later. NotFound for a session that
+  /// views nothing.
   Status set_camera(SessionId session, const CameraDesc& camera);
-  /// Whom a command about cameras concerns.
+  /// Sessions that a command about cameras concerns.
   struct Aimed {
     std::vector<SessionId> movable;
     std::vector<SessionId> own;  // keep their own
   };
-  /// `whose` 0: all that view but `by`. NotFound names those that view.
+  /// Returns the sessions a camera command is aimed at; `whose` 0 means all viewers except `by`. NotFound
+  /// lists the viewers.
   Result<Aimed> aimed_at(SessionId by, SessionId whose) const;
 
-  /// What the viewer says of itself; the newest counts.
+  /// Stores the newest report of a viewer about itself.
   void set_report(SessionId session, const ViewerReport& report);
   ViewerReport report(SessionId session) const;
-  /// What the person wants; of requests within kModeRequestNs the newest counts.
+  /// Notes the mode that the person wants; of requests within kModeRequestNs only the newest counts.
   void request_mode(SessionId session, StreamMode mode);
   bool has_request(SessionId session) const;
-  /// Call often: may begin or give up a change in the subscription. What to tell the session.
+  /// Begins or abandons a change of mode in the subscription if needed; call it often. Returns the message
+  /// for the session, if any.
   std::optional<ModeChange> consider(SessionId session, const ModeFacts& facts, int64_t time_ns);
-  /// A change is done.
+  /// Notes that a change of mode is complete.
   void note_mode(SessionId session, int64_t time_ns);
 
-  /// Moves the viewer along its ladder, in its subscription. NotFound for a session without pictures,
-  /// Unavailable as in PictureViews; it then keeps what it had.
+  /// Moves a viewer along its quality ladder, in its subscription. NotFound for a session without pictures.
+  /// Unavailable as in PictureViews; then nothing changes.
   Result<Pictures> set_picture_step(SessionId session, size_t step);
-  /// Nothing for a session without pictures.
+  /// Returns a viewer's pictures; empty for a session without pictures.
   std::optional<Pictures> pictures(SessionId session) const;
 
-  /// The session has put another strand class into its subscription; it joins with class 0.
+  /// Notes that the session's subscription has another strand class; it joins with class 0.
   void note_strand_class(SessionId session);
-  /// The size of its pictures.
+  /// Returns the size of a session's pictures.
   RenderSize picture_size(SessionId session) const;
 
-  /// All who watch.
+  /// Returns the number of viewers.
   uint32_t viewer_count() const { return viewer_count_; }
 
  private:

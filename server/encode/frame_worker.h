@@ -1,7 +1,7 @@
-// FrameWorker: a thread that decodes the strand stream as a client would, draws it for the viewers who asked
-// for frames and encodes the pictures: one drawing per camera and size, one encode per picture class, and
-// each view gets a fair share of the time (picture_turns.h). It sleeps while there are none, and nothing
-// waits for it. All functions from any thread.
+// FrameWorker: a thread that decodes the strand stream like a client, draws it for viewers of pictures and
+// encodes the pictures. It draws once per camera and size and encodes once per picture class. Each view gets
+// a fair share of the time (picture_turns.h). It sleeps while there are no views, and nothing waits for it.
+// All functions from any thread.
 #pragma once
 
 #include <condition_variable>
@@ -45,7 +45,7 @@ struct FrameCounters {
   double encode_median_ms = 0.0;
 };
 
-/// A picture in which nothing changed for so many periods is sent once more, finely.
+/// Number of periods without change after which a picture is sent once more at the finest quality.
 inline constexpr uint32_t kStillPeriods = 5;
 
 struct FrameWorkerConfig {
@@ -56,58 +56,59 @@ struct FrameWorkerConfig {
 class FrameWorker {
  public:
   struct Hooks {
-    /// Takes a frame of one picture class (PictureViews), on the worker's thread.
+    /// Receives the frames of all picture classes (PictureViews), on the worker's thread.
     std::function<void(uint32_t picture_class, PicturePtr picture)> sink;
-    /// Asks whoever encodes strands for a keyframe, on any thread.
+    /// Requests a keyframe from the strand encoder, on any thread.
     std::function<void()> request_keyframe;
-    /// Asks them for one more state, the newest at this time (now_ns()): the next drawing begins when it is
-    /// there. Without it they give what they have. May be empty.
+    /// Requests one more state, the newest at this time (now_ns()); the next drawing begins when it has come.
+    /// If empty, the encoder sends all states.
     std::function<void(int64_t not_before_ns)> request_state;
-    /// Called on the worker's thread when one class cannot be drawn; it is left out until its view changes.
-    /// May be empty.
+    /// Reports, on the worker's thread, that one class cannot be drawn; it is left out until its view
+    /// changes. May be empty.
     std::function<void(uint32_t picture_class, const Error& error)> on_refused;
-    /// Called on the worker's thread for each class when its pictures keep their look because the newest
-    /// cannot be drawn. May be empty.
+    /// Reports, on the worker's thread, that a class keeps its look because the newest cannot be drawn. May
+    /// be empty.
     std::function<void(uint32_t picture_class, const Error& error)> on_look_refused;
-    /// Called once, on the worker's thread, when no frames can be drawn any more (no GL, say). May be empty.
+    /// Reports once, on the worker's thread, that no frames can be drawn any more, for example without GL.
+    /// May be empty.
     std::function<void(const Error& error)> on_failure;
   };
 
   /// Starts the thread.
   FrameWorker(std::unique_ptr<StrandDecoder> decoder, MakePicturePainter make_painter,
               FrameWorkerConfig config, Hooks hooks);
-  /// Ends the thread after the frame that is being drawn.
+  /// Ends the thread after the current frame.
   ~FrameWorker();
   FrameWorker(const FrameWorker&) = delete;
   FrameWorker& operator=(const FrameWorker&) = delete;
 
-  /// Every strand frame in the order of the chain. Returns at once; dropped while there are no views.
+  /// Offers every strand frame, in the order of the chain. Returns at once; frames are dropped while there
+  /// are no views.
   void offer(EncodedFramePtr strand_frame);
-  /// What to draw from now on, by picture class; none: the painter is destroyed and strand frames are not
-  /// needed.
+  /// Sets what is drawn from now on, by picture class. Without views the painter is destroyed, and strand
+  /// frames are not needed.
   void set_views(std::map<uint32_t, PictureView> views);
-  /// What pictures look like from now on; what stands is drawn again. Before the first call as the painter is
-  /// made.
+  /// Sets the look from now on and redraws current pictures. Before the first call it is that of the painter.
   void set_look(const LookDesc& look);
-  /// Gives the newest picture of a class again, for viewers that have none; video at the next keyframe that
-  /// may be made. Ignored for unknown classes, and before the first picture.
+  /// Sends the newest picture of a class again, for viewers that have none; for video, at the next permitted
+  /// keyframe. Ignored for unknown classes and before the first picture.
   void request_whole(uint32_t picture_class);
-  /// Something else is to be seen, though no strand frame came: what stands is drawn again.
+  /// Redraws current pictures without a new strand frame, because something else has changed.
   void redraw();
-  /// True while strand frames must be offered.
+  /// Returns true while strand frames must be offered.
   bool has_views() const;
 
-  /// Why no frames can be had; nothing while all is well.
+  /// Returns why no frames can be drawn; empty while they can.
   std::optional<Error> failure() const;
   FrameCounters counters() const;
-  /// Of the states that were drawn since the last call those that hold a newer motion sample than the one
-  /// before, the newest kMaxPictureMotions.
+  /// Returns the states drawn since the last call that hold a newer motion sample than the one before; at
+  /// most the newest kMaxPictureMotions.
   std::vector<PictureMotion> take_motions();
-  /// What the thread runs and how long it takes; empty while there is nothing to draw.
+  /// Returns the passes of the thread with their times; empty while there is nothing to draw.
   gl::PassReports passes() const;
 
  private:
-  /// One class's progress.
+  /// Progress of one class.
   struct Drawn {
     PictureView view;
     std::unique_ptr<PictureEncoder> encoder;  // null until the first picture of this size and codec
@@ -122,7 +123,7 @@ class FrameWorker {
     bool is_whole_wanted = false;
     bool is_refused = false;  // this view cannot be drawn
   };
-  /// What other threads left for the worker.
+  /// Work that other threads have left for the worker.
   struct Job {
     std::deque<EncodedFramePtr> strand_frames;
     std::map<uint32_t, PictureView> views;

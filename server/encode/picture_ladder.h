@@ -1,5 +1,5 @@
-// The ladder of picture classes for one view: what a viewer on a slower link gets instead. First the quality
-// falls, then the rate, then the size. Pure data, any thread.
+// Quality ladder of one view: the picture classes that a viewer on a slower link gets instead. First the
+// quality falls, then the rate, then the size. Pure data, any thread.
 #pragma once
 
 #include <cstdint>
@@ -16,12 +16,12 @@ struct PictureStep {
   double relative_cost = 1.0;  // bytes per second against the first step
 };
 
-/// Best first; the usual quality is one of them.
+/// Returns the steps, best first; `usual_quality` is one of them.
 std::vector<PictureStep> make_picture_ladder(PictureCodec codec, int usual_quality);
-/// The first step of this quality.
+/// Returns the first step of this quality.
 size_t find_step(const std::vector<PictureStep>& ladder, int quality);
 
-/// What a video of this quality may take per pixel and picture.
+/// Returns the bits per pixel and picture that a video of this quality may take.
 double video_bits_per_pixel(int quality);
 
 }  // namespace strandcast

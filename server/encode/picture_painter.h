@@ -20,15 +20,16 @@ namespace strandcast {
 class PicturePainter {
  public:
   virtual ~PicturePainter() = default;
-  /// Shared, so that what a painter keeps of the last snapshot cannot be mistaken for another's: ticks come
-  /// again after a reset. BadInput and LimitExceeded concern this view alone; after any other error nothing
-  /// can be painted any more.
+  /// Paints a snapshot. It is shared so that a painter can keep the last one and recognise it by identity,
+  /// since ticks repeat after a reset. BadInput and LimitExceeded concern this view alone; after any other
+  /// error nothing can be painted any more.
   virtual Result<Image> paint(const std::shared_ptr<const Snapshot>& snapshot, const PictureView& view) = 0;
-  /// From the next picture on. On an error the look of before stays, and painting goes on.
+  /// Changes the look from the next picture on. After an error the previous look stays and painting
+  /// continues.
   virtual Status set_look(const LookDesc&) { return {}; }
-  /// Of the newest picture.
+  /// Returns the measurements of the newest picture.
   virtual RenderProfile profile() const { return {}; }
-  /// What it runs to paint.
+  /// Returns the passes that the painter runs.
   virtual gl::PassReports passes() const { return {}; }
 };
 
@@ -40,10 +41,10 @@ struct PainterConfig {
   LookDesc look;
 };
 
-/// The line of the copy from the device to the processor.
+/// Returns the report line of the copy from the device to the processor.
 gl::PassReport read_back_report(const StageTimer& timer);
 
-/// A maker of painters with a device of their own (common/render/render_device.h).
+/// Returns a maker of painters with a device of their own (common/render/render_device.h).
 MakePicturePainter device_picture_painter(PainterConfig config);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// What the frame thread runs, as passes: it follows the strand frames, paints, and codes. Values, any thread.
+// Passes of the frame thread: it follows the strand frames, paints and encodes. Values, any thread.
 #pragma once
 
 #include <array>
@@ -12,17 +12,17 @@
 
 namespace strandcast {
 
-/// Of the frame thread's own work; its painter has its own.
+/// Timers of the frame thread's own work; the painter has its own.
 struct PictureTimers {
   StageTimer decode;                                       // strand frames
   std::array<StageTimer, kPictureCodecs.size()> encode{};  // by codec
 };
 
-/// `painted`: what the painter runs. A codec that is not `wanted` runs for nobody.
+/// Returns the passes; `painted` are those of the painter. Codecs that are not in `wanted` do not run.
 gl::PassReports picture_passes(const PictureTimers& timers, const gl::PassReports& painted,
                                PictureCodecs wanted);
 
-/// The same before there is a frame thread. BadInput for an asset that cannot be drawn.
+/// Returns the passes before there is a frame thread. BadInput for an asset that cannot be drawn.
 Result<gl::PassReports> plan_picture_passes(const SceneAsset& asset, const LookDesc& look, RendererKind kind,
                                             PictureCodecs wanted);
 

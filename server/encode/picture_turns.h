@@ -1,5 +1,5 @@
-// PictureTurns: how often each view may be drawn when there is not time enough for all, so that a view that
-// costs little keeps its rate beside views that cost much. Pure arithmetic on measured times, any thread.
+// PictureTurns: decides how often each view may be drawn when time does not suffice for all. A cheap view
+// keeps its rate beside expensive ones. Pure arithmetic on measured times, any thread.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +8,13 @@
 
 namespace strandcast {
 
-/// A drawing that takes longer than so many periods of another view holds that one up: nothing interrupts it.
-/// A view that cannot be drawn at its rate even alone has the period at which it can.
+/// A drawing that takes longer than this many periods of another view blocks that view, because nothing
+/// interrupts it. A view that cannot reach its rate even alone counts with the period that it can reach.
 inline constexpr double kBlockingPeriods = 2.0;
-/// Share of the time that such drawings take together while others need less.
+/// Share of the time for all blocking drawings together, while other views need less.
 inline constexpr double kBlockingShare = 0.25;
 
-/// What one view asks for.
+/// Demand of one view.
 struct PictureLoad {
   double cost_ms = 0.0;    // of one drawing with all its encodes; 0 = not known yet
   double period_ms = 0.0;  // from drawing to drawing, at the rate that it should have
@@ -25,18 +25,18 @@ struct PictureTurn {
   bool is_blocking = false;  // its drawings hold others up
 };
 
-/// Max-min fair: a view that needs no more than an even share gets all it needs, and the others divide what
-/// is left evenly, whatever one drawing of theirs costs. Where some block others, they divide kBlockingShare.
-/// One turn for each load.
+/// Divides the time max-min fairly. Views that need at most an even share get what they need, and the others
+/// divide the rest evenly, whatever one drawing costs. If some views block others, the blocking ones divide
+/// kBlockingShare. Returns one turn per load.
 std::vector<PictureTurn> share_drawing_time(std::span<const PictureLoad> loads);
 
-/// When one view was drawn, and when it is due again.
+/// When one view was drawn last, and when it is due next.
 class PictureSchedule {
  public:
-  /// A drawing begins; times between two of them as in PictureTurn.
+  /// Notes the beginning of a drawing; `spacing_ns` is the time between two drawings as in PictureTurn.
   void begin(int64_t time_ns, int64_t spacing_ns);
-  /// 0 before the first drawing. A view that had to wait for others makes up for it as far as its period
-  /// allows.
+  /// Returns when the view is due; 0 before the first drawing. A view that had to wait catches up as far as
+  /// its period allows.
   int64_t due_ns(int64_t spacing_ns, int64_t period_ns) const;
 
  private:
@@ -44,16 +44,17 @@ class PictureSchedule {
   int64_t owed_ns_ = 0;  // by how much the newest drawing was late
 };
 
-/// Something that waits to be drawn or encoded.
+/// A view that waits to be drawn or encoded.
 struct PictureWait {
   int64_t due_ns = 0;
   int64_t deadline_ns = 0;  // when its next turn is due
 };
-/// Of two that are due the one with the earlier deadline, else the one that is due first.
+/// Returns whether `a` precedes `b`: if both are due, the earlier deadline; otherwise, the one that is due
+/// first.
 bool goes_before(const PictureWait& a, const PictureWait& b, int64_t time_ns);
 
-/// How long blocking views rest after one of them took `cost_ms`, so that kBlockingShare holds for views
-/// whose cost nobody knew.
+/// Returns how long blocking views must rest after one of them took `cost_ms`, so that kBlockingShare holds
+/// even for views of unknown cost.
 double blocking_rest_ms(double cost_ms);
 
 }  // namespace strandcast

@@ -1,7 +1,7 @@
-// PictureViews: which pictures the server draws. Viewers with the same camera, size, quality, rate and codec
-// share one picture class, which is encoded once; classes with the same camera and size are drawn once. There
-// are few, because each drawing costs a whole rendered frame, and nobody can take them all. Pure bookkeeping,
-// one thread.
+// PictureViews: decides which pictures the server draws. Viewers with equal camera, size, quality, rate and
+// codec share a picture class, which is encoded once. Classes with equal camera and size are drawn once.
+// Their number is limited because each drawing costs a whole rendered frame, and no client can take all of
+// them. Pure bookkeeping, one thread.
 #pragma once
 
 #include <cstdint>
@@ -19,41 +19,43 @@ namespace strandcast {
 
 inline constexpr size_t kMaxPictureViews = 8;     // different cameras and sizes
 inline constexpr size_t kMaxPictureClasses = 16;  // encoders
-/// Kept for the scene's own picture: one class for each codec. Nobody's wishes take it from the others.
+/// Classes reserved for the scene's own picture, one for each codec; no viewer's wishes can take them.
 inline constexpr size_t kReservedPictureClasses = std::size(kPictureCodecs);
-/// What one address may take, whatever its roles.
+/// Limits of one address, whatever the roles of its sessions.
 inline constexpr size_t kMaxPictureViewsOfPeer = kMaxPictureViews / 2;
 inline constexpr size_t kMaxPictureClassesOfPeer = kMaxPictureClasses / 2;
 
-/// What a pixel takes while it is drawn: 2 x 2 samples of colour and depth, and the driver's copies of the
-/// picture. Of the one view that is being drawn. Measured with llvmpipe.
+/// Memory per pixel while drawing: 2 x 2 samples of colour and depth, and the driver's copies of the picture.
+/// Only one view is drawn at a time. Measured with llvmpipe.
 inline constexpr uint64_t kDrawnPixelBytes = 110;
-/// And in each class: its picture and what its encoder refers to, by estimate 20 to 40 by codec.
+/// Memory per pixel of each class for its picture and its encoder's references; the latter are estimated at
+/// 20 to 40 by codec.
 inline constexpr uint64_t kClassPixelBytes = 40;
 
-/// How many pixels a device is good for.
+/// Numbers of pixels that a device can draw.
 struct PictureBudget {
   uint64_t picture_pixels = 0;  // of one picture; a larger one is drawn smaller
   uint64_t all_pixels = 0;      // of all classes but the reserved ones
-  /// Of those, what viewers may take; the rest is kept for whoever controls.
+  /// Returns the pixels that viewers may take together; the rest is kept for controllers.
   constexpr uint64_t viewer_pixels() const { return all_pixels * 3 / 4; }
-  /// What one address may take, whatever its roles.
+  /// Returns the pixels that one address may take, whatever the roles of its sessions.
   constexpr uint64_t peer_pixels() const { return all_pixels / 2; }
-  /// What all this takes, the reserved classes included, by estimate.
+  /// Returns the estimated memory of the whole budget, including the reserved classes.
   constexpr uint64_t most_bytes() const {
     return picture_pixels * kDrawnPixelBytes +
            (all_pixels + kReservedPictureClasses * picture_pixels) * kClassPixelBytes;
   }
 };
 
-/// Every picture that can be asked for, and two of the largest at once.
+/// Budget with a GPU: every permitted picture, and two of the largest at once.
 inline constexpr PictureBudget kHardwareBudget{uint64_t{kMaxPictureWidth} * kMaxPictureHeight,
                                                2 * uint64_t{kMaxPictureWidth} * kMaxPictureHeight};
-/// Without a GPU the processor draws, in its own memory, and finishes what it has begun: pictures are no
-/// larger than what it draws in a fraction of a second.
+/// Budget without a GPU, where the processor draws in its own memory and finishes what it has begun: pictures
+/// that take a fraction of a second.
 inline constexpr PictureBudget kSoftwareBudget{1280 * 720, 6 * 1280 * 720};
 
-/// The size, or where it has more pixels a smaller one of that shape. Its sides are then multiples of 4.
+/// Returns `size`, or a smaller size of the same shape if it exceeds the budget; its sides are then multiples
+/// of 4.
 RenderSize fit_picture(const RenderSize& size, const PictureBudget& budget);
 
 struct PictureView {
@@ -65,20 +67,21 @@ struct PictureView {
 };
 
 bool operator==(const PictureView& a, const PictureView& b);
-/// Whether one drawing serves both.
+/// Returns whether one drawing serves both views.
 bool look_alike(const PictureView& a, const PictureView& b);
 
-/// BadInput for a size or quality out of range and a camera that is not finite or looks at its own place.
+/// Returns BadInput for a size or quality out of range, and for a camera that is not finite or sits on its
+/// target.
 Status validate(const PictureView& view);
 
-/// Whose wish a picture is: what the shares go by.
+/// The viewer that wants a picture, and the properties by which shares are counted.
 struct PictureOwner {
   uint64_t viewer = 0;
   std::string peer;            // address, or what counts as one
   bool is_controller = false;  // or more
 };
 
-/// What some classes need; the reserved ones are left out.
+/// Resources that a set of classes needs, without the reserved ones.
 struct PictureUse {
   size_t views = 0;
   size_t classes = 0;
@@ -87,25 +90,25 @@ struct PictureUse {
 
 class PictureViews {
  public:
-  /// `reserved` is the scene's own picture: in any codec there is always room for it.
+  /// Makes an empty set; `reserved` is the scene's own picture, for which there is always room in any codec.
   PictureViews(PictureView reserved, const PictureBudget& budget);
   const PictureBudget& budget() const { return budget_; }
-  /// Before the first class.
+  /// Sets the budget; call it before the first class.
   void set_budget(const PictureBudget& budget);
 
-  /// The scene's own picture is taken from here from now on. Whoever has one from where it was keeps it, and
-  /// counts like others then: the scene's own has room while all of them are within the limits.
+  /// Changes the camera of the scene's own picture. Viewers of the previous one keep it and then count like
+  /// others. The scene's picture has room while all views are within the limits.
   void set_reserved_camera(const CameraDesc& camera) { reserved_.camera = camera; }
 
-  /// Gives the viewer a class: that of an equal view, else a new one. Call again when its camera changes: a
-  /// viewer alone in its class keeps the class. Unavailable while a limit above is reached, and the viewer
-  /// then keeps what it had; BadInput for a view that cannot be drawn, or has not been made to fit.
+  /// Assigns a viewer the class of an equal view, or a new one. Call it again when the camera changes: a
+  /// viewer alone in its class keeps the class. Unavailable if a limit is reached; the viewer then keeps what
+  /// it had. BadInput for a view that cannot be drawn or exceeds the budget.
   Result<uint32_t> assign(const PictureOwner& owner, const PictureView& view);
-  /// Ignored for unknown viewers.
+  /// Removes a viewer; ignored if it is unknown.
   void remove(uint64_t viewer);
-  /// 0 for unknown viewers.
+  /// Returns a viewer's class; 0 for unknown viewers.
   uint32_t class_of(uint64_t viewer) const;
-  /// By class; class numbers start at 1 and are never used again.
+  /// Returns the views by class; class numbers start at 1 and are never reused.
   std::map<uint32_t, PictureView> views() const;
   size_t viewer_count() const { return members_.size(); }
 

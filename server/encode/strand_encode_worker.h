@@ -1,4 +1,4 @@
-// StrandEncodeWorker: a thread that encodes the newest snapshot once for everybody who watches strands, and
+// StrandEncodeWorker: a thread that encodes the newest snapshot once for all viewers of strands, and
 // keyframes for those who join. Nothing is encoded while nobody listens. All functions from any thread.
 #pragma once
 
@@ -29,7 +29,7 @@ struct StrandEncodeCounters {
   double keyframe_median_ms = 0.0;
 };
 
-/// What one strand class encodes of the published states.
+/// How one strand class encodes the published states.
 struct StrandEncodeConfig {
   uint16_t stream_id = 0;     // of its frames
   uint32_t rate_divisor = 1;  // at most one state per so many simulation steps
@@ -38,52 +38,55 @@ struct StrandEncodeConfig {
   float quantum_m = 0.0f;     // states on another published lattice are left out; 0 = all are taken
 };
 
-/// The newest state is encoded after this long even if its turn has not come: the simulation is paused.
+/// Time after which the newest state is encoded even if its turn has not come, because the simulation is
+/// paused.
 inline constexpr std::chrono::milliseconds kLongestStateWait{250};
 
-/// The snapshot on a lattice that is `factor` times coarser; adds at most `factor` times the error it has
-/// already.
+/// Returns the snapshot on a lattice that is `factor` times coarser; the error grows by at most `factor`
+/// times the present one.
 Snapshot coarsen(const Snapshot& snapshot, uint32_t factor);
 
-/// Who is there for the frames of a class.
+/// Which readers the frames of a class have.
 enum class StrandListeners {
   None,       // nothing is encoded
   OnRequest,  // whoever draws pictures: a state when it asks for one (request_state)
   All,        // every state of the class's rate
 };
 
-/// "encode/strands" for the first class, "encode/strands_3" for stream 3.
+/// Returns the report line: "encode/strands" for the first class, "encode/strands_3" for stream 3.
 gl::PassReport strand_encode_report(uint16_t stream_id, bool has_listeners, const StageTimer& timer);
 
 class StrandEncodeWorker {
  public:
-  /// Called on the worker's thread, frames in the order of the chain: the keyframe of sequence s comes after
-  /// delta s and before delta s + 1, so whoever starts with it goes on with delta s + 1. send_time_ns is set.
-  /// A state that is encoded again for those who join while nothing moves has a sequence of its own.
+  /// Receives frames on the worker's thread, in the order of the chain, with send_time_ns set. The keyframe
+  /// of sequence s comes after delta s and before delta s + 1, so a decoder continues from it with delta s +
+  /// 1. A state that is encoded again for joiners while nothing moves gets a new sequence number.
   using Sink = std::function<void(EncodedFramePtr)>;
 
-  /// Starts the thread. `slot` outlives the worker.
+  /// Starts the thread. `slot` must outlive the worker.
   StrandEncodeWorker(SnapshotSlot& slot, std::unique_ptr<StrandEncoder> encoder, Sink sink,
                      StrandEncodeConfig config = {});
-  /// Ends the thread after the encode that is under way.
+  /// Ends the thread after the current encode.
   ~StrandEncodeWorker();
   StrandEncodeWorker(const StrandEncodeWorker&) = delete;
   StrandEncodeWorker& operator=(const StrandEncodeWorker&) = delete;
 
-  /// From None to others the chain goes on with a keyframe of the newest snapshot.
+  /// Sets the readers. When the first readers come, the chain continues with a keyframe of the newest
+  /// snapshot.
   void set_listeners(StrandListeners listeners);
-  /// From the next state on; stream_id stays. States of the old lattice are left out from here on.
+  /// Changes the coding from the next state on; stream_id stays. States of the old lattice are skipped from
+  /// then on.
   void change(const StrandEncodeConfig& config);
-  /// Asks for a keyframe and returns at once. It comes with the next state, or with the present one when no
-  /// other is published soon. Requests that come before it is made share it; later ones for the same state
-  /// get the same frame again.
+  /// Requests a keyframe and returns at once. It comes with the next state, or with the present one if no
+  /// other is published soon. Requests made before it share it; later requests for the same state get the
+  /// same frame.
   void request_keyframe();
-  /// Asks for one state that is newer than the last one, the newest from `not_before_ns` (now_ns()) on. Of
-  /// requests that wait the earliest counts. Without meaning for those who get all states.
+  /// Requests one state newer than the last one: the newest from `not_before_ns` (now_ns()) on. Of several
+  /// requests the earliest counts. Has no effect for listeners of all states.
   void request_state(int64_t not_before_ns);
 
   StrandEncodeCounters counters() const;
-  /// The line of its work among the passes.
+  /// Returns the report line of the encoder's work.
   gl::PassReport pass() const;
 
  private:

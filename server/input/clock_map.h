@@ -1,4 +1,4 @@
-// Maps one source's clock to the server's from one-way traffic. Pure arithmetic; not thread-safe.
+// ClockMap: maps one source's clock to the server's, from one-way traffic. Pure arithmetic; not thread-safe.
 #pragma once
 
 #include <array>
@@ -9,13 +9,12 @@
 namespace strandcast {
 inline constexpr int64_t kClockWindowS = 10;
 
-/// The fastest sample on its way within the last kClockWindowS tells the offset best: arrival minus sample
-/// time is clock offset plus delay, and only the delay varies. Its smallest value removes the jitter and
-/// leaves the smallest delay, so that samples never map after their arrival. The window lets slow clock drift
-/// be followed.
+/// Estimates the offset from the fastest sample within the last kClockWindowS. Arrival minus sample time is
+/// clock offset plus delay, of which only the delay varies. Its minimum removes jitter and retains the
+/// smallest delay, so no sample maps to a time after its arrival. The window follows slow clock drift.
 class ClockMap {
  public:
-  /// Notes a sample; `arrival_ns` never decreases.
+  /// Adds a sample; `arrival_ns` must not decrease.
   void add(int64_t sample_ns, int64_t arrival_ns) {
     const int64_t second = arrival_ns / kSInNs;
     Bucket& bucket =
@@ -28,7 +27,7 @@ class ClockMap {
       if (other.is_used && second - other.second < kClockWindowS && other.smallest_ns < offset_ns_)
         offset_ns_ = other.smallest_ns;
   }
-  /// Server clock minus source clock, ns.
+  /// Returns server clock minus source clock, ns.
   int64_t offset_ns() const { return offset_ns_; }
   int64_t to_source_ns(int64_t server_ns) const { return server_ns - offset_ns_; }
 

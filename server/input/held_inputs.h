@@ -1,7 +1,7 @@
-// HeldInputs: samples that wait for the simulated time that they are for, where simulation time runs on
-// demand (lockstep). Of a source the first sample is for the time that the simulation is at, and its clock
-// goes on from there: when a message arrives then says nothing, only that it came before the next step.
-// Bounded. Not thread-safe; pure logic.
+// HeldInputs: samples that wait for their simulated time, when simulation time runs on demand (lockstep). The
+// first sample of a source is for the present simulated time, and later ones follow the source's clock. So
+// the arrival time of a message does not matter, as long as it comes before its step. Bounded. Not
+// thread-safe; pure logic.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,11 @@
 
 namespace strandcast {
 
-/// Of all sources together.
+/// Largest number of held samples of all sources together.
 inline constexpr size_t kMaxHeldSamples = 65'536;
-/// A source whose clock jumps by more than this begins anew at the time of the simulation.
+/// Clock step beyond which a source begins anew at the simulation's time.
 inline constexpr int64_t kHeldClockJumpNs = 1'000'000'000;
-/// Sample times are rounded to nanoseconds by whoever made them.
+/// Tolerance for sample times that senders have rounded to nanoseconds.
 inline constexpr int64_t kHeldSlackNs = 1'000;
 
 class HeldInputs {
@@ -31,14 +31,15 @@ class HeldInputs {
     std::shared_ptr<const WindSamples> wind = {};
   };
 
-  /// Takes the samples of a message; gives how many found no room. `time_ns` is the simulation's.
+  /// Takes the samples of a message and returns how many were dropped because the limit was reached.
+  /// `time_ns` is the simulation's time.
   uint64_t hold(uint64_t source_id, const MotionSamples& samples, int64_t time_ns);
   uint64_t hold(uint64_t source_id, const WindSamples& samples, int64_t time_ns);
-  /// It sends no more; what waits of it stays.
+  /// Notes that a source sends no more; its waiting samples stay.
   void leave(uint64_t source_id);
-  /// Takes out what is for times up to `time_ns`, oldest first.
+  /// Removes and returns the samples for times up to `time_ns`, oldest first.
   std::deque<Due> take_due(int64_t time_ns);
-  /// Forgets the sources that have left and of which nothing waits; gives which.
+  /// Forgets sources that have left and have no waiting samples, and returns their ids.
   std::vector<uint64_t> take_left();
 
  private:

@@ -1,4 +1,4 @@
-// InputFrame: what the world does to the hair up to a given time, merged from all input streams. Plain data.
+// InputFrame: head motion and wind at a given time, merged from all input streams. Plain data.
 #pragma once
 
 #include <cstdint>

@@ -1,31 +1,28 @@
 // InputHub: merges head motion and wind from any number of network sources into one InputFrame per simulation
 // step. Any thread may call any function; each holds one short lock. Does no I/O, reads no clock and never
-// waits: the same calls give the same frames.
+// waits: equal calls give equal frames.
 //
 // Policy (the numbers are the constants below):
 // * A source's clock is mapped to the server's by the fastest sample of the last 10 s (clock_map.h), so that
 //   network jitter does not reach the hair. A source clock that steps by more than kClockJumpNs starts a new
 //   mapping.
-// * One source at a time drives the head, and one the wind: the first that sends a possible sample, until it
-//   is removed or has been silent for kMotionStaleNs / kWindStaleNs. Samples of others are refused meanwhile.
-// * Between two samples the pose is interpolated (lerp, slerp); when none is later the newest is held, so
-//   that live feeding adds no delay. Without motion for kMotionStaleNs the frame says so and the last pose
-//   stays. Without wind for kWindStaleNs the scene's own wind returns.
+// * One source at a time drives the head, and one the wind. It is the first that sends a valid sample, until
+//   it is removed or silent for kMotionStaleNs / kWindStaleNs. Meanwhile samples of others are refused.
+// * Between two samples the pose is interpolated (lerp, slerp). If no sample is later, the newest is held, so
+//   that live feeding adds no delay. Without motion for kMotionStaleNs the frame is marked stale and the last
+//   pose stays. Without wind for kWindStaleNs the scene's own wind returns.
 // * Refused and counted: samples not newer than the newest one used, duplicates, impossible values, more than
 //   kMaxSampleRateHz per source and kind, more than kMaxInputSources sources. Buffers are bounded; the oldest
-//   samples go first.
-// * A source that slows its motion to go with a slow simulation says how much; the frame has what it said
-//   last.
-// * Joints of the body come with the head's samples: one owner, one time, interpolated likewise where two
-// samples
-//   name the same joints; never across a jump of the head.
-// * A jump beyond kTeleportSpeedMps or kTeleportTurnRadPerS between samples, or between frames, is carried
-//   out in one frame, flagged as a teleport and never interpolated.
-// * Two changes are teleports however short the way: to the first pose of another source, or of one whose
-// clock
-//   stepped; and to now, where a source falls silent and goes on. In the latter the frame shows more than
-//   kCatchUpNs beyond the time that passed, and more than kCatchUpSpacings of what is usual between its
-//   samples.
+//   samples are dropped first.
+// * A source that slows its motion to match a slow simulation reports its rate; the frame holds the last
+//   reported one.
+// * Joints of the body come with the head's samples and have the same owner and times. They are interpolated
+//   if both samples name the same joints, but never across a jump of the head.
+// * A jump beyond kTeleportSpeedMps or kTeleportTurnRadPerS between samples or frames is carried out in one
+//   frame, flagged as a teleport and never interpolated.
+// * Two changes are teleports however short they are. One is the first pose of another source, or of one
+//   whose clock stepped. The other is the return of a source that was silent: the frame then advances by more
+//   than kCatchUpNs beyond the elapsed time, and by more than kCatchUpSpacings of the usual sample spacing.
 #pragma once
 
 #include <cstdint>
@@ -61,7 +58,7 @@ inline constexpr double kMaxSampleBurst = 1000.0;  // samples at once, after a s
 inline constexpr size_t kMaxInputSources = 64;
 inline constexpr size_t kKeptSourceTimes = 1024;  // of the newest samples that were used
 
-/// What happened to samples since the start.
+/// Counts of samples since the start, by what happened to them.
 struct InputCounters {
   uint64_t accepted = 0;
   uint64_t late = 0;
@@ -76,7 +73,7 @@ struct InputCounters {
   uint64_t rejected() const { return late + duplicate + impossible + over_rate + not_owner; }
 };
 
-/// What a sample says: the head, and joints of the body below it.
+/// Content of a sample: the head's pose, and joints of the body below it.
 struct HeadSample {
   Pose pose;
   std::shared_ptr<const std::vector<std::string>> joint_names;  // of one message; null = none
@@ -85,35 +82,34 @@ struct HeadSample {
 
 class InputHub {
  public:
-  /// From now on each sample waits for the simulated time that it is for (held_inputs.h), and times given to
-  /// sample() are simulated ones. Before anything else.
+  /// Makes samples wait for their simulated time (held_inputs.h); sample() then takes simulated times. Call
+  /// it before all else.
   void hold_samples();
 
-  /// Takes samples of one message; `source_id` is the session's, `arrival_ns` the server clock when it was
-  /// read.
+  /// Takes the samples of one message. `source_id` is the session's; `arrival_ns` is the server clock when it
+  /// was read.
   void push(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns);
   void push(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns);
 
-  /// What this source says of the head is shown so much later, so that there is a sample after as well as one
-  /// before: 0 until told. Lasts until told otherwise.
+  /// Delays a source's head motion by `delay_ns`, so that samples exist before and after each used time.
+  /// Initially 0; lasts until the next call.
   void set_delay(uint64_t source_id, int64_t delay_ns);
 
-  /// Forgets a source. The head keeps its last pose (stale at once); the scene's own wind returns.
+  /// Removes a source. The head keeps its last pose (stale at once); the scene's own wind returns.
   void remove_source(uint64_t source_id);
 
-  /// The inputs at a server time, for one simulation step. `motion_time_ns` of the frame is the server's
-  /// clock at the arrival of the newest motion sample used, so that a viewer can tell its age through the
-  /// whole pipeline.
+  /// Returns the inputs at a server time, for one simulation step. `motion_time_ns` is the server clock at
+  /// the arrival of the newest motion sample used, so that viewers can tell its age.
   InputFrame sample(int64_t server_time_ns);
 
-  /// When the sample was made that arrived then and was used, of several the newest: on the server's clock,
-  /// but for what the fastest of its source take on their way. 0 = not known, or long ago.
+  /// Returns when the used sample with this arrival time was made (the newest of several), on the server's
+  /// clock. It is late by the delay of the source's fastest sample. 0 = not known, or too long ago.
   int64_t source_time_ns(int64_t arrival_ns) const;
 
   InputCounters counters() const;
 
  private:
-  /// Samples a source may still send: a bucket that fills at kMaxSampleRateHz.
+  /// Samples that a source may still send: a token bucket that fills at kMaxSampleRateHz.
   struct Allowance {
     double samples = kMaxSampleBurst;
     int64_t updated_ns = 0;

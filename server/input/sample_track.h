@@ -1,4 +1,4 @@
-// Bounded buffer of timed samples of one stream, in time order. Not thread-safe.
+// SampleTrack: bounded buffer of one stream's timed samples, in time order. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -24,8 +24,8 @@ class SampleTrack {
  public:
   using Sample = TimedSample<Value>;
 
-  /// Puts a sample in its place. Late: not newer than the newest one already used. At most
-  /// kMaxBufferedSamples stay; the oldest goes first.
+  /// Inserts a sample in time order. Late: not newer than the newest sample already used. At most
+  /// kMaxBufferedSamples are kept; the oldest is dropped first.
   InsertOutcome insert(const Sample& sample) {
     if (sample.time_ns <= newest_used_ns_)
       return sample.time_ns == newest_used_ns_ ? InsertOutcome::Duplicate : InsertOutcome::Late;
@@ -42,14 +42,15 @@ class SampleTrack {
     return InsertOutcome::Accepted;
   }
 
-  /// Index of the last sample at or before `time_ns`, or 0 when all are later. The track is not empty.
+  /// Returns the index of the last sample at or before `time_ns`, or 0 if all are later. The track must not
+  /// be empty.
   size_t index_at(int64_t time_ns) const {
     size_t index = samples_.size() - 1;
     while (index > 0 && samples_[index].time_ns > time_ns) --index;
     return index;
   }
 
-  /// Marks everything up to `newest` as used and forgets what is older than `oldest`.
+  /// Marks everything up to index `newest` as used and drops what is older than index `oldest`.
   void use(size_t oldest, size_t newest) {
     if (samples_[newest].time_ns > newest_used_ns_) newest_used_ns_ = samples_[newest].time_ns;
     samples_.erase(samples_.begin(), samples_.begin() + static_cast<std::ptrdiff_t>(oldest));

@@ -1,6 +1,5 @@
-// What is done with the strands of a block that is published, in one walk while they are in cache: are their
-// numbers usable, are they stretched, where are they in head space and on the lattice. Any thread; the same
-// bits from every instruction set.
+// Processes the strands of a block in one pass while they are in cache: checks their numbers and stretch, and
+// converts positions to head space and to the lattice. Any thread; the same bits from every instruction set.
 #pragma once
 
 #include <array>
@@ -11,10 +10,10 @@
 
 namespace strandcast {
 
-/// Of the strands of a block.
+/// Results of the checks for each strand of a block.
 struct BlockFindings {
   std::array<int32_t, kBlockStrands> bad_vertices{};  // without a usable position or velocity
-  /// Segments that are longer than longest_squared_m2 says, or have no length that is a number.
+  /// Segments that exceed longest_squared_m2 or whose length is not finite.
   std::array<int32_t, kBlockStrands> stretched_segments{};
   bool has_bad = false;
   bool has_stretched = false;
@@ -24,14 +23,15 @@ struct BlockQuantise {
   StrandBlocksView position_m;  // world axes
   StrandBlocksView velocity_mps;
   float reach_m = 0.0f;  // farther from the head along an axis no position is usable
-  /// (blocks x vertex_count x 16) for the segment before each vertex; nullptr: stretch is not looked at.
+  /// Squared limit of the segment before each vertex, (blocks x vertex_count x 16); nullptr: stretch is not
+  /// checked.
   const float* longest_squared_m2 = nullptr;
   /// Columns of the rotation.
   std::array<std::array<double, 3>, 3> head_from_world{};
   float quantum_m = 0.0f;
   BlockFindings* findings = nullptr;  // (blocks)
-  /// (3 x vertex_count x strand_count) as Snapshot::lattice: what quantise() of common/strands/snapshot.h
-  /// gives for the same positions. Of a strand with bad vertices any number.
+  /// Output, (3 x vertex_count x strand_count) as Snapshot::lattice; equals quantise() of
+  /// common/strands/snapshot.h. Values of strands with bad vertices are arbitrary.
   int32_t* lattice = nullptr;
 };
 

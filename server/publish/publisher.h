@@ -1,8 +1,8 @@
-// Publisher: reads the solver's state back and makes a Snapshot of it (head space, quantised). A strand with
-// a vertex that is no usable number, or that stays stretched beyond what its model does, is quarantined: it
-// is published at rest, and repair() puts the solver's copy back to rest relative to the head. Its neighbours
-// keep every bit. One walk over the strands, a block at a time, shared with the workers where there are many.
-// Used on the simulation thread; holds no GL objects of its own.
+// Publisher: reads back the solver's state and makes a Snapshot of it (head space, quantised). A strand with
+// a non-finite or runaway vertex, or with lasting stretch beyond its model's, is quarantined. It is published
+// at rest, and repair() resets the solver's copy to rest relative to the head; its neighbours keep every bit.
+// One pass over the strands, in blocks, shared with the workers if there are many. Simulation thread; holds
+// no GL objects of its own.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@
 
 namespace strandcast {
 
-/// No hair reaches farther from the head joint along any axis: a vertex beyond it has left the simulation.
+/// Largest distance of hair from the head joint along any axis; a vertex beyond it has left the simulation.
 inline constexpr float kMaxStrandReachM = 10.0f * kMaxGroomExtentM;
 
 // A strand is over-stretched when one segment is longer than at rest by more than this times the row's
@@ -28,12 +28,12 @@ inline constexpr float kMaxStrandReachM = 10.0f * kMaxGroomExtentM;
 // of a mean one where that is longer, so that segments of nearly no length do not count.
 inline constexpr double kOverstretchPerBound = 4.0;
 inline constexpr double kLeastOverstretch = 0.5;
-/// Simulated time for which a strand may stay over-stretched; a jolt is over by then.
+/// Simulated time for which a strand may stay over-stretched; longer than a jolt lasts.
 inline constexpr int64_t kOverstretchPatienceNs = 250'000'000;
-/// Beyond this no shape is left to come back to: quarantined at once.
+/// Relative stretch at which a strand is quarantined at once, because its shape is lost.
 inline constexpr double kRunawayStretch = 20.0;
 
-/// Relative stretch that a strand may keep up; at least kLeastOverstretch.
+/// Returns the relative stretch that a strand may keep; at least kLeastOverstretch.
 double overstretch_limit(double stretch_bound);
 
 struct PublishInput {
@@ -46,7 +46,7 @@ struct PublishInput {
   std::shared_ptr<const StepTrail> trail = {};  // for Snapshot
 };
 
-/// What publishing runs on; changes no bit.
+/// Resources for publishing; they change no bit.
 struct PublishMeans {
   WorkerPool* workers = &shared_workers();
   simd::InstructionSet set = simd::widest_set();
@@ -54,40 +54,40 @@ struct PublishMeans {
 
 class Publisher {
  public:
-  /// `groom` is uniform; `quantum_m` is the step of the lattice to publish on (lattice_step_m() of the
+  /// Makes a publisher for a uniform `groom`; `quantum_m` is the lattice step (lattice_step_m() of the
   /// codec).
   Publisher(const Groom& groom, float quantum_m, const PublishMeans& means = {});
 
-  /// Both stages. The memory of snapshots that nobody has any more is used again.
+  /// Runs both stages: read() and quantise(). Reuses the memory of snapshots that nobody holds any more.
   std::shared_ptr<const Snapshot> publish(Solver& solver, const PublishInput& input) {
     read(solver);
     return quantise(input);
   }
-  /// The state to the processor; waits for the device.
+  /// Reads the state back to the processor; waits for the device.
   void read(Solver& solver);
-  /// What was read, as it is published: quarantine, head space, the lattice. The solver has not been called
-  /// since.
+  /// Makes the snapshot from what read() returned: quarantine, head space, lattice. The solver must not have
+  /// been called in between.
   std::shared_ptr<const Snapshot> quantise(const PublishInput& input);
 
-  /// From now on strands that stretch beyond overstretch_limit() are quarantined as well. `stretch_bound` as
-  /// in SolverRow. Without this call stretch is not looked at.
+  /// Enables quarantine of strands that stretch beyond overstretch_limit(). `stretch_bound` as in SolverRow.
+  /// Without this call stretch is not checked.
   void watch_stretch(double stretch_bound);
 
-  /// Strands that the last publish() found broken or over-stretched, ascending. Valid until the next
-  /// publish().
+  /// Returns the strands that the last publish() found broken or over-stretched, ascending. Valid until the
+  /// next publish().
   std::span<const uint32_t> quarantined() const { return quarantined_; }
-  /// Puts the solver's quarantined strands to rest under the head pose of the last publish(), and leaves the
-  /// others untouched. Call before the next substep when quarantined() is not empty.
+  /// Resets the solver's quarantined strands to rest under the head pose of the last publish(). Call it
+  /// before the next substep if quarantined() is not empty.
   void repair(Solver& solver);
 
-  /// Vertices without a usable position or velocity, since start.
+  /// Returns the number of vertices without a usable position or velocity, since start.
   uint64_t bad_vertex_count() const { return bad_vertex_count_; }
-  /// Strands put back to rest because they had no usable numbers, since start; one may count many times.
+  /// Returns how often strands were reset because of unusable numbers, since start.
   uint64_t quarantine_count() const { return quarantine_count_; }
-  /// Strands put back to rest because they had stretched too far, since start.
+  /// Returns how often strands were reset because of stretch, since start.
   uint64_t overstretch_count() const { return overstretch_count_; }
   float quantum_m() const { return quantum_m_; }
-  /// From the next publish() on.
+  /// Changes the lattice step from the next publish() on.
   void set_quantum_m(float quantum_m) { quantum_m_ = quantum_m; }
 
  private:

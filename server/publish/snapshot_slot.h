@@ -1,5 +1,5 @@
-// SnapshotSlot: the newest published state, handed from the simulation thread to any number of readers.
-// Latest wins: a slow reader skips states and never holds up the writer. Any thread.
+// SnapshotSlot: passes the newest published state from the simulation thread to any number of readers. A slow
+// reader skips states and never delays the writer. Any thread.
 #pragma once
 
 #include <chrono>
@@ -36,8 +36,8 @@ class SnapshotSlot {
     return view_;
   }
 
-  /// Waits until `is_ready(view)` or stop(). `is_ready` runs under the slot's lock: short, and no calls back
-  /// into it.
+  /// Waits until `is_ready(view)` or stop(). `is_ready` runs under the slot's lock, so it must be short and
+  /// must not call the slot.
   template <class IsReady>
   View wait(IsReady is_ready) const {
     std::unique_lock lock(mutex_);
@@ -45,7 +45,7 @@ class SnapshotSlot {
     return view_;
   }
 
-  /// As wait(), but returns after `timeout` at the latest.
+  /// Waits like wait(), but at most for `timeout`.
   template <class IsReady>
   View wait_for(std::chrono::nanoseconds timeout, IsReady is_ready) const {
     std::unique_lock lock(mutex_);
@@ -53,14 +53,14 @@ class SnapshotSlot {
     return view_;
   }
 
-  /// Makes every waiting reader look again: call after changing what its `is_ready` depends on.
+  /// Makes every waiting reader check again; call it after changing what its `is_ready` depends on.
   void notify() {
     // A reader between its check and its sleep holds the lock; this cannot slip in between.
     { const std::lock_guard lock(mutex_); }
     changed_.notify_all();
   }
 
-  /// Wakes all readers for good.
+  /// Wakes all readers permanently.
   void stop() {
     {
       const std::lock_guard lock(mutex_);

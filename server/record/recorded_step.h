@@ -1,4 +1,4 @@
-// A step as the simulation takes it, and as a recording has it. Pure functions, any thread.
+// Converts steps between the simulation's form and that of a recording. Pure functions, any thread.
 #pragma once
 
 #include "common/wire/recording_messages.h"

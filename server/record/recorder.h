@@ -1,5 +1,5 @@
-// Recorder: a reader of the stream, and a tap of the simulation, that puts both into a recording. Whoever
-// calls it only hands over; a thread of its own makes chunks, and another one writes them (RecordFile).
+// Recorder: records the stream as its reader, and the simulation as its tap. Callers only queue data; one
+// thread makes chunks, and another writes them (RecordFile).
 #pragma once
 
 #include <atomic>
@@ -23,17 +23,17 @@
 
 namespace strandcast {
 
-/// What may wait for the recorder's thread: states and frames by their bytes, all else by number.
+/// Limits of what may wait for the recorder's thread: bytes of states and frames, number of other items.
 inline constexpr uint64_t kMaxRecorderBytes = 64u << 20;
 inline constexpr size_t kMaxRecorderItems = 1u << 16;
 inline constexpr int64_t kRecordFlushNs = 1'000'000'000;
-/// Keyframes are so far apart at least, in time of the simulation, and no farther than that what may have to
-/// be decoded to see a moment takes about kRecordSeekMs of a processor: one takes as many bytes as many
-/// seconds of deltas.
+/// Intervals of keyframes. The first is the shortest, in simulated time. The second is the processor time
+/// that decoding up to any moment may take; it bounds the longest interval. A keyframe takes as many bytes as
+/// many seconds of deltas.
 inline constexpr int64_t kRecordKeyframeNs = 2'000'000'000;
 inline constexpr double kRecordSeekMs = 170.0;
-/// Of a vertex of a frame by codecs that do not predict, by one that does but for its steps, and of one in a
-/// step of dftl; scrub_bench says what they come to.
+/// Decoding costs per vertex: of a frame without prediction, of a predicted frame without its steps, and of a
+/// step of dftl. Measured by scrub_bench.
 inline constexpr double kRecordDecodeNs = 36.0;
 inline constexpr double kRecordPredictedNs = 21.0;
 inline constexpr double kRecordStepNs = 10.0;
@@ -62,29 +62,29 @@ class Recorder : public StreamReader, public StepTap {
  public:
   /// Makes the file; errors as RecordFile::make().
   static Result<std::unique_ptr<Recorder>> make(const RecordConfig& config);
-  /// stop(); without begin() nothing is left behind.
+  /// Calls stop(); a recording without begin() leaves no file.
   ~Recorder() override;
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  /// Reads all states, inputs and strands of the scene's codec from now on; what comes waits for begin().
-  /// The hub outlives its stop(), or it.
+  /// Subscribes to all states, inputs and strands of the scene's codec; they are queued until begin(). The
+  /// hub must exist until stop() or until the recorder is destroyed.
   Status attach(StreamHub& hub);
-  /// The start says what it is of; times and codec are filled in here.
+  /// Begins the recording. `start` describes it; times and codec are filled in here.
   void begin(RecordingStart start, EncodedFramePtr asset);
   void add(const ServerStatus& status);
-  /// What decoding a step takes, in steps of dftl; 1 to begin with. Any thread.
+  /// Sets the cost of decoding a step relative to one of dftl; initially 1. Any thread.
   void set_step_cost(double steps) { step_cost_ = steps; }
-  /// Takes nothing more, from whomever: what is in it goes up to one moment. Any thread.
+  /// Accepts nothing more from any caller, so that all recorded data ends at one moment. Any thread.
   void refuse();
-  /// Reads no more, closes the file and says what is in it; no longer the tap of anything.
+  /// Unsubscribes, closes the file and logs its content; afterwards it is no longer a tap.
   void stop();
 
   RecordCounters counters() const;
   const std::filesystem::path& path() const { return config_.path; }
-  /// What is in the file: "3.2 MB, 750 states up to step 812, 748 frames, nothing lost".
+  /// Describes the file: "3.2 MB, 750 states up to step 812, 748 frames, nothing lost".
   std::string summary() const;
-  /// Why it ended by itself; nothing while all is well.
+  /// Returns why recording ended by itself; empty while it runs.
   std::optional<Error> failure() const { return file_->failure(); }
 
   void on_strands(const EncodedFramePtr& frame) override;

@@ -1,5 +1,5 @@
-// Replay: simulates a recording's scene again, with the inputs and changes of each step as they were taken,
-// and compares every state's hash. Its simulation has no readers and goes by no clock.
+// Replay: simulates a recording's scene again with the recorded inputs and changes, and compares the hash of
+// every state. The simulation has no readers and follows no clock.
 #pragma once
 
 #include <atomic>
@@ -32,7 +32,7 @@ struct ReplayConfig {
   const std::atomic<bool>* stop = nullptr;                      // set: it ends
 };
 
-/// The first state that is not what was recorded.
+/// The first state that differs from the recording.
 struct ReplayDifference {
   uint64_t tick = 0;
   std::string what;  // a sentence without its end
@@ -48,11 +48,11 @@ struct ReplayResult {
   bool is_equal() const { return compared > 0 && equal == compared && !difference && early_end.empty(); }
 };
 
-/// NotFound, BadInput or Unsupported where the recording, its scene or its hair cannot be had, or where it
-/// did not begin with the simulation.
+/// Replays a recording. NotFound, BadInput or Unsupported if the recording, its scene or its groom is
+/// unavailable, or if recording did not begin with the simulation.
 Result<ReplayResult> replay_recording(const ReplayConfig& config);
 
-/// "3600 of 3600 state hashes are equal", or where they first differ.
+/// Describes the result: "3600 of 3600 state hashes are equal", or where they first differ.
 std::string to_sentence(const ReplayResult& result);
 
 }  // namespace strandcast

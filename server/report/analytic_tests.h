@@ -1,5 +1,5 @@
-// The tests of work-precision with an exact answer: a strand model at one setting against theory. Numbers T1
-// to T18 name the tests in tables. Each runs on the GPU where the row does, else as its reference.
+// Work-precision tests with an exact answer: a strand model at one setting against theory. Tables name the
+// tests T1 to T18. A test runs with the row's kernel if it has one, otherwise with its reference.
 //
 // Not here: twisted rings (T11: a step has no such input), and the largest stable stiffness (T8:
 // strandcast-report stability).
@@ -13,7 +13,7 @@
 
 namespace strandcast {
 
-/// NaN: not measured by this test.
+/// Result of a test; NaN = not measured by this test.
 struct AnalyticResult {
   double value = std::numeric_limits<double>::quiet_NaN();
   double exact = std::numeric_limits<double>::quiet_NaN();
@@ -36,10 +36,10 @@ struct AnalyticTest {
   AnalyticResult (*run)(const Workbench& workbench, const RunSetting& setting);
 };
 
-/// All of them, in the order of their numbers.
+/// Returns all tests in the order of their numbers.
 const std::vector<AnalyticTest>& analytic_tests();
 
-/// The row has what the test needs: constants of hair, parameters for a chain, or twist.
+/// Returns whether the row has what the test needs: constants of hair, parameters for a chain, or twist.
 bool has_physics(const SolverRow& row, const AnalyticTest& test);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// How much of a head of hair moves as one: measures of strands at some moments. Pure functions in double
-// precision, any thread.
+// Coherence: how much of a head of hair moves together, from strands at some moments. Pure functions in
+// double precision, any thread.
 #pragma once
 
 #include <cstdint>
@@ -8,12 +8,12 @@
 
 namespace strandcast {
 
-/// Vertices of other strands that are nearer than this are neighbours.
+/// Distance within which vertices of other strands are neighbours.
 inline constexpr double kNeighbourReachM = 0.015;
-/// A vertex or segment with fewer neighbours is alone.
+/// Number of neighbours below which a vertex or segment counts as alone.
 inline constexpr uint32_t kLeastNeighbours = 4;
 
-/// Strands at one moment, all in one frame of reference; (vertex_count x strand_count), strand fastest.
+/// Strands at one moment in one frame of reference; (vertex_count x strand_count), strand fastest.
 struct HairMoment {
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
@@ -21,10 +21,11 @@ struct HairMoment {
   std::span<const glm::dvec3> velocity_mps;
 };
 
-/// First vertex of a strand that is measured: vertices before it go with the head. The fifth of sixteen.
+/// Returns the first vertex of a strand that is measured, for example the fifth of sixteen; earlier ones move
+/// with the head.
 uint32_t first_measured_vertex(uint32_t vertex_count);
 
-/// Sums over vertices and segments; those of several moments add up.
+/// Sums over vertices and segments; those of several moments can be added.
 struct Coherence {
   double apart_m2ps2 = 0.0;  // squared velocities relative to the neighbours' mean
   double whole_m2ps2 = 0.0;  // the same vertices' squared velocities relative to the mean of all of them
@@ -33,19 +34,21 @@ struct Coherence {
   uint64_t lone_count = 0;     // of the vertices, those that are alone
   uint64_t segment_count = 0;  // that are not alone
 
-  /// Energy of the motion against the neighbours over that against the mean of all; 0 where nothing moves.
+  /// Returns the energy of motion relative to the neighbours over that relative to the overall mean; 0 if
+  /// nothing moves.
   double incoherent_share() const;
-  /// How fast it moves against the mean of all, root mean square: a share of little motion says little.
+  /// Returns the root mean square of velocity relative to the overall mean; if it is small, the share means
+  /// little.
   double motion_mps() const;
-  /// Share of the vertices that are alone.
+  /// Returns the share of vertices that are alone.
   double lone_share() const;
-  /// 1: neighbouring segments are parallel; 0: they point anywhere, or all are alone.
+  /// Returns 1 if neighbouring segments are parallel, 0 if their directions are random or all are alone.
   double order() const;
 
   Coherence& operator+=(const Coherence& other);
 };
 
-/// Vertices without usable positions are alone. The same moment gives the same bits.
+/// Measures one moment; vertices without usable positions count as alone. Equal input gives equal bits.
 Coherence measure_coherence(const HairMoment& moment);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// The files of strandcast-report coherence: a table as CSV, plots and pictures on one page, and what it
-// prints. Pure functions of a CoherenceStudy but for saving.
+// Files of strandcast-report coherence: CSV table, page with plots and pictures, and printed text. Pure
+// functions of a CoherenceStudy, except saving.
 #pragma once
 
 #include <filesystem>
@@ -11,15 +11,15 @@ namespace strandcast {
 
 inline constexpr const char* kCoherencePage = "coherence.html";
 
-/// The tables as text, for a terminal.
+/// Returns the tables as text for a terminal.
 std::string coherence_text(const CoherenceStudy& study);
-/// A line for each row of the shake.
+/// Returns a CSV line for each row of the shake.
 std::string coherence_csv(const CoherenceStudy& study);
-/// Incoherent share of each row, as bars.
+/// Returns a bar chart of the incoherent share of each row.
 std::string coherence_bars(const CoherenceStudy& study);
-/// Incoherent share against processor time, a dot for each row.
+/// Returns a plot of the incoherent share against processor time, a dot per row.
 std::string coherence_cost_plot(const CoherenceStudy& study);
-/// Incoherent share over the time of the shake, of the main rows.
+/// Returns a plot of the incoherent share of the main rows over the time of the shake.
 std::string coherence_time_plot(const CoherenceStudy& study);
 std::string coherence_page(const CoherenceStudy& study);
 

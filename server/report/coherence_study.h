@@ -1,5 +1,6 @@
-// The measurements of strandcast-report coherence: one shake of the head for every strand model with a
-// kernel. Each runs alone and with what hair and air do to hair; measured is how much of it moves as one.
+// Measurements of strandcast-report coherence: a shake of the head for every strand model with a kernel. Each
+// model runs alone and with the forces between hairs and air; the study measures how much of the hair moves
+// together.
 #pragma once
 
 #include <functional>
@@ -15,11 +16,11 @@
 
 namespace strandcast {
 
-/// The head says no: 55 degrees to either side, 2.2 times a second.
+/// Shake of the head: amplitude to either side, and frequency.
 inline constexpr double kShakeYawDeg = 55.0;
 inline constexpr double kShakeHz = 2.2;
 
-/// A model as it is run.
+/// A model with the settings that it runs with.
 struct CoherenceRow {
   std::string name;
   std::string solver;
@@ -28,8 +29,8 @@ struct CoherenceRow {
   bool is_main = false;         // it has pictures and a line in plots
   uint32_t least_substeps = 1;  // more where its model cannot bear so few
 };
-/// Every model with a kernel alone, then `direct_rod` in all company; `is_whole`: also every model in all the
-/// company that it bears, and other step rates.
+/// Returns the rows: every model with a kernel alone, then `direct_rod` with all forces. `is_whole` adds
+/// every model with all forces that it tolerates, and other step rates.
 std::vector<CoherenceRow> coherence_rows(bool is_whole);
 
 struct CoherenceStudyDesc {
@@ -45,7 +46,7 @@ struct CoherenceStudyDesc {
   HairRealityDesc reality;
 };
 
-/// Share of one moment.
+/// Measured share at one moment.
 struct CoherenceMoment {
   double time_s = 0.0;
   double incoherent_share = 0.0;
@@ -73,18 +74,19 @@ struct CoherenceStudy {
   HairReality reality;
 };
 
-/// Rotation of the head in a shake of so long, which sets in and ends within a quarter of a second.
+/// Returns the head's pose in a shake of `shake_s`, which starts and ends smoothly within a quarter of a
+/// second.
 Pose yawed_head(double time_s, double shake_s);
 
-/// The scene of a row: that solver, without wind, with enough substeps for its stable range. Where the model
-/// knows it, the groom's shape carries all of its weight.
+/// Returns the scene of a row: its solver, no wind, and enough substeps for its stable range. If the model
+/// supports it, the groom's shape carries all of its weight.
 Result<SceneDesc> scene_of_row(const CoherenceRow& row, const SceneDesc& scene);
 
-/// One row. BadInput where the scene or the model does not bear it.
+/// Measures one row. BadInput if the scene or the model does not support it.
 Result<CoherenceOutcome> measure_row(const CoherenceStudyDesc& desc, const CoherenceRow& row,
                                      Executor& executor);
 
-/// Says what it is at, once per part.
+/// Receives a description of each part when it begins.
 using CoherenceProgress = std::function<void(const std::string&)>;
 
 Result<CoherenceStudy> run_coherence_study(const CoherenceStudyDesc& desc, Executor& executor,

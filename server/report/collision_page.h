@@ -1,5 +1,5 @@
-// The files of strandcast-report collisions: tables as CSV, plots, and one page. Pure functions of a
-// CollisionStudy but for saving.
+// Files of strandcast-report collisions: CSV tables, plots and one page. Pure functions of a CollisionStudy,
+// except saving.
 #pragma once
 
 #include <filesystem>
@@ -11,14 +11,14 @@ namespace strandcast {
 
 inline constexpr const char* kCollisionPage = "collisions.html";
 
-/// What to pick, in some sentences.
+/// Returns a recommendation in some sentences.
 std::string collision_summary(const CollisionStudy& study);
 
 std::string head_collision_csv(const CollisionStudy& study);
 std::string body_answer_csv(const CollisionStudy& study);
-/// How deep hair gets in the head against the time of a step.
+/// Returns a plot of penetration into the head against the time of a step.
 std::string head_collision_plot(const CollisionStudy& study);
-/// Likewise in the body.
+/// Returns a plot of penetration into the body against the time of a step.
 std::string body_answer_plot(const CollisionStudy& study);
 std::string collision_page(const CollisionStudy& study);
 

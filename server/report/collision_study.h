@@ -1,5 +1,5 @@
-// The measurements of strandcast-report collisions: what keeps hair out of the head, and how it answers to a
-// body that moves by itself, each by how deep hair gets against the time that it takes.
+// Measurements of strandcast-report collisions: methods that keep hair out of the head, and its responses to
+// a moving body, each by penetration depth against time.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace strandcast {
 
-/// Cells of the field that says how deep hair is in the head, whatever kept it out.
+/// Resolution of the distance field that measures the penetration for all methods.
 inline constexpr uint32_t kTrueFieldResolution = kMaxFieldResolution;
 
 struct CollisionStudyDesc {
@@ -31,14 +31,14 @@ struct CollisionStudyDesc {
   bool has_pictures = true;
 };
 
-/// How deep, m, below the clearance that hair has there as loaded.
+/// Penetration in metres, relative to the clearance of the loaded hair.
 struct CollisionDepth {
   double vertex_most_m = 0.0;
   double vertex_usual_m = 0.0;  // of all vertices and steps, 99.9 % are less deep
   double middle_most_m = 0.0;
 };
 
-/// One way to keep hair out of the head.
+/// One method of keeping hair out of the head.
 struct HeadCollision {
   std::string name;
   uint32_t resolution = 0;  // of a field; 0 = none
@@ -52,7 +52,7 @@ struct HeadCollision {
   double rest_speed_mps = 0.0;
 };
 
-/// One way for hair to answer to the body.
+/// One response of hair to the body.
 struct BodyAnswer {
   std::string name;
   double step_cpu_ms = 0.0;
@@ -72,15 +72,15 @@ struct CollisionStudy {
   Image moments;  // of the first answer; empty without pictures
 };
 
-/// Says what it is at, once per part.
+/// Receives a description of each part when it begins.
 using CollisionProgress = std::function<void(const std::string&)>;
 
-/// BadInput for a scene without a head to collide with, or with a solver that has no kernel; NotFound for the
-/// clip.
+/// Runs the study. BadInput for a scene without a head to collide with, or with a solver without a kernel;
+/// NotFound for the clip.
 Result<CollisionStudy> run_collision_study(const CollisionStudyDesc& desc, Executor& executor,
                                            const CollisionProgress& progress);
 
-/// The parts of it; `study` has solver and counts already.
+/// Run the parts of the study; `study` must already contain solver and counts.
 Status measure_head_collisions(const CollisionStudyDesc& desc, Executor& executor,
                                const CollisionProgress& progress, CollisionStudy& study);
 Status measure_body_answers(const CollisionStudyDesc& desc, Executor& executor,

@@ -1,4 +1,4 @@
-// How deep hair gets in what it collides with, and whether it rests. Any thread.
+// Measures how deep hair penetrates its colliders, and whether it is at rest. Any thread.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,7 @@
 
 namespace strandcast {
 
-/// Depths of many places over many steps.
+/// Penetration depths of many points over many steps.
 class DepthRecord {
  public:
   void add_vertex(double depth_m) { vertex_m_.push_back(depth_m > 0.0 ? depth_m : 0.0); }
@@ -24,14 +24,14 @@ class DepthRecord {
   double middle_most_m_ = 0.0;
 };
 
-/// How deep a place is that hair as loaded has there.
+/// Returns the penetration of a point whose position in the loaded hair is `groomed_m`.
 using DepthAt = std::function<double(const glm::dvec3& place_m, const glm::dvec3& groomed_m)>;
 
-/// Free vertices and the middles before them of every `stride`-th strand, seen from the head.
+/// Records the free vertices and the midpoints before them of every `stride`-th strand, in head space.
 void record_depths(const Groom& groom, const SolverState& state, const glm::dquat& world_from_head,
                    uint32_t stride, const DepthAt& depth_at, DepthRecord& record);
 
-/// Root mean square over all vertices.
+/// Returns the root mean square of the speed over all vertices.
 double speed_rms_mps(const SolverState& before, const SolverState& after, double apart_s);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// CrowdedHair: hair that acts on hair, shaken and left alone, and how it lies afterwards, seen from the head.
-// From the thread of its executor.
+// CrowdedHair: hair with forces between strands that is shaken and then left alone; measures its final state
+// in head space. Runs on its executor's thread.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace strandcast {
 
-/// What is seen of hair that should lie still.
+/// Measurements of hair that should be at rest.
 struct RestFindings {
   double speed_rms_mps = 0.0;
   double nyquist_m = 0.0;  // largest amplitude of what changes its sign from step to step, 99.9 % of vertices
@@ -25,28 +25,29 @@ struct RestFindings {
   double highest_m = 0.0;      // height of the hair above the head joint
 };
 
-/// A tuft that hangs from a disc and gets wider downwards, each strand a little in its own direction: without
-/// forces between strands it falls together. Roots are pinned.
+/// Makes a tuft that hangs from a disc and widens downwards, with a slightly different direction per strand.
+/// Without forces between strands it falls together. Roots are pinned.
 Groom make_tuft(uint32_t strand_count, uint32_t vertex_count, float length_m, uint32_t seed);
 
-/// Where a shaken head is: 3 g to and fro at 2 Hz while it says no and nods.
+/// Returns the pose of a shaken head: 3 g to and fro at 2 Hz while it turns and nods.
 Pose shaken_head(double time_s);
 
-/// The scene's solver under that head: no wind but the scene's own, and the colliders that are given.
+/// The scene's solver under that head, with the scene's own wind and the given colliders.
 class HairRun {
  public:
-  /// As SolverRow::make() and Solver::load(). `executor` outlives the run.
+  /// Makes a run; errors as SolverRow::make() and Solver::load(). `executor` must outlive it.
   static Result<HairRun> make(Executor& executor, const SceneDesc& scene, const SceneContent& content);
 
-  /// One step, with the head there at its end.
+  /// Advances one step; `world_from_head` is the pose at its end.
   void step(const Pose& world_from_head);
   double time_s() const { return static_cast<double>(tick_) / scene_.step_rate_hz; }
   const SceneDesc& scene() const { return scene_; }
   const StrandLayout& layout() const { return layout_; }
-  /// (vertex_count x strand_count) head space, m; velocities relative to the head joint, head axes.
+  /// Positions (vertex_count x strand_count) in head space, m, and velocities relative to the head joint in
+  /// head axes.
   const std::vector<glm::vec3>& position_in_head_m() const { return position_m_; }
   const std::vector<glm::vec3>& velocity_in_head_mps() const { return velocity_mps_; }
-  /// Of the simulation's thread, over all steps: processor time of the whole process.
+  /// Returns the processor time of the whole process during all steps.
   double cpu_ms() const { return cpu_ms_; }
   uint64_t steps() const { return tick_; }
 
@@ -68,18 +69,18 @@ class HairRun {
 
 class CrowdedHair {
  public:
-  /// A groom without a head; it is looked at by a volume of its own, of so many cells.
+  /// Makes a run of a groom without a head; a separate volume with `look_resolution` cells measures it.
   static Result<CrowdedHair> make(Executor& executor, const SceneDesc& scene, Groom groom,
                                   uint32_t look_resolution);
 
-  /// Shakes for so long, then holds still.
+  /// Shake the hair for `seconds`, and hold it still.
   void shake(double seconds);
   void hold(double seconds);
-  /// While it lies for so long.
+  /// Measures the hair while it lies still for `seconds`.
   RestFindings look(double seconds);
-  /// Root mean square of how far vertices are from where the groom has them.
+  /// Returns the root mean square distance of vertices from their groomed positions.
   double shape_rms_m() const;
-  /// Of all vertices from where the groom has them, head space.
+  /// Returns the mean displacement of all vertices from their groomed positions, head space.
   glm::dvec3 mean_shift_m() const;
   const HairRun& run() const { return run_; }
 

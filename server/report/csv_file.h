@@ -1,4 +1,4 @@
-// CsvFile: a table of a report as comma-separated values, RFC 4180, for spreadsheets and scripts. Any thread.
+// CsvFile: a report's table as comma-separated values (RFC 4180), for spreadsheets and scripts. Any thread.
 #pragma once
 
 #include <string>
@@ -10,9 +10,9 @@ class CsvFile {
  public:
   explicit CsvFile(std::vector<std::string> columns);
 
-  /// As many cells as there are columns.
+  /// Adds a row with one cell per column.
   void add_row(const std::vector<std::string>& cells);
-  /// Header and rows; a cell with a comma, a quote or a line break is quoted.
+  /// Returns header and rows; a cell with a comma, a quote or a line break is quoted.
   const std::string& text() const { return text_; }
 
  private:
@@ -22,7 +22,7 @@ class CsvFile {
   std::string text_;
 };
 
-/// Six significant digits; empty for NaN (not measured), "inf" for what grew without bound.
+/// Formats a number with six significant digits; empty for NaN (not measured), "inf" for unbounded growth.
 std::string csv_number(double value);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// What hair in air does, held against what is known of it: hairs and locks that lean in a steady wind, the
-// air that a bundle carries along, and a ponytail that sways over a head that goes up and down.
+// Compares simulated hair in air with known results: hairs and locks that lean in a steady wind, air carried
+// along by a bundle, and the sway of a ponytail under a head that moves up and down.
 #pragma once
 
 #include <functional>
@@ -55,19 +55,19 @@ struct HairReality {
   std::vector<Ponytail> ponytails;
 };
 
-/// Says what it is at, once per part.
+/// Receives a description of each part when it begins.
 using RealityProgress = std::function<void(const std::string&)>;
 
 Result<HairReality> measure_reality(const HairRealityDesc& desc, Executor& executor,
                                     const RealityProgress& progress);
 
-/// Lean of a limp string in a steady horizontal wind, by the law of common/kernels/volume/hair_in_air.h. Drag
-/// and weight balance across it, all along it alike, so it is straight: tan(lean) = rate x wind / g.
+/// Lean of a limp string in a steady horizontal wind by the law of common/kernels/volume/hair_in_air.h. Drag
+/// and weight balance equally along it, so it is straight: tan(lean) = rate x wind / g.
 double lawful_lean_rad(double wind_mps, double gravity_mps2);
-/// Likewise by the drag of a cylinder as published, of the flow across it alone (independence principle).
+/// The same lean by the published drag of a cylinder, of the cross flow alone (independence principle).
 double cylinder_lean_rad(double wind_mps, double gravity_mps2);
 
-/// Strands that hang limp in a steady wind, and how many hairs they stand for.
+/// Strands that hang limp in a steady wind, and the number of hairs that they represent.
 struct HangingHair {
   Groom groom;
   double hairs = 1.0;
@@ -76,8 +76,8 @@ struct HangingHair {
   uint32_t volume_cells = 32;
   HairCompany company{.has_air = true};
 };
-/// Mean angle, from straight down to where the wind goes, of the ways from the roots to the tips after they
-/// have settled.
+/// Returns the mean angle between straight down and the direction from root to tip, towards the wind, after
+/// settling.
 Result<double> lean_rad(const HangingHair& hair, Executor& executor);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// HtmlPage: one self-contained page of a report: text, tables and inline SVG, readable in a light and a dark
-// browser, without scripts and without anything from elsewhere. Any thread.
+// HtmlPage: a self-contained page of a report with text, tables and inline SVG, in light and dark mode,
+// without scripts or external resources. Any thread.
 #pragma once
 
 #include <cstddef>
@@ -35,21 +35,21 @@ class HtmlPage {
  public:
   explicit HtmlPage(std::string title);
 
-  /// A section; further calls add to it. Text is escaped.
+  /// Starts a section; further calls add to it. Text is escaped.
   void heading(std::string_view text);
   void paragraph(std::string_view text);
-  /// A paragraph that stands out: the answer to a reader's question.
+  /// Adds a highlighted paragraph with the answer to a reader's question.
   void answer(std::string_view text);
-  /// Lines to copy, in a fixed-width font.
+  /// Adds lines to copy in a fixed-width font.
   void code(std::string_view text);
   void table(const HtmlTable& table);
-  /// `svg` as made by make_svg_plot(), not escaped.
+  /// Adds a figure; `svg` comes from make_svg_plot() and is not escaped.
   void figure(std::string_view svg, std::string_view caption);
 
-  /// A JPEG, kept in the page.
+  /// Adds a JPEG, which is embedded in the page.
   void picture(std::span<const std::byte> jpeg, std::string_view caption);
 
-  /// The whole page.
+  /// Returns the whole page.
   std::string text() const;
 
  private:

@@ -1,8 +1,8 @@
-// MotionSet: strands on a moving head in gusts, what work-precision measures on besides exact solutions. Hair
-// of real constants grows from a ring about the head: straight and hanging, or curled or styled by nature,
-// which begins without weight, so that every model begins in its own equilibrium; head, wind and that weight
-// set in smoothly. The inputs of a step are made by the server's own StepBuilder. No colliders: what they add
-// depends on where vertices happen to be. Any thread; immutable.
+// MotionSet: strands on a moving head in gusts, which work-precision measures besides exact solutions. Hair
+// of real constants grows from a ring about the head: straight and hanging, or naturally curled or styled. It
+// begins without weight, so that every model begins in its own equilibrium; head motion, wind and weight set
+// in smoothly. The server's own StepBuilder makes the inputs. There are no colliders, because their effect
+// depends on the positions of vertices. Any thread; immutable.
 #pragma once
 
 #include <filesystem>
@@ -14,14 +14,14 @@
 
 namespace strandcast {
 
-/// The shape of the strands without forces.
+/// Shape of the strands without forces.
 enum class MotionHair {
   Straight,  // hangs straight down
   Curled,    // helices of two turns, 20 mm wide, about an axis that hangs down
   Styled     // leaves the head outwards and turns down in one arc of 100 degrees
 };
 inline constexpr MotionHair kMotionHairs[] = {MotionHair::Straight, MotionHair::Curled, MotionHair::Styled};
-/// "straight", "curled", "styled".
+/// Returns "straight", "curled" or "styled".
 const char* to_string(MotionHair hair);
 
 struct MotionSetOptions {
@@ -32,8 +32,8 @@ struct MotionSetOptions {
   MotionFileOptions clip_file = {};  // how to read the clip
 };
 
-/// Positions of one run at times that all rates share, kSampleS apart. (vertex_count x strand_count) each,
-/// vertex-major, head-relative world axes.
+/// Positions of one run at times that all rates share, kSampleS apart. Each has (vertex_count x strand_count)
+/// points, vertex-major, head-relative world axes.
 struct Trajectory {
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
@@ -51,23 +51,23 @@ class MotionSet {
 
   static Result<MotionSet> make(const MotionSetOptions& options);
 
-  /// The strands, cut into segments; more of them than measured are for timing.
+  /// Returns the strands, cut into segments; timing uses more strands than are measured.
   Groom groom(uint32_t vertex_count, uint32_t strand_count) const;
   Groom groom(uint32_t vertex_count) const { return groom(vertex_count, options_.strand_count); }
-  /// Hair of the reference constants in air, with its material damping.
+  /// Returns hair of the reference constants in air, with its material damping.
   RunPhysics physics() const;
   MotionHair hair() const { return options_.hair; }
-  /// Smooth in time to the second derivative; at rest and upright at 0.
+  /// Returns the head's pose: twice differentiable in time, at rest and upright at 0.
   Pose head_at(double t_s) const;
   double duration_s() const { return options_.duration_s; }
 
-  /// The whole motion at the setting's rate, a multiple of 1 / kSampleS.
+  /// Runs the whole motion at the setting's rate, which must be a multiple of 1 / kSampleS.
   Result<Trajectory> run(const Workbench& workbench, const RunSetting& setting) const {
     return run(workbench, setting, options_.strand_count);
   }
-  /// With fewer strands, a divisor of all: every so many of them.
+  /// Runs with every n-th strand only; `strand_count` must divide the number of all.
   Result<Trajectory> run(const Workbench& workbench, const RunSetting& setting, uint32_t strand_count) const;
-  /// The inputs of the first `step_count` steps, substep by substep.
+  /// Returns the inputs of the first `step_count` steps, substep by substep.
   std::vector<StepInput> inputs(const RunSetting& setting, int step_count) const;
 
  private:
@@ -82,16 +82,16 @@ class MotionSet {
   MotionClip clip_;  // empty: built in
 };
 
-/// A row of hair in double precision at its default effort.
+/// Runs a row in double precision at its default effort.
 Result<Trajectory> run_in_double(const MotionSet& motion, const std::string& solver, uint32_t vertex_count,
                                  double rate_hz);
 
-/// The rod that others are compared with: direct_rod in double precision.
+/// Runs the rod that others are compared with: direct_rod in double precision.
 Result<Trajectory> run_rod(const MotionSet& motion, uint32_t vertex_count, double rate_hz);
 
-/// Root of the mean squared distance of a run's free vertices from the reference's curve at the same share of
-/// the arc, over strands and samples, over the length; infinity when either is not finite. Of trajectories
-/// with different strand counts, one a divisor of the other, the strands that both have.
+/// Returns the RMS distance of a run's free vertices from the reference's curve at equal arc share, over
+/// strands and samples, relative to the length; infinity if either is not finite. If one strand count divides
+/// the other, only common strands are compared.
 double relative_rms(const Trajectory& run, const Trajectory& reference);
 
 }  // namespace strandcast

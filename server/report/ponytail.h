@@ -1,4 +1,4 @@
-// A jogger's ponytail: how fast sideways sway grows over a head that goes straight up and down, beside
+// A jogger's ponytail: growth rate of its sideways sway under a head that moves vertically, compared with
 // theory.
 #pragma once
 
@@ -10,7 +10,7 @@
 namespace strandcast {
 
 struct PonytailDesc {
-  /// Of the head's frequency over twice that of the ponytail's own sway.
+  /// Frequencies of the head, relative to twice that of the ponytail's own sway.
   std::vector<double> ratios = {0.7, 0.85, 1.0, 1.15, 1.4, 1.7};
   double seconds = 8.0;
   double step_rate_hz = 240.0;
@@ -18,7 +18,7 @@ struct PonytailDesc {
   double tuft_hairs = 40'000.0;  // that they stand for
 };
 
-/// How fast sideways sway grows over a head that goes up and down; below 0: it dies away.
+/// Growth rate of sideways sway under a vertically moving head; negative if it decays.
 struct PonytailSway {
   double ratio = 0.0;  // of frequencies, as PonytailDesc::ratios
   double head_hz = 0.0;
@@ -34,9 +34,9 @@ struct Ponytail {
   std::vector<PonytailSway> rows;
 };
 
-/// Growth per second of q'' + 2 decay q' + frequency^2 (1 + modulation cos(head t)) q = 0 (Mathieu). It is
-/// the logarithm of the largest Floquet multiplier over the period. A hanging string's sway obeys it under a
-/// head that goes up and down (Keller 2010): gravity and the head's acceleration act alike.
+/// Growth rate per second of q'' + 2 decay q' + frequency^2 (1 + modulation cos(head t)) q = 0 (Mathieu). It
+/// is the logarithm of the largest Floquet multiplier over the period. A hanging string's sway obeys it under
+/// a vertically moving head (Keller 2010), because the head's acceleration acts like gravity.
 struct MathieuSway {
   double frequency_radps = 0.0;
   double decay_per_s = 0.0;
@@ -45,7 +45,7 @@ struct MathieuSway {
 };
 double mathieu_growth_per_s(const MathieuSway& sway);
 
-/// A limp hair without air, and a tuft of full quality.
+/// Measures a limp hair without air, and a tuft of full quality.
 Result<std::vector<Ponytail>> measure_ponytails(const PonytailDesc& desc, Executor& executor);
 
 }  // namespace strandcast

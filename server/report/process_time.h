@@ -1,9 +1,9 @@
-// What reports time work by.
+// Clock by which reports time work.
 #pragma once
 
 namespace strandcast {
 
-/// Processor time of the whole process so far, of all its threads. Any thread.
+/// Returns the processor time of the whole process so far, over all its threads. Any thread.
 double process_cpu_ms();
 
 }  // namespace strandcast

@@ -1,7 +1,7 @@
-// What is left out of a scene because nobody wants anything of it, and what that saves: every fact that does
-// not hold is forced (RuntimeFacts::forced), and the scene runs both ways in turns under the same head
-// motion. Hair must be where it was, bit for bit. And what it costs, in millimetres and bytes, to let most
-// strands follow others. From the executor's thread.
+// Measures what leaving out unneeded parts of a scene saves. Every fact that is false is forced true
+// (RuntimeFacts::forced), and both versions run in turns under the same head motion; hair must be equal bit
+// for bit. Also measures what letting most strands follow others costs in millimetres and bytes. Runs on the
+// executor's thread.
 #pragma once
 
 #include <string>
@@ -16,7 +16,8 @@
 
 namespace strandcast {
 
-/// An OpenGL compiler may round a kernel with another part otherwise; beyond this hair is elsewhere.
+/// Tolerance for OpenGL compilers that round a kernel differently if another part is left out; a larger
+/// distance is a real difference.
 inline constexpr double kRoundingMm = 0.01;
 
 struct PruningDesc {
@@ -26,7 +27,7 @@ struct PruningDesc {
   bool has_pictures = true;  // compared at the end; what pictures take is measured too
 };
 
-/// A pass that the simulation of a scene is without.
+/// A pass that the simulation of a scene leaves out.
 struct PrunedPass {
   std::string pass;
   std::string reason;          // why it is left out
@@ -41,7 +42,7 @@ struct PrunedPass {
   std::string note;              // why it could not be forced; then nothing else is told
 };
 
-/// A pass that runs for readers only, with what it takes where there are some.
+/// A pass that runs only for readers, with its cost if there are some.
 struct ReaderPass {
   std::string pass;
   double ms = 0.0;
@@ -55,14 +56,14 @@ struct PruningRun {
   bool is_same_unread = false;            // hair after all steps, whether or not states were published
 };
 
-/// How much of the hair of a scene is simulated.
+/// Share of a scene's hair that is simulated.
 struct FollowedDesc {
   double share = 1.0;            // of the strands
   bool has_every_vertex = true;  // else as DetailLevel::FewerVertices has them, which has no volume either
   bool has_volume = false;       // the scene as it is, or without forces between strands
 };
 
-/// What a part of the hair simulated is worth against all of it.
+/// Comparison of hair that is partly simulated with hair that is fully simulated.
 struct FollowedRun {
   std::string scene;
   FollowedDesc part;
@@ -85,7 +86,7 @@ std::string pruning_text(const std::vector<PruningRun>& runs, const std::vector<
 std::string pruning_csv(const std::vector<PruningRun>& runs);
 std::string followed_csv(const std::vector<FollowedRun>& followed);
 std::string pruning_page(const std::vector<PruningRun>& runs, const std::vector<FollowedRun>& followed);
-/// A sentence for each pass that changes what is seen; empty when none does.
+/// Returns a sentence for each left-out pass that changes the result; empty if none does.
 std::vector<std::string> pruning_breaks(const std::vector<PruningRun>& runs);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// What strandcast-report coherence says of hair in air beside what is known of it. Pure functions.
+// The part of strandcast-report coherence that compares hair in air with known results. Pure functions.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace strandcast {
 
-/// The tables as text, for a terminal.
+/// Returns the tables as text for a terminal.
 std::string reality_text(const HairReality& reality);
 void add_reality(HtmlPage& page, const HairReality& reality);
 

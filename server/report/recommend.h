@@ -1,6 +1,6 @@
-// strandcast-report recommend: which strand model, at which setting, is the most exact that moves a scene's
-// strands within a time budget on this machine. Times are of the scene's own strands; errors are of the
-// motion set's hair that is nearest to them in shape.
+// strandcast-report recommend: finds the most exact strand model and setting that simulates a scene's strands
+// within a time budget on this machine. Times are of the scene's own strands; errors are of the motion set's
+// hair that is most similar in shape.
 #pragma once
 
 #include <filesystem>
@@ -21,7 +21,7 @@ struct RecommendOptions {
   ExecutorConfig device;               // kAllDevices: on each executor, beside each other
 };
 
-/// One setting of one row, for the scene.
+/// One setting of one row for the scene.
 struct Candidate {
   RunSetting setting;
   SimDevice device = SimDevice::Gl;  // what its time was measured on
@@ -39,11 +39,11 @@ struct Recommendation {
   std::string scene_lines;         // of the first, to paste into a scene file
 };
 
-/// Measures the rows that a server can run. LimitExceeded when none fits the budget: names the fastest,
-/// what it takes, and how many strands would fit.
+/// Measures the rows that a server can run. If none fits the budget, LimitExceeded names the fastest, its
+/// time, and how many strands would fit.
 Result<Recommendation> recommend(const SceneDesc& scene, const RecommendOptions& options);
 
-/// What a person reads.
+/// Returns the text for a person.
 std::string recommendation_text(const Recommendation& recommendation, const SceneDesc& scene,
                                 double budget_ms);
 

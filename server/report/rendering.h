@@ -1,6 +1,6 @@
-// The rendering report: every way to draw the same strands, its time and memory, and how far its picture is
-// from one that is drawn sixteen times as finely. Near and far, interleaved, so that a busy machine disturbs
-// all alike.
+// The rendering report: all methods of drawing the same strands, with time, memory and the error against a
+// picture drawn at sixteen times the resolution. Near and far; runs are interleaved, so that other load on
+// the machine affects all alike.
 #pragma once
 
 #include <functional>
@@ -23,7 +23,7 @@ struct RenderingReportDesc {
   std::function<void(const std::string& doing)> on_progress;
 };
 
-/// Ways to draw that are held against one truth.
+/// Methods that are compared with the same true picture.
 struct RenderingGroup {
   std::string name;
   std::string truth;                            // in words
@@ -33,7 +33,7 @@ struct RenderingGroup {
 };
 const std::vector<RenderingGroup>& rendering_groups();
 
-/// A way to draw.
+/// One method of drawing.
 struct RenderingRow {
   std::string name;
   std::string summary;
@@ -41,7 +41,7 @@ struct RenderingRow {
   RendererKind kind = RendererKind::Tiles;
   std::function<void(LookDesc&)> change;  // of the scene's look; empty: none
 };
-/// All of them; the first is the main path, what the times of others are held against.
+/// Returns all rows; the first is the main path, to which times are compared.
 const std::vector<RenderingRow>& rendering_rows();
 
 struct RenderingMeasure {
@@ -73,18 +73,18 @@ struct RenderingReport {
   std::vector<RenderingOutcome> rows;
 };
 
-/// Of the scene's strands at rest.
+/// Measures the scene's strands at rest.
 Result<RenderingReport> run_rendering(const RenderingReportDesc& desc);
 
-/// Rows that take more time than the main path, near and far, and more memory: they are there to be compared
-/// with.
+/// Returns the rows that take more time, near and far, and more memory than the main path; they exist for
+/// comparison.
 std::vector<std::string> losing_rows(const RenderingReport& report);
-/// Of a GPU, to be held against 1 ms.
+/// Returns the time of a GPU per 100,000 strands, to be compared with 1 ms.
 double ms_per_100k_strands(const RenderingMeasure& measure);
 
 std::string rendering_csv(const RenderingReport& report);
 std::string rendering_text(const RenderingReport& report);
-/// Self-contained: tables, plots of error against time and a sheet of all pictures.
+/// Returns a self-contained page: tables, plots of error against time and a sheet of all pictures.
 std::string rendering_page(const RenderingReportDesc& desc, const RenderingReport& report);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// The subcommands of strandcast-report. Each lives in files of its own name and adds itself, with its
-// options, to the program's command line; report_main.cpp lists them.
+// Sub-commands of strandcast-report. Each has files of its own name and adds itself, with its options, to the
+// program's command line; report_main.cpp lists them.
 #pragma once
 
 #include <functional>
@@ -14,7 +14,7 @@ class App;
 namespace strandcast {
 
 struct MotionFileOptions;
-/// --unit, --up, --joint, --filter-glitches and --keep-first-frames, as those of strandcast-ctl feed.
+/// Adds --unit, --up, --joint, --filter-glitches and --keep-first-frames, as strandcast-ctl feed has them.
 void add_motion_file_options(CLI::App& command, MotionFileOptions& options);
 
 struct ExecutorConfig;
@@ -22,14 +22,13 @@ struct SimDeviceHelp {
   bool has_all = false;   // the report can run on every executor (kAllDevices)
   std::string none = {};  // what a GL device of that name stands for; "" = it is none
 };
-/// --sim-device and --gl-device: what runs the simulation.
+/// Adds --sim-device and --gl-device, which choose the device of the simulation.
 void add_sim_device_options(CLI::App& command, ExecutorConfig& config, const SimDeviceHelp& help = {});
 
-/// What the chosen subcommand does once the command line is read; the error ends the program with one
-/// sentence.
+/// Work of the chosen sub-command, called after parsing. Its error ends the program with one sentence.
 using ReportAction = std::function<Status()>;
 
-/// Adds a subcommand; when the command line names it, `action` becomes its work.
+/// Adds a sub-command and sets `action` if the command line names it.
 using AddReportCommand = void (*)(CLI::App& app, ReportAction& action);
 
 void add_work_precision_command(CLI::App& app, ReportAction& action);

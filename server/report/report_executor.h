@@ -1,4 +1,4 @@
-// What runs the solvers of a report.
+// Executors that run the solvers of a report.
 #pragma once
 
 #include <memory>
@@ -8,16 +8,16 @@
 
 namespace strandcast {
 
-/// As a GL device: none, but the double-precision references.
+/// Name of the GL device that stands for none: only double-precision references run.
 inline constexpr const char* kNoDevice = "none";
 
-/// As a simulation device: every executor, where a report compares them.
+/// Name of the simulation device that stands for every executor, in reports that compare them.
 inline constexpr const char* kAllDevices = "all";
 
-/// nullptr for kNoDevice, unless lanes are asked for. Makes it current.
+/// Opens an executor and makes it current; nullptr for kNoDevice, unless lanes are requested.
 Result<std::unique_ptr<Executor>> open_report_executor(const ExecutorConfig& config);
 
-/// That one, if any; of kAllDevices every executor, the one of `config`'s OpenGL device first.
+/// Opens that executor, if any. For kAllDevices opens every executor, first that of `config`'s OpenGL device.
 Result<std::vector<std::unique_ptr<Executor>>> open_report_executors(const ExecutorConfig& config);
 
 }  // namespace strandcast

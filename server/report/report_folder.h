@@ -1,4 +1,4 @@
-// Where a report's files go. Any thread.
+// Folder and files of a report. Any thread.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 namespace strandcast {
 
-/// Makes the folder and those above it; BadInput when something else has its name or it cannot be written to.
+/// Creates the folder with its parents. BadInput if something else has its name or it is not writable.
 Status make_report_folder(const std::filesystem::path& folder);
 
 /// Writes one file of a report.

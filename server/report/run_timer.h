@@ -1,5 +1,5 @@
-// RunTimer: how long one substep of a strand model takes, per strand, with many strands at once, so that a
-// dispatch does not measure its own overhead. From the thread of the executor.
+// RunTimer: measures the time of one substep of a strand model per strand, with many strands at once, so that
+// dispatch overhead does not dominate. Runs on its executor's thread.
 #pragma once
 
 #include <cstdint>
@@ -18,19 +18,20 @@ struct StrandTime {
   double median_us = 0.0;
 };
 
-/// Microseconds per strand and frame (MotionSet::kFrameS) at the setting's rate and substeps.
+/// Returns microseconds per strand and frame (MotionSet::kFrameS) at the setting's rate and substeps.
 double us_per_frame(double us_per_substep, const RunSetting& setting);
 
 class RunTimer {
  public:
-  /// `clock_ns` times what does not run on a device of its own.
+  /// Makes a timer; `clock_ns` times work that does not run on a device of its own.
   RunTimer(const Workbench& workbench, const MotionSet& motion, std::function<int64_t()> clock_ns = now_ns)
       : workbench_(workbench), motion_(motion), clock_ns_(std::move(clock_ns)) {}
 
-  /// Measured once for every row, vertex count and effort: rate and substeps change nothing in it.
+  /// Returns the time; measured once per row, vertex count and effort, because rate and substeps do not
+  /// affect it.
   Result<StrandTime> time(const RunSetting& setting);
 
-  /// Strands in one measurement.
+  /// Returns the number of strands in one measurement.
   uint32_t strand_count(const RunSetting& setting) const;
 
  private:

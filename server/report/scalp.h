@@ -1,11 +1,11 @@
-// ScalpView: how much of the scalp a camera sees between the hair, as a number; and the run of
-// strandcast-report scalp that takes it during a head motion. Needs the thread's GL context.
+// ScalpView: measures how much of the scalp a camera sees between the hair, and runs strandcast-report scalp
+// during a head motion. Needs the thread's GL context.
 //
-// Scalp is the skin of the head that is drawn with at least half of the root density of the middle of the
-// hair (common/render/scalp_cover.h). Visible is the share of its pixels on the bald head that still show
-// skin through the hair as it is drawn; a pixel with both counts half. The camera is the scene's, carried
-// along with the head, position and rotation, so that it always sees the same scalp and only hair changes;
-// and that camera turned about the head by a quarter, a half and three quarters.
+// Scalp is the drawn skin with at least half of the root density of the middle of the hair
+// (common/render/scalp_cover.h). Visible is the share of its pixels on the bald head that still show skin
+// through the hair; a pixel with both counts half. The camera is the scene's, carried along with the head's
+// position and rotation, so that it always sees the same scalp and only hair changes. Three more cameras are
+// turned about the head by a quarter, a half and three quarters.
 #pragma once
 
 #include <array>
@@ -23,19 +23,20 @@
 
 namespace strandcast {
 
-/// The scene's camera, then that from the other sides of the head.
+/// Number of views: the scene's camera and three around the head.
 inline constexpr size_t kScalpViews = 4;
 using ScalpShares = std::array<double, kScalpViews>;
 
 class ScalpView {
  public:
-  /// BadInput for a scene without a head that is drawn, or with no scalp in any view.
+  /// Makes a view. BadInput for a scene without a drawn head, or with no scalp in any view.
   static Result<ScalpView> make(const gl::ShaderLibrary& shaders, const gl::DeviceInfo& device,
                                 const SceneAsset& asset, const SceneDesc& scene, RenderSize size);
 
-  /// Visible shares, 0..1, of hair in head space, (vertex_count x strand_count); 0 where a view has no scalp.
+  /// Returns the visible shares, 0..1, for hair in head space, (vertex_count x strand_count); 0 if a view has
+  /// no scalp.
   Result<ScalpShares> visible(const std::vector<glm::vec3>& position_in_head_m);
-  /// The hair as the scene draws it, by its own camera.
+  /// Returns a picture of the hair by the scene's own camera.
   Result<Image> picture(const std::vector<glm::vec3>& position_in_head_m);
 
  private:
@@ -57,7 +58,7 @@ struct ScalpRunDesc {
   RenderSize size{640, 360};
 };
 
-/// Of one moment.
+/// Measurement at one moment.
 struct ScalpSample {
   double time_s = 0.0;
   ScalpShares visible{};
@@ -70,16 +71,16 @@ struct ScalpRun {
   Image groomed_picture;
   Image worst_picture;  // of the moment with most scalp from all around
 
-  /// Mean of all samples over what the groomed hair shows, less 1; by the scene's camera, and from all
-  /// around.
+  /// Return the mean of all samples relative to the groomed hair, less 1: by the scene's camera, and over all
+  /// views.
   double growth() const;
   double growth_around() const;
-  /// The same for the 95 % quantile of the samples.
+  /// Returns the same growth for the 95 % quantile of the samples.
   double growth_p95() const;
 };
 
-/// The scene's solver under the motion; colliders, no wind. `device`: of the current context, the executor's
-/// where it has one.
+/// Runs the scene's solver under the motion, with colliders and without wind. `device` describes the current
+/// context, which is the executor's if it has one.
 Result<ScalpRun> run_scalp(const ScalpRunDesc& desc, const gl::ShaderLibrary& shaders,
                            const gl::DeviceInfo& device, Executor& executor);
 

@@ -1,6 +1,6 @@
-// The ways to get strands into a volume, side by side: the host's and those of OpenGL that the simulation may
-// use, and the ones that document 003 tried (4.2.4). All make the same volume of the same hair, without
-// smoothing, and are held against a sum in double.
+// Compares the methods of summing strands into a volume: the host's, those of OpenGL that the simulation may
+// use, and those of document 003 (4.2.4). All compute the same volume of the same hair without smoothing, and
+// are compared with a sum in double precision.
 #pragma once
 
 #include <string>
@@ -20,8 +20,8 @@ struct ScatterStudyDesc {
   uint32_t rounds = 5;
 };
 
-/// Fills the study's part about it. Where there is no OpenGL only the host's way is in it. Leaves another
-/// context current than there was.
+/// Fills this part of the study; without OpenGL only the host's method is measured. Changes the current
+/// context.
 Status study_scatters(const ScatterStudyDesc& desc, VolumeStudy& study);
 
 }  // namespace strandcast

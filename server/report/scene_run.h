@@ -1,5 +1,5 @@
-// SceneRun: a scene's own simulation, step by step under a head motion, as the server runs it: its passes,
-// its publisher, its codec. From the executor's thread, which outlives it.
+// SceneRun: a scene's own simulation under a head motion, step by step, as the server runs it: passes,
+// publisher and codec. Runs on the executor's thread; the executor must outlive it.
 #pragma once
 
 #include <memory>
@@ -19,20 +19,20 @@ namespace strandcast {
 
 class SceneRun {
  public:
-  /// Hair at rest under an upright head. `content` outlives it.
+  /// Makes a run with hair at rest under an upright head. `content` must outlive it.
   static Result<std::unique_ptr<SceneRun>> make(const SceneDesc& scene, const SceneContent& content,
                                                 const RuntimeFacts& facts, Executor& executor);
 
-  /// One step of the scene's rate, to where the head is at its end.
+  /// Advances one step of the scene's rate; `world_from_head` is the pose at its end.
   Status step(const Pose& world_from_head);
   Result<std::shared_ptr<const Snapshot>> publish();
-  /// Bytes of a state for somebody who has those before; the first is a keyframe.
+  /// Returns the bytes of a state for a receiver of all earlier ones; the first is a keyframe.
   Result<size_t> encoded_bytes(const Snapshot& snapshot);
 
   double step_median_ms() const { return step_timer_.median_ms(); }
   gl::PassReports passes() const { return stages_->report(); }
   uint64_t solver_bytes() const { return solver_->memory_bytes(); }
-  /// Of solver and step.
+  /// Returns the bytes of solver and step.
   uint64_t step_bytes() const;
   uint64_t tick() const { return tick_; }
 

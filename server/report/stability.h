@@ -1,4 +1,4 @@
-// strandcast-report stability: every strand model of the table against stiff and extreme cases.
+// strandcast-report stability: tests every strand model of the table with stiff and extreme cases.
 #pragma once
 
 #include <filesystem>
@@ -20,13 +20,13 @@ struct StabilityOptions {
 /// Measures, prints the tables and writes them.
 Status run_stability(const StabilityOptions& options);
 
-/// What the outcomes are of. `device` is what the runs ran on.
+/// Set-up of the outcomes; `device` is what the runs ran on.
 struct StabilitySetup {
   std::string device;
   StabilityGrid grid = StabilityGrid::Full;
 };
 
-/// The tables as printed text, as CSV and as a page.
+/// Return the tables as printed text, as CSV and as a page.
 std::string stability_text(const std::vector<StabilityOutcome>& outcomes);
 std::string stability_csv(const std::vector<StabilityOutcome>& outcomes);
 std::string stability_page(const std::vector<StabilityOutcome>& outcomes, const StabilitySetup& setup);

@@ -1,5 +1,5 @@
-// StabilityObserver: watches a run step by step and gives the measures of stability_trial.h. Knows positions
-// only, so every model is measured alike. Any thread.
+// StabilityObserver: observes a run step by step and computes the measures of stability_trial.h. Uses
+// positions only, so that all models are measured alike. Any thread.
 #pragma once
 
 #include <array>
@@ -10,30 +10,30 @@
 
 namespace strandcast {
 
-/// Slower than this nothing is seen to move: a tenth of a millimetre, the default bound of the strand stream,
-/// in a sixtieth of a second.
+/// Speed below which motion is invisible: a tenth of a millimetre, the default bound of the strand stream,
+/// per sixtieth of a second.
 inline constexpr double kRestingSpeedMps = 6e-3;
-/// Steps over which jitter is measured, and when that begins after the head has stopped.
+/// Steps over which jitter is measured, and the delay after the head has stopped.
 inline constexpr int kJitterSteps = 128;
 inline constexpr double kJitterDelayS = 1.0;
 
-/// Root mean square of the acceleration of `position_m`, sampled every `step_s`, in the upper half of the
-/// frequencies that such samples can show (a quarter to a half of the step rate); m/s^2. A Hann window keeps
-/// slow swings out. 0 for fewer than 16 samples.
+/// Returns the RMS acceleration (m/s^2) of `position_m`, sampled every `step_s`, in the upper half of the
+/// representable frequencies: a quarter to a half of the step rate. A Hann window excludes slow swings. 0 for
+/// fewer than 16 samples.
 double upper_band_acceleration_mps2(const std::vector<glm::dvec3>& position_m, double step_s);
 
 class StabilityObserver {
  public:
   StabilityObserver(const StabilityTrial& trial, const glm::dquat& world_from_head_rotation);
 
-  /// The state that the run starts from.
+  /// Begins with the state from which the run starts.
   void begin(const SolverState& state);
-  /// The state after a step of `input.h_s` that ends at `time_s`. States that are looked at seldom come in
-  /// pairs of consecutive steps, the first of them by skip_to().
+  /// Takes the state after a step of `input.h_s` that ends at `time_s`. If states are sampled rarely, they
+  /// must come in pairs of successive steps, the first by skip_to().
   void step(const SolverState& state, const StepInput& input, double time_s);
   void skip_to(const SolverState& state);
 
-  /// By StabilityMeasure; all are computed, whether the trial asks for them or not.
+  /// Returns the values by StabilityMeasure; all are computed, whether the trial needs them or not.
   std::array<double, kStabilityMeasureCount> values(const glm::dquat& world_from_head_rotation) const;
 
  private:

@@ -1,5 +1,5 @@
-// StabilityRunner: puts a row of the solver table through the trials and judges what it measures by the
-// row's promises. From the executor's thread.
+// StabilityRunner: runs a row of the solver table through the trials and judges the measures by the row's
+// promises. Runs on the executor's thread.
 #pragma once
 
 #include <array>
@@ -14,18 +14,19 @@
 
 namespace strandcast {
 
-/// What a row promises of a measure in a trial. Not promised: shown without a judgement.
+/// Limit that a row promises for a measure in a trial. A measure without a promise is shown without
+/// judgement.
 struct StabilityPromise {
   double limit = 0.0;
   bool is_promised = true;
 };
 StabilityPromise stability_promise(const SolverRow& row, const StabilityTrial& trial,
                                    StabilityMeasure measure);
-/// Why the limits of a measure are what they are, in a few sentences.
+/// Explains the limits of a measure in a few sentences.
 std::string promise_reason(StabilityMeasure measure);
 
-/// A promise that a row is known to break in one trial, by how much, and why. Reports show such cells red
-/// like any other; tests expect exactly these to break, and none beyond its ceiling.
+/// A promise that a row is known to break in one trial, with the measured value and the reason. Reports show
+/// such cells red like any other; tests expect exactly these breaks, none beyond its ceiling.
 struct KnownBreak {
   const char* row;
   const char* group;
@@ -34,7 +35,7 @@ struct KnownBreak {
   double measured;  // on llvmpipe
   const char* reason;
 
-  /// Devices round otherwise, and what breaks a promise lets roundings grow.
+  /// Returns the largest accepted value; devices round differently, and unstable cases amplify rounding.
   double ceiling() const { return 1.3 * measured; }
 };
 const std::vector<KnownBreak>& known_breaks();
@@ -57,11 +58,11 @@ struct StabilityOutcome {
 
 class StabilityRunner {
  public:
-  /// nullptr: references only.
+  /// Makes a runner; nullptr: references only.
   explicit StabilityRunner(Executor* executor) : executor_(executor) {}
 
-  /// By its kernel where the row has one, else its reference. The error names the row and what it would not
-  /// do.
+  /// Runs a trial with the row's kernel if it has one, otherwise with its reference. The error names the row
+  /// and what failed.
   Result<StabilityOutcome> run(const SolverRow& row, const StabilityTrial& trial);
 
  private:

@@ -1,5 +1,5 @@
-// StabilityTrial: one thing that is done to a few strands, stiff or extreme: what the head does, how long the
-// steps are, what the strands start from and what is measured. Plain data; any thread.
+// StabilityTrial: a stiff or extreme case for a few strands: head motion, step size, start state and
+// measures. Plain data; any thread.
 #pragma once
 
 #include <array>
@@ -25,7 +25,7 @@ enum class StabilityMeasure {
   Style,    // largest distance from where the strands should end, m
 };
 inline constexpr size_t kStabilityMeasureCount = 7;
-/// "finite", "stretch", ...
+/// Returns the measure's name: "finite", "stretch", ...
 const char* name_of(StabilityMeasure measure);
 
 enum class StartState {
@@ -34,10 +34,10 @@ enum class StartState {
   Taut,     // straight out from the root, lengths exact, at rest
 };
 
-/// Rate of a kicked start.
+/// Angular rate of a start state with a kick.
 inline constexpr double kKickRadps = 20.0;
 
-/// What the input is spoilt with for one step.
+/// Invalid value in the input of one step.
 enum class BadInput { None, NotANumber, Infinite, ZeroQuaternion };
 
 struct StabilityTrial {
@@ -73,17 +73,17 @@ struct RestLengths {
   double rest_s;
   int many_steps;
 };
-/// How long the trials at rest last.
+/// Returns the durations of the trials at rest.
 RestLengths rest_lengths(StabilityGrid grid);
 
-/// Whether the trial is one for the row.
+/// Returns whether the trial applies to the row.
 bool is_for(const SolverRow& row, const StabilityTrial& trial);
 
-/// All trials, of which every row goes through those that are for it.
+/// Returns all trials; each row runs those that apply to it.
 std::vector<StabilityTrial> make_stability_trials(StabilityGrid grid);
 
-/// Complete parameters with every stiffness times `factor` and every compliance over it, each held to its
-/// range. `note` says what became what, and what was held.
+/// Complete parameters with every stiffness multiplied and every compliance divided by `factor`, clamped to
+/// their ranges. `note` lists the changes and what was clamped.
 struct ScaledStiffness {
   SolverParameters parameters;
   std::string note;

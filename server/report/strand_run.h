@@ -1,6 +1,6 @@
-// StrandRun: one strand model at one setting, loaded with a groom and driven step by step, by its kernel
-// or as its double-precision reference. What every measurement of work-precision is made of. Kernels run on
-// the executor's thread; reference runs may be on any thread.
+// StrandRun: one strand model at one setting, loaded with a groom and advanced step by step, by its kernel or
+// as its double-precision reference. All measurements of work-precision use it. Kernels run on the executor's
+// thread; reference runs may be on any thread.
 #pragma once
 
 #include <limits>
@@ -13,7 +13,7 @@
 
 namespace strandcast {
 
-/// What the parameters of a row stand for.
+/// What the parameters of a row represent.
 enum class Material {
   Hair,      // the row's nearest to a real hair
   Limp,      // a chain: no bending, no pull to the style, no drag
@@ -33,29 +33,29 @@ struct RunSetting {
   double substep_s() const { return 1.0 / (rate_hz * substeps); }
 };
 
-/// "32 vertices, 60 Hz, solves 1".
+/// Describes a setting: "32 vertices, 60 Hz, solves 1".
 std::string setting_words(const RunSetting& setting);
-/// "direct_rod, 32 vertices, 60 Hz, solves 1".
+/// Describes a setting with its solver: "direct_rod, 32 vertices, 60 Hz, solves 1".
 std::string to_string(const RunSetting& setting);
 
-/// What the strand is, whatever models it.
+/// Physical properties of the strand, independent of the model.
 struct RunPhysics {
   HairConstants hair;
   double length_m = 0.3;
   SolverParameters given;  // put over the material's, as far as the row has them
 };
 
-/// The row's parameters for the setting; BadInput when the hair is out of their range or the step outside
-/// what the model is stable for.
+/// Returns the row's parameters for the setting. BadInput if the hair is out of their range or the step
+/// outside the stable range.
 Result<SolverParameters> run_parameters(const RunSetting& setting, const RunPhysics& physics);
 
-/// The row has parameters for a chain without stiffness: found out by letting one hang, once per row.
+/// Returns whether the row can represent a chain without stiffness; tested once per row by letting one hang.
 bool can_be_limp(const SolverRow& row);
 
-/// The values of a row's effort parameter to try around its default, ascending; {NaN} without one.
+/// Returns values of a row's effort parameter around its default to try, ascending; {NaN} without one.
 std::vector<double> effort_values(const SolverRow& row, const std::vector<double>& factors);
 
-/// What runs were made without a kernel are said to have run on.
+/// Device name of runs without a kernel.
 inline constexpr const char* kRanInDouble = "double";
 
 /// Whether and where kernels run.
@@ -65,7 +65,7 @@ struct Workbench {
   bool runs_kernel(const RunSetting& setting) const {
     return executor != nullptr && !setting.is_reference && setting.row->make != nullptr;
   }
-  /// "gl", "lanes"; "double" for a reference.
+  /// Returns "gl" or "lanes", or "double" for a reference.
   std::string name_of(const RunSetting& setting) const {
     return runs_kernel(setting) ? to_string(executor->info().device) : kRanInDouble;
   }
@@ -78,12 +78,12 @@ class StrandRun {
   static Result<StrandRun> make(const Workbench& workbench, const RunSetting& setting,
                                 const RunPhysics& physics, const Groom& groom);
 
-  /// Advances by one step of the setting's rate: `input` holds what is the same in all its substeps;
-  /// head_shift_m is the whole step's.
+  /// Advances by one step of the setting's rate. `input` holds what all its substeps share; head_shift_m is
+  /// that of the whole step.
   void step(StepInput input);
   /// Advances by input.h_s.
   void substep(const StepInput& input) { solver_->substep(input); }
-  /// The state now. Valid until the next call.
+  /// Returns the present state, valid until the next call.
   const SolverState& state();
   void write(const SolverState& state) { solver_->write(state); }
 
@@ -98,17 +98,17 @@ class StrandRun {
   SolverState state_;
 };
 
-/// Every position and velocity is finite.
+/// Returns whether every position and velocity is finite.
 bool is_state_finite(const SolverState& state);
 
-/// Largest relative change of a segment's length against the groom's; segments below a micrometre are left
-/// out.
+/// Returns the largest relative change of a segment's length since the groom; segments below a micrometre are
+/// ignored.
 double largest_run_stretch(const Groom& groom, const SolverState& state);
 
-/// A uniform groom of polylines with the same number of points each.
+/// Makes a uniform groom of polylines with equal numbers of points.
 Groom groom_of(const std::vector<std::vector<glm::dvec3>>& strands, Pinning pinning);
 
-/// `vertex_count` points evenly along a straight line from the head joint.
+/// Returns `vertex_count` points evenly spaced on a straight line from the head joint.
 std::vector<glm::dvec3> straight_run(uint32_t vertex_count, double length_m, const glm::dvec3& direction);
 
 }  // namespace strandcast

@@ -1,6 +1,6 @@
-// StreamCodec: one way to send strands, ours or a general library's, as the streaming report runs it: a frame
-// in, a message out, a frame back. Encoder and decoder side live in one object but share nothing but the
-// message. One thread.
+// StreamCodec: one codec of strands, ours or a general library's, as the streaming report runs it: a frame
+// in, a message out, a frame back. Encoder and decoder are in one object but share only the message. One
+// thread.
 #pragma once
 
 #include <cstddef>
@@ -27,24 +27,25 @@ struct StreamShape {
 
 /// One recorded state.
 struct StreamFrame {
-  /// As the publisher gave it, copied whole, but without its lattice: every codec and bound has its own.
+  /// Complete copy of the published state without its lattice, which depends on codec and bound.
   Snapshot published;
   std::vector<glm::vec3> position_in_head_m;  // (vertex_count x strand_count) vertex-major, strand fastest
 };
 
-/// The published state with its positions on a lattice of this step.
+/// Returns the published state with its positions on a lattice of this step.
 Snapshot on_lattice(const StreamFrame& frame, float quantum_m);
 
-/// What a codec that predicts by steps of the solver is told of the wind.
+/// How much of the wind a codec knows that predicts by solver steps.
 enum class WindTold {
   Known,   // all that the solver is
   Mean,    // the wind at the head, as it changes; not the waves that vary it over the head
   Unknown  // nothing
 };
 inline constexpr WindTold kWindsTold[] = {WindTold::Known, WindTold::Mean, WindTold::Unknown};
-/// "known", "mean", "unknown".
+/// Returns "known", "mean" or "unknown".
 const char* to_string(WindTold told);
-/// Trails with as much of their wind, of one stream: as long as the scene stays, so does what is told of it.
+/// Makes trails of one stream with only that much of the wind. While the scene stays the same, so does the
+/// wind that is reported.
 class ToldWind {
  public:
   explicit ToldWind(WindTold told) : told_(told) {}
@@ -59,20 +60,19 @@ class ToldWind {
 class StreamCodec {
  public:
   virtual ~StreamCodec() = default;
-  /// The frame to encode next, brought into the form that the encoder is given; not part of its time.
-  /// `frame` outlives the following encode().
+  /// Converts the next frame to the encoder's input; not timed. `frame` must outlive the following encode().
   virtual Status take(const StreamFrame& frame) = 0;
-  /// The taken frame as one message; frames depend on those before.
+  /// Encodes the taken frame into one message; frames depend on earlier ones.
   virtual Result<std::vector<std::byte>> encode() = 0;
-  /// Messages come in the order in which they were encoded.
+  /// Decodes a message; messages must come in the order of encoding.
   virtual Status decode(std::span<const std::byte> message) = 0;
-  /// What the last decode() gave, (vertex_count x strand_count) as in StreamFrame; not part of its time.
+  /// Returns the result of the last decode(), (vertex_count x strand_count) as in StreamFrame; not timed.
   virtual std::vector<glm::vec3> decoded() const = 0;
-  /// Bytes of what somebody who joins at `frame` needs to see it; ends the stream.
+  /// Returns the bytes that a viewer joining at `frame` needs; ends the stream.
   virtual Result<size_t> join_bytes(const StreamFrame& frame) = 0;
 };
 
-/// A codec at one bound: a row of the report.
+/// A codec at one bound, as a row of the report.
 struct StreamCodecRow {
   std::string name;  // "tangent", "zfp temporal"
   bool is_ours = false;
@@ -84,7 +84,8 @@ struct StreamCodecRow {
   std::function<Result<std::unique_ptr<StreamCodec>>(const StreamShape&)> make;
 };
 
-/// Every strand codec of the project at one bound; one that predicts by steps once for each of kWindsTold.
+/// Returns every strand codec of the project at one bound; a codec that predicts by steps appears once for
+/// each of kWindsTold.
 std::vector<StreamCodecRow> own_stream_codecs(double bound_m);
 
 }  // namespace strandcast

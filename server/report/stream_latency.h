@@ -1,7 +1,6 @@
-// StreamLatency: where the time from a motion sample to a decoded frame goes, stage by stage, in one process:
-// the server's stages as it runs them, TCP on loopback for the network, and the decoder of a viewer. What
-// strandcast-view draws, and how long a sample waits for its step, is not in it. Needs the thread's GL
-// context for GPU solvers.
+// StreamLatency: durations of the stages from a motion sample to a decoded frame, in one process: the
+// server's own stages, TCP on loopback, and a viewer's decoder. It excludes drawing by strandcast-view and a
+// sample's wait for its step. Needs the thread's GL context for GPU solvers.
 #pragma once
 
 #include <string>
@@ -27,7 +26,7 @@ struct StreamLatency {
   LatencyStage total;  // of whole frames: not the sum of the stages' quantiles
 };
 
-/// Runs the recording's frames through the stages after the solver, whose times the recording has.
+/// Runs the recording's frames through the stages after the solver; the recording has the solver's times.
 Result<StreamLatency> measure_latency(const StreamRecording& recording, const std::string& codec,
                                       double bound_m);
 

@@ -1,7 +1,6 @@
-// StreamPlayout: what a viewer shows between states. Every second state of a recording is taken away, as a
-// stream of 30 states a second does, and what a viewer draws in its place is held against the picture of the
-// state itself. States are the exact floats: what codecs add is StreamView's. Drawn in tiles on the
-// processors.
+// StreamPlayout: measures interpolation between states. Every second state of a recording is removed, as in a
+// stream of 30 states a second. The viewer's picture in its place is compared with the picture of the removed
+// state. States are exact floats; StreamView measures the errors of codecs. Drawn in tiles on the processors.
 #pragma once
 
 #include <string>
@@ -20,7 +19,7 @@ struct StreamPlayoutDesc {
   double distance_m = 0.66;
 };
 
-/// One way to show moments between states of one recording: means over the compared pictures.
+/// One interpolation on one recording: means over the compared pictures.
 struct PlayoutRow {
   std::string motion;
   std::string solver;
@@ -32,7 +31,7 @@ struct PlayoutRow {
   double delta_e = 0.0;
 };
 
-/// A row for each Interpolation. BadInput for a recording of fewer than seven frames.
+/// Returns a row for each Interpolation. BadInput for a recording of fewer than seven frames.
 Result<std::vector<PlayoutRow>> measure_playout(const StreamPlayoutDesc& desc, const SceneDesc& scene,
                                                 const StreamRecording& recording);
 

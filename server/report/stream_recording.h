@@ -1,5 +1,5 @@
-// StreamRecording: strands as the server's own solver moves them under a head motion, kept as float positions
-// in head space, so that every codec gets the same frames. From the executor's thread.
+// StreamRecording: strands moved by the server's own solver under a head motion, stored as float positions in
+// head space, so that every codec gets the same frames. Runs on the executor's thread.
 #pragma once
 
 #include <string>
@@ -12,10 +12,11 @@
 
 namespace strandcast {
 
-/// A recording is kept in memory; more than this is refused.
+/// Memory limit of a recording.
 inline constexpr size_t kMaxRecordingBytes = size_t{1} << 30;
 
-/// The first differences are not typical yet; as codec_bench.
+/// Number of first frames that are ignored because their differences are not typical yet; codec_bench does
+/// the same.
 inline constexpr size_t kStartFrames = 9;
 
 struct StreamSize {
@@ -24,13 +25,13 @@ struct StreamSize {
 
   size_t vertices() const { return static_cast<size_t>(strand_count) * vertex_count; }
 };
-/// "10000 x 16".
+/// Returns a size as text: "10000 x 16".
 std::string to_string(const StreamSize& size);
 
-/// The double-precision solver, whose steps nobody is told.
+/// Name of the double-precision solver, whose steps codecs cannot predict.
 inline constexpr const char* kMovedByReference = "double";
 
-/// In place of a solver's name: the built-in scene in full quality, with its style.
+/// Name that stands for the built-in scene in full quality with its style, in place of a solver's name.
 inline constexpr const char* kFullHair = "full";
 
 struct RecordingDesc {
@@ -55,15 +56,14 @@ struct StreamRecording {
   std::vector<double> step_ms;  // (frames) wall time of solving and reading back
 };
 
-/// The built-in scene with these strands and this solver.
+/// Returns the built-in scene with these strands and this solver.
 SceneDesc recorded_scene(const RecordingDesc& desc);
 
-/// BadInput when the motion is too short, LimitExceeded when the recording would be too large.
+/// Returns BadInput if the motion is too short, LimitExceeded if the recording would be too large.
 Status check_recording(const RecordingDesc& desc);
 
-/// Records one part of the motion, after strands have settled into it. The built-in scene as it
-/// ships, with its head, its wind and its follicles, so that what is measured is what a viewer gets; 60 steps
-/// a second.
+/// Records one part of the motion after strands have settled into it, at 60 steps a second. Uses the built-in
+/// scene with its head, wind and follicles, so that the recording is what a viewer gets.
 Result<StreamRecording> record_strands(const RecordingDesc& desc);
 
 }  // namespace strandcast

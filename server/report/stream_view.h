@@ -1,7 +1,7 @@
-// StreamView: what a viewer sees of a stream of strands. Pictures drawn from decoded strands are held against
-// pictures drawn from the exact floats, in the hair's pixels, near and far; and so are coded pictures of the
-// exact floats, so that both ways to stream can be compared by what they take for the same look. Drawn in
-// tiles on the processors.
+// StreamView: measures what a viewer sees of a stream of strands. Pictures drawn from decoded strands are
+// compared with those drawn from exact floats, in the pixels of the hair, near and far. Coded pictures of the
+// exact floats are compared too, which gives the bit rate of both kinds of streaming at equal quality. Drawn
+// in tiles on the processors.
 #pragma once
 
 #include <functional>
@@ -16,10 +16,10 @@
 
 namespace strandcast {
 
-/// Distances of the camera from the point that it looks at: the built-in scene's own, and hair across a room.
+/// Distances of the camera from its target: that of the built-in scene, and hair across a room.
 inline constexpr double kViewDistancesM[] = {0.66, 3.0};
 inline constexpr double kViewBoundsM[] = {2e-5, 5e-5, 1e-4, 2e-4, 5e-4};
-/// What strands are coded with; "step" is told all of the wind.
+/// Codecs of the strands; "step" knows all of the wind.
 inline constexpr const char* kViewCodecs[] = {"tangent", "step"};
 
 struct StreamViewDesc {
@@ -27,7 +27,7 @@ struct StreamViewDesc {
   size_t compared_pictures = 4;  // evenly spaced after the first kStartFrames
 };
 
-/// Pictures of decoded strands against those of the floats: means over the compared pictures.
+/// Pictures of decoded strands compared with those of the floats: means over the compared pictures.
 struct StreamViewRow {
   std::string codec;  // of kViewCodecs
   double distance_m = 0.0;
@@ -49,7 +49,7 @@ struct PixelPoint {
   double ssim = 0.0;
 };
 
-/// The hair of one picture: the exact one, of two bounds, and how far the finer of them is off.
+/// Hair of one picture: exact, at two bounds, and the error of the finer one.
 struct ViewSheet {
   double distance_m = 0.0;
   std::string caption;
@@ -68,30 +68,30 @@ struct StreamView {
   std::vector<ViewSheet> sheets;
 };
 
-/// How often measure_view() says what it does, at most.
+/// Returns how often measure_view() reports progress, at most.
 uint32_t view_step_count();
-/// The recording is of the scene's strands.
+/// Measures a recording of the scene's strands.
 Result<StreamView> measure_view(const StreamViewDesc& desc, const SceneDesc& scene,
                                 const StreamRecording& recording,
                                 const std::function<void(const std::string& doing)>& on_progress);
 
-/// What "as good" goes by. PSNR is of red, green and blue, which picture codecs keep at half the size; SSIM
-/// is of brightness alone.
+/// Measure of equal quality. PSNR uses red, green and blue, whose colour picture codecs store at half the
+/// size; SSIM uses brightness alone.
 enum class LookMeasure { Psnr, Ssim };
-/// In dB: of SSIM how far it is from 1.
+/// Returns a quality in dB; for SSIM, that of its distance from 1.
 double look_db(const PixelPoint& point, LookMeasure measure);
 double look_db(const StreamViewRow& row, LookMeasure measure);
 
-/// Mbit/s at which a codec's pictures reach a look: between the measured settings around it, linear in dB
-/// over the logarithm of the rate. Nothing when no setting reaches it; the least of them when all do.
+/// Returns the Mbit/s at which a codec's pictures reach a quality, interpolated between settings linearly in
+/// dB over the logarithm of the rate. Empty if no setting reaches it; the least rate if all do.
 std::optional<double> mbit_per_s_for(const std::vector<PixelPoint>& pixels, const std::string& codec,
                                      double distance_m, LookMeasure measure, double wanted_db);
-/// The PSNR of its pictures with that rate: nothing below the least that was measured; the best when above
-/// all.
+/// Returns the PSNR of a codec's pictures at this rate. Empty below the least measured rate; the best value
+/// above all.
 std::optional<double> psnr_db_at(const std::vector<PixelPoint>& pixels, const std::string& codec,
                                  double distance_m, double mbit_per_s);
 
-/// The square of the picture with most of the mask: `side` pixels, or as many as there are.
+/// The square of `side` pixels in the picture that contains most of the mask; smaller if the picture is.
 struct PictureCrop {
   uint32_t left = 0, top = 0, side = 0;
 };

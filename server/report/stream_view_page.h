@@ -1,5 +1,4 @@
-// The part of the streaming report's page that is about what viewers see: tables, a plot, the CSV files. Any
-// thread.
+// The part of the streaming report's page about what viewers see: tables, a plot and CSV files. Any thread.
 #pragma once
 
 #include <string>
@@ -10,18 +9,18 @@
 
 namespace strandcast {
 
-/// PSNR and SSIM of every bound and distance.
+/// Returns PSNR and SSIM of every bound and distance.
 HtmlTable view_table(const StreamView& view);
 std::string view_plot(const StreamView& view);
-/// Mbit/s of pictures that look as good as strands, beside what the strands take.
+/// Returns the Mbit/s of pictures that look as good as strands, beside those of the strands.
 HtmlTable pixel_table(const StreamView& view, LookMeasure measure);
-/// PSNR against Mbit/s of strands and of every picture codec from one distance.
+/// Returns a plot of PSNR against Mbit/s of strands and of every picture codec at one distance.
 std::string pixel_plot(const StreamView& view, double distance_m);
 
 /// Adds both sections with their pictures.
 void add_view_sections(HtmlPage& page, const StreamView& view);
 
-/// What is shown between states at 30 Hz; nothing without rows.
+/// Returns the errors of interpolation at 30 Hz; empty without rows.
 HtmlTable playout_table(const std::vector<PlayoutRow>& rows);
 void add_playout_section(HtmlPage& page, const std::vector<PlayoutRow>& rows, const std::string& note);
 std::string playout_csv(const std::vector<PlayoutRow>& rows);

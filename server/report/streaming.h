@@ -1,5 +1,5 @@
-// strandcast-report streaming: error against bytes against milliseconds of every strand codec, beside general
-// codecs on the same frames. This header is what is measured; streaming_page.h turns it into files.
+// strandcast-report streaming: compares error, bytes and milliseconds of every strand codec and of general
+// codecs on the same frames. This header defines the measurements; streaming_page.h writes them to files.
 #pragma once
 
 #include <filesystem>
@@ -30,10 +30,10 @@ struct StreamingOptions {
 };
 
 inline constexpr double kStreamBoundsM[] = {2e-5, 5e-5, 1e-4, 2e-4, 5e-4};
-/// The bound that goals are stated at.
+/// Bound for which the goals are stated.
 inline constexpr double kGoalBoundM = 1e-4;
 
-/// What is recorded, once for all codecs.
+/// One recording, made once for all codecs.
 struct StreamCase {
   size_t motion = 0;  // index
   std::string solver;
@@ -42,9 +42,9 @@ struct StreamCase {
   bool has_peers = false;           // beside our own codecs, at the goals' bound
   bool has_curve_of_peers = false;  // and at all bounds
 };
-/// Every motion's two parts: with the first solver at every size and beside peers, with the others at the
-/// first size. All codecs of ours run on each at every bound, those that predict by steps of the solver once
-/// for each of kWindsTold; peers at every bound on the first case of each level and size.
+/// Returns the recordings: both parts of every motion, with the first solver at every size and beside peers,
+/// with other solvers at the first size. Our codecs run on each at every bound, those that predict by steps
+/// once for each of kWindsTold. Peers run at every bound on the first case of each level and size.
 std::vector<StreamCase> stream_cases(const std::vector<MotionLevel>& motion_levels,
                                      const std::vector<std::string>& solvers,
                                      const std::vector<StreamSize>& sizes);
@@ -74,16 +74,17 @@ struct StreamingRow {
   double decode_cpu_ms = 0.0;
   double decode_wall_ms = 0.0;
 
-  /// "94_01, wildest part".
+  /// Returns motion and part as text: "94_01, wildest part".
   std::string motion_and_part() const { return motion + ", " + to_string(part) + " part"; }
-  /// "tangent"; "step, wind mean".
+  /// Returns codec and wind as text: "tangent", "step, wind mean".
   std::string codec_and_wind() const { return wind.empty() ? codec : codec + ", wind " + wind; }
   bool is_same_recording(const StreamingRow& other) const {
     return motion == other.motion && part == other.part && solver == other.solver &&
            size.strand_count == other.size.strand_count && size.vertex_count == other.size.vertex_count;
   }
   double mbit_per_s() const { return bits * static_cast<double>(size.vertices()) / kStreamFrameS * 1e-6; }
-  /// A little room for the rounding of what was recorded to floats, half a step below 1 m.
+  /// Returns whether the bound was kept; allows for rounding of the recording to floats, half a unit in the
+  /// last place below 1 m.
   bool keeps_bound() const { return max_error_m <= bound_m + 0x1p-25; }
 };
 
@@ -102,15 +103,15 @@ struct StreamingReport {
   std::string playout_note;  // a head that it lacks
 };
 
-/// Runs everything; prints progress. `on_recording` gets what is known after each recording: a run of many
-/// minutes that is broken off leaves that. BadInput for options that nothing can be run for.
+/// Runs everything and prints progress. `on_recording` gets the results so far after each recording, so that
+/// an interrupted run leaves them. BadInput for options that leave nothing to run.
 Result<StreamingReport> measure_streaming(const StreamingOptions& options,
                                           const std::function<Status(const StreamingReport&)>& on_recording);
 
-/// One codec on one recording. An error names the codec.
+/// Measures one codec on one recording; an error names the codec.
 Result<StreamingRow> measure_codec(const StreamCodecRow& codec, const StreamRecording& recording);
 
-/// Measures and writes; prints progress and where the files are.
+/// Measures, writes the files, and prints progress and their location.
 Status run_streaming(const StreamingOptions& options);
 
 }  // namespace strandcast

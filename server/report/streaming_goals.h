@@ -1,5 +1,4 @@
-// What the codecs tangent and step have to reach, and whether a streaming report shows that it does. Any
-// thread.
+// Goals of the codecs tangent and step, and whether a streaming report meets them. Any thread.
 #pragma once
 
 #include <string>
@@ -10,7 +9,7 @@
 namespace strandcast {
 
 enum class Verdict { Met, Missed, NotMeasured };
-/// "met", "missed", "not measured".
+/// Returns "met", "missed" or "not measured".
 const char* to_string(Verdict verdict);
 
 struct GoalLine {
@@ -19,13 +18,13 @@ struct GoalLine {
   Verdict verdict = Verdict::NotMeasured;
 };
 
-/// Every goal; the worst recording that it is stated for decides: of the report's first solver those of
-/// tangent, of the solver that it names one of step, of all what is about the bound.
+/// Judges every goal by the worst recording that it applies to: those of tangent by the first solver, those
+/// of step by the solver that they name, those about the bound by all.
 std::vector<GoalLine> judge_streaming(const StreamingReport& report);
 
 enum class PeerKind { Plain, Temporal };
-/// The best peer on one recording at the goals' bound, by bits; nullptr when there is none. Peers that miss
-/// the bound, and those with a bound of their own, take no part.
+/// Returns the peer with the fewest bits on one recording at the goals' bound; nullptr if there is none.
+/// Peers that miss the bound or have a bound of their own are ignored.
 const StreamingRow* best_peer(const StreamingReport& report, const StreamingRow& ours, PeerKind kind);
 
 }  // namespace strandcast

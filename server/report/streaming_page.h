@@ -1,4 +1,4 @@
-// The files of a streaming report: streaming.csv, three plots and one page. Any thread.
+// Files of a streaming report: streaming.csv, three plots and one page. Any thread.
 #pragma once
 
 #include <filesystem>
@@ -12,12 +12,12 @@ inline constexpr const char* kStreamingCsv = "streaming.csv";
 inline constexpr const char* kStreamingPage = "streaming.html";
 
 std::string streaming_csv(const StreamingReport& report);
-/// Bits against the bound; bits against time; bits of each motion. All at the first size.
+/// Return plots at the first size: bits against the bound, bits against time, bits of each motion.
 std::string streaming_bound_plot(const StreamingReport& report);
 std::string streaming_time_plot(const StreamingReport& report);
 std::string streaming_motion_plot(const StreamingReport& report);
 std::string streaming_page(const StreamingReport& report);
-/// The goals with their verdicts, for a terminal.
+/// Returns the goals with their verdicts for a terminal.
 std::string streaming_summary(const StreamingReport& report);
 
 /// Writes everything into the folder.

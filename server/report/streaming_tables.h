@@ -1,5 +1,5 @@
-// Tables of the streaming report's page that a reader looks for first: what a viewer's link has to carry, and
-// every clip, strand model and wind. Any thread.
+// Main tables of the streaming report's page: the bit rate that a viewer's link must carry, and every clip,
+// strand model and wind. Any thread.
 #pragma once
 
 #include "server/report/html_page.h"
@@ -7,14 +7,15 @@
 
 namespace strandcast {
 
-/// Mbit/s at the goals' bound of every codec of ours and of the best peers: for the built-in scene and for
-/// the largest number of vertices, in the first recording of each class; with milliseconds of both sides.
+/// Returns Mbit/s and milliseconds of both sides, at the goals' bound, of each of our codecs and of the best
+/// peers. For the built-in scene and the largest number of vertices, in the first recording of each class.
 HtmlTable needs_table(const StreamingReport& report);
-/// The answer in words: the codec with the fewest bits.
+/// Returns the conclusion in words: the codec with the fewest bits.
 std::string needs_text(const StreamingReport& report);
-/// Bits per vertex by bound, of every clip, part, strand model, codec of ours and wind, at the first size.
+/// Returns bits per vertex by bound, of every clip, part, strand model, codec of ours and wind, at the first
+/// size.
 HtmlTable case_table(const StreamingReport& report);
-/// Which clips there were.
+/// Returns which clips were available.
 std::string clips_text(const StreamingReport& report);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// Grouped bar charts as SVG text, with the look of svg_plot.h: a group per thing, a bar per series, the value
-// above each bar. Any thread.
+// Grouped bar charts as SVG text, in the style of svg_plot.h: a group per subject, a bar per series, the
+// value above each bar. Any thread.
 #pragma once
 
 #include <string>
@@ -22,7 +22,7 @@ struct BarDesc {
   double height = 480.0;  // px
 };
 
-/// Bars stand on 0 with a linear scale. A chart without any bar says so.
+/// Draws a bar chart with a linear scale from 0. A chart without bars shows a note.
 std::string make_svg_bars(const BarDesc& desc);
 
 }  // namespace strandcast

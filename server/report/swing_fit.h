@@ -1,4 +1,4 @@
-// Period, damping and growth out of a sequence of displacements sampled at equal times. Pure functions.
+// Estimates period, damping and growth from displacements sampled at equal intervals. Pure functions.
 #pragma once
 
 #include <complex>
@@ -6,14 +6,14 @@
 
 namespace strandcast {
 
-/// Time between the first and the last downward zero crossing over the number of swings between, with linear
-/// interpolation; NaN with fewer than two crossings.
+/// Returns the mean time between downward zero crossings, with linear interpolation; NaN with fewer than two.
 double swing_period_s(const std::vector<double>& q, double sample_s);
 
-/// The root z, Im z >= 0, of q(k+1) = 2 Re(z) q(k) - |z|^2 q(k-1) that fits the sequence best.
+/// Returns the root z, Im z >= 0, of the recurrence q(k+1) = 2 Re(z) q(k) - |z|^2 q(k-1) that best fits the
+/// sequence.
 std::complex<double> swing_root(const std::vector<double>& q);
 
-/// The rate s in q'' = s q that fits best: minus the squared frequency, or positive where q grows.
+/// Returns the rate s that best fits q'' = s q: minus the squared frequency, or positive if q grows.
 double swing_growth_per_s2(const std::vector<double>& q, double sample_s);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// ViewPainter: pictures of a recording's strands as a viewer draws them, in tiles on the processors, with the
-// pixels that are hair. One thread.
+// ViewPainter: draws pictures of a recording's strands as a viewer does, in tiles on the processors, and
+// finds the pixels that are hair. One thread.
 #pragma once
 
 #include <cstdint>
@@ -14,24 +14,24 @@
 
 namespace strandcast {
 
-/// A picture and which of its pixels show hair.
+/// A picture, and a mask of the pixels that show hair.
 struct HairPicture {
   Image image;
   PictureMask hair;
 };
 
-/// The camera from so far away, in the same direction.
+/// Returns the camera moved to this distance in the same direction.
 CameraDesc camera_at(CameraDesc camera, double distance_m);
-/// Pixels that are in one mask or the other.
+/// Returns the union of two masks.
 PictureMask either(PictureMask a, const PictureMask& b);
 
 class ViewPainter {
  public:
-  /// Loads the scene's hair and head.
+  /// Loads the scene's hair and head and makes the painter.
   static Result<std::unique_ptr<ViewPainter>> make(const SceneDesc& scene, RenderSize size);
   Result<Image> image(const PosedStrands& strands, double distance_m, DebugView debug_view = DebugView::None);
-  /// Hair is what changes when strands have the colours of their directions. A picture of the bald head would
-  /// say the same of skin in the hair's shadow.
+  /// Draws a picture and its mask. Hair is what changes if strands are coloured by their directions; a
+  /// comparison with the bald head would include skin in the hair's shadow.
   Result<HairPicture> hair(const PosedStrands& strands, double distance_m);
   uint64_t drawn_strands() const { return renderer_->profile().drawn_strands; }
 

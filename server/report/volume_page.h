@@ -1,5 +1,5 @@
-// The files of strandcast-report volume: tables as CSV, plots, and one page. Pure functions of a VolumeStudy
-// but for saving.
+// Files of strandcast-report volume: CSV tables, plots and one page. Pure functions of a VolumeStudy, except
+// saving.
 #pragma once
 
 #include <filesystem>
@@ -11,13 +11,14 @@ namespace strandcast {
 
 inline constexpr const char* kVolumePage = "volume.html";
 
-/// What to pick, in some sentences.
+/// Returns a recommendation in some sentences.
 std::string volume_summary(const VolumeStudy& study);
 
 std::string volume_error_csv(const VolumeStudy& study);
 std::string volume_scatter_csv(const VolumeStudy& study);
 std::string volume_outcome_csv(const VolumeStudy& study);
-/// Error of the density against the time of a step, a line for each number of smoothings and who is asked.
+/// Returns a plot of density error against the time of a step, with a line per number of smoothings and
+/// choice of hairs.
 std::string volume_plot(const VolumeStudy& study);
 std::string volume_page(const VolumeStudy& study);
 

@@ -1,6 +1,5 @@
-// The measurements of strandcast-report volume: how well a volume is known of the hair that there is, against
-// the time that it takes; the ways to get strands into it; and how hair lies after a shake for every way to
-// use it.
+// Measurements of strandcast-report volume: error of a volume of hair against its time, methods of summing
+// strands into it, and the state of hair after a shake for every method of using it.
 #pragma once
 
 #include <cstdint>
@@ -13,12 +12,12 @@
 
 namespace strandcast {
 
-/// Who is asked about the hair, out of all that there is.
+/// Hairs from which the volume is made: guides, or all.
 enum class VolumeHairs { Guides, All };
-/// "guides", "all hairs".
+/// Returns "guides" or "all hairs".
 const char* to_string(VolumeHairs hairs);
 
-/// What the hair is really like: of all hairs, with cells and smoothing as here.
+/// Settings of the true volume, which is made of all hairs.
 inline constexpr uint32_t kTrueResolution = 64;
 inline constexpr uint32_t kTrueSmoothing = 1;
 
@@ -37,7 +36,7 @@ struct VolumeStudyDesc {
   uint32_t tuft_strands = 200;
 };
 
-/// One way to ask for a volume.
+/// One setting of a volume, with its error.
 struct VolumeError {
   uint32_t resolution = 0;
   uint32_t smoothing = 0;
@@ -51,7 +50,7 @@ struct VolumeError {
   double cpu_ms = 0.0;  // of a step, median
 };
 
-/// One way to get strands into a volume.
+/// One method of summing strands into a volume.
 struct ScatterResult {
   std::string name;
   std::string what;        // it is, in words
@@ -64,7 +63,7 @@ struct ScatterResult {
   double cpu_ms = 0.0;
 };
 
-/// One way to use it, on a tuft: shaken, held, looked at.
+/// One method of using the volume on a tuft that is shaken, held and measured.
 struct VolumeOutcome {
   std::string name;
   VolumeDesc volume;
@@ -87,10 +86,10 @@ struct VolumeStudy {
   std::vector<VolumeOutcome> outcomes;
 };
 
-/// Says what it is at, once per part.
+/// Receives a description of each part when it begins.
 using VolumeProgress = std::function<void(const std::string&)>;
 
-/// BadInput for a scene that is none, or for more guides than hairs.
+/// Runs the study. BadInput for an invalid scene, or for more guides than hairs.
 Result<VolumeStudy> run_volume_study(const VolumeStudyDesc& desc, Executor& executor,
                                      const std::string& gl_device, const VolumeProgress& progress);
 

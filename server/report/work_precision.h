@@ -1,5 +1,5 @@
-// strandcast-report work-precision: error against run time of every strand model of the table. This header is
-// what is measured; work_precision_page.h turns it into files.
+// strandcast-report work-precision: measures error against run time of every strand model of the table. This
+// header defines the measurements; work_precision_page.h writes them to files.
 #pragma once
 
 #include <filesystem>
@@ -27,7 +27,7 @@ struct WorkPrecisionOptions {
   double motion_s = 0.0;           // of the motion set; 0 = as the grid says
 };
 
-/// What is run.
+/// The settings that are run.
 struct WorkGrid {
   std::vector<uint32_t> vertices = {8, 16, 32, 64};
   std::vector<double> rates_hz = {30.0, 60.0, 120.0, 240.0};
@@ -54,7 +54,7 @@ struct WorkGrid {
 };
 WorkGrid make_work_grid(const WorkPrecisionOptions& options);
 
-/// NaN: not measured.
+/// Result of one run; NaN = not measured.
 struct WorkRecord {
   std::string test;  // motion_test() or the name of an analytic one
   RunSetting setting;
@@ -69,12 +69,12 @@ struct WorkRecord {
   double refined_rate_hz = std::numeric_limits<double>::quiet_NaN();
   AnalyticResult result = {};  // of the motion set: error, stretch and note
 };
-/// "motion, curled hair".
+/// Returns the name of a motion test: "motion, curled hair".
 std::string motion_test(MotionHair hair);
-/// A model that is not the rod and has all its physics.
+/// Name of a model, other than the rod, that has all of its physics.
 inline constexpr const char* kCheckModel = "articulated";
 
-/// Puts the time of its setting into a record: of a frame, at its rate and substeps.
+/// Adds the time of the record's setting: that of a frame at its rate and substeps.
 void add_time(WorkRecord& record, const StrandTime& time);
 
 struct WorkReport {
@@ -83,7 +83,7 @@ struct WorkReport {
   std::vector<ExecutorInfo> executors;  // empty: every row ran as its double-precision reference
   std::string motion_name;
   uint32_t timed_strands = 0;  // on the first of the executors
-  /// How far the converged rod is from others, relative RMS.
+  /// Distance of the converged rod from other converged solutions, relative RMS.
   struct Converged {
     MotionHair hair = MotionHair::Straight;
     double time_self_difference = 0.0;   // itself with steps of half the length
@@ -94,10 +94,10 @@ struct WorkReport {
   std::vector<WorkRecord> records;
 };
 
-/// Runs everything; prints progress. BadInput for options that nothing can be run for.
+/// Runs everything and prints progress. BadInput for options that leave nothing to run.
 Result<WorkReport> measure_work_precision(const WorkPrecisionOptions& options);
 
-/// Measures and writes; prints progress and where the files are.
+/// Measures, writes the files, and prints progress and their location.
 Status run_work_precision(const WorkPrecisionOptions& options);
 
 }  // namespace strandcast

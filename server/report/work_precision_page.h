@@ -1,5 +1,5 @@
-// The files of work-precision: one CSV with every run, SVG plots, and one page that answers what to pick.
-// Pure functions of a WorkReport but for saving.
+// Files of work-precision: one CSV with every run, SVG plots, and one page with a recommendation. Pure
+// functions of a WorkReport, except saving.
 #pragma once
 
 #include <filesystem>
@@ -18,26 +18,26 @@ inline constexpr const char* kChampion = "direct_rod";
 inline constexpr double kChampionErrorLimit = 0.01;
 
 inline constexpr const char* kFrameTimeTitle = "microseconds per strand and frame of 1/60 s";
-/// An error above this is no picture of the same motion.
+/// Error above which a run no longer resembles the motion.
 inline constexpr double kWorstPlotted = 3.0;
 PlotPoint plotted(const WorkPoint& point);
 
-/// Runs of the motion set as points of time and error, in the order of the records; of one executor
-/// (front_devices()), "" = of all.
+/// Returns runs of the motion set as points of time and error, in the order of the records. They are those of
+/// one executor (front_devices()); "" = of all.
 std::vector<WorkPoint> motion_points(const WorkReport& report, MotionHair hair,
                                      const std::string& device = "");
 
-/// Whether any model beats the champion, in a sentence for each kind of hair and executor; where there are
-/// several, also what they save.
+/// Returns whether any model beats the champion, in a sentence for each kind of hair and executor. With
+/// several executors, also what they save.
 std::string work_precision_summary(const WorkReport& report);
 
 std::string work_precision_csv(const WorkReport& report);
 std::string work_precision_page(const WorkReport& report);
 
-/// Error against time on the motion set: all runs faint, each model's front as a line, and the front of all
-/// models on every other executor.
+/// Returns a plot of error against time on the motion set. All runs are faint, each model's front is a line,
+/// and so is the overall front on every other executor.
 std::string motion_plot(const WorkReport& report, MotionHair hair, const std::string& device = "");
-/// Error against time of one analytic test, on the first executor.
+/// Returns a plot of error against time for one analytic test, on the first executor.
 std::string analytic_plot(const WorkReport& report, const std::string& test, const std::string& title);
 
 Status save_work_precision(const WorkReport& report, const std::filesystem::path& folder);

@@ -1,5 +1,6 @@
-// BustFollower: where the chest under a moving head is. With the motion's joints it is where they are; else
-// it stands upright and turns to where the head looks, softly. Simulation thread; deterministic.
+// BustFollower: computes the pose of the chest under a moving head. It uses the motion's joints if there are
+// any. Otherwise the chest stays upright and turns smoothly towards where the head looks. Simulation thread;
+// deterministic.
 #pragma once
 
 #include <complex>
@@ -9,22 +10,25 @@
 
 namespace strandcast {
 
-/// Of two low passes one behind the other, s: a head that shakes at 2.2 Hz by 55 degrees moves the chest by
-/// 2 degrees, 4 as it begins, and one that turns for good has the chest turned by nine tenths after 1.8 s.
+/// Time constant of each of two successive low-pass filters, s. A head that shakes at 2.2 Hz by 55 degrees
+/// moves the chest by 2 degrees (4 at first). After a lasting turn the chest has followed by nine tenths in
+/// 1.8 s.
 inline constexpr double kBustLagS = 0.45;
 
 class BustFollower {
  public:
-  /// The head jumps, and takes neck and chest along as they are.
+  /// Moves neck and chest rigidly with a head that jumps.
   void carry(const glm::dquat& world_from_head_before, const glm::dquat& world_from_head,
              const JointPlaces& joints);
-  /// The head came here, evenly, within so long. `joints`: of the motion, head space.
+  /// Follows the head, which moved evenly to this rotation within `seconds`. `joints`: of the motion, head
+  /// space.
   void follow(const glm::dquat& world_from_head, const JointPlaces& joints, double seconds);
 
   glm::dquat world_from_chest() const;
 
  private:
-  /// Two low passes of the same lag: exact for inputs on a line, so steps of any length end at the same.
+  /// Two low-pass filters of equal lag; exact for inputs on a line, so step length does not change the
+  /// result.
   struct Lag {
     std::complex<double> input, once, twice;
 

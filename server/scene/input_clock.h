@@ -1,6 +1,6 @@
-// InputClock: up to which time of the input streams each simulation step goes. In real time that is the time
-// the step stands for. When steps are left out it goes on smoothly, faster than the simulation, so that the
-// head does not leap whenever a step is missing. Pure logic: times are passed in.
+// InputClock: chooses the input time that each simulation step uses. In real time it is the time that the
+// step represents. If steps are dropped, it advances smoothly, faster than the simulation, so that the head
+// does not leap. Pure logic: times are passed in.
 #pragma once
 
 #include <cstdint>
@@ -8,25 +8,25 @@
 
 namespace strandcast {
 
-/// Behind by a sudden stop, the inputs are this share of it closer with every step: half of it after five.
-/// At a lasting pace f of the simulation they stay (1 / f - 1) * (1 / kCatchUpShare - 1) steps behind.
+/// Share of the remaining lag that each step removes: half of a sudden lag is gone after five steps. At a
+/// lasting speed f of the simulation the inputs lag by (1 / f - 1) * (1 / kCatchUpShare - 1) steps.
 inline constexpr double kCatchUpShare = 0.125;
-/// Further behind than this the inputs leap: it was a stop, and nobody wants to see what was missed.
+/// Lag beyond which the inputs leap to the present; it was a stop, and nobody wants to see what was missed.
 inline constexpr int64_t kLongestBehindNs = 1'000'000'000;
-/// Closer than this is not behind.
+/// Lag below which the inputs count as up to date.
 inline constexpr int64_t kOnTimeNs = 10'000;
 
 class InputClock {
  public:
   explicit InputClock(double step_s);
 
-  /// The time of the inputs at the end of the next step, which stands for `due_ns` of server time. Never
-  /// later than that, and exactly that while no step was left out.
+  /// Returns the input time at the end of the next step, which represents server time `due_ns`. Never later
+  /// than that, and equal to it while no step was dropped.
   int64_t next(int64_t due_ns);
-  /// The next step follows none: nothing was missed.
+  /// Makes the next step count as the first, so that nothing is caught up.
   void restart() { last_due_ns_.reset(); }
 
-  /// Time of the inputs that passed in the newest step per simulated time; 1 in real time, never less.
+  /// Returns input time per simulated time in the newest step; 1 in real time, never less.
   double rate() const { return rate_; }
 
  private:

@@ -1,4 +1,4 @@
-// SceneContent: what a SceneDesc refers to, loaded: groom, head mesh and colliders. Any thread, no GL.
+// SceneContent: the loaded contents of a SceneDesc: groom, head mesh and colliders. Any thread, no GL.
 #pragma once
 
 #include <memory>
@@ -26,10 +26,11 @@ struct SceneContent {
   std::shared_ptr<const DistanceField> head_field;  // head space; where the scene asks for one
 };
 
-/// Loads or grows the groom and the head. Errors name the file or the option.
+/// Loads or grows the groom and the head. Errors name the file or option.
 Result<SceneContent> load_scene_content(const SceneDesc& scene);
 
-/// Those of the scene; without any the head's, unless the scene wants none. Head space.
+/// Returns the scene's colliders, or the head's if the scene lists none and does not disable them. Head
+/// space.
 std::vector<SphereCollider> colliders_of(const SceneDesc& scene,
                                          const std::vector<SphereCollider>& head_colliders);
 

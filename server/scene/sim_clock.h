@@ -1,6 +1,6 @@
-// SimClock: when the next fixed step is due. A late simulation catches up by at most kMaxCatchUpSteps; older
-// steps are dropped and counted, so that one slow moment never becomes a lasting delay. Pure logic: time is
-// passed in.
+// SimClock: determines when the next fixed step is due. A late simulation catches up by at most
+// kMaxCatchUpSteps. Older steps are dropped and counted, so that one slow moment never becomes a lasting
+// delay. Pure logic: time is passed in.
 #pragma once
 
 #include <cstdint>
@@ -16,25 +16,25 @@ class SimClock {
   /// Starts running; the first step is due one step after `time_ns`.
   SimClock(double step_s, int64_t time_ns);
 
-  /// Takes the next step if it is due by `time_ns`: the server time that its end stands for. While paused
-  /// only steps asked for by add_single_steps().
+  /// Takes the next step if it is due by `time_ns` and returns the server time of its end. While paused, only
+  /// steps from add_single_steps() are taken.
   std::optional<int64_t> take_step(int64_t time_ns);
-  /// Leaves out all steps that are due by `time_ns`, which nobody needs: they are taken as far as the pace
-  /// goes. Gives how many; none while paused.
+  /// Skips all steps that are due by `time_ns`, because nobody needs them; the real-time factor counts them
+  /// as taken. Returns their number; 0 while paused.
   uint64_t skip(int64_t time_ns);
-  /// When take_step() will have one; nullopt while paused.
+  /// Returns when the next step is due; nullopt while paused.
   std::optional<int64_t> next_due_ns() const;
 
   void pause();
-  /// Goes on from `time_ns`: the pause is not caught up.
+  /// Resumes at `time_ns`; the paused time is not caught up.
   void resume(int64_t time_ns);
   bool is_paused() const { return is_paused_; }
-  /// So many more steps while paused; false when running.
+  /// Adds `count` single steps while paused; returns false if running.
   bool add_single_steps(uint32_t count);
-  /// Steps asked for by add_single_steps() are waiting.
+  /// Returns whether steps of add_single_steps() are waiting.
   bool has_single_steps() const { return single_steps_ > 0; }
 
-  /// Steps taken over steps that real time asked for, within the last second; 0 while paused.
+  /// Returns steps taken divided by steps that real time required, within the last second; 0 while paused.
   double realtime_factor(int64_t time_ns) const;
   uint64_t dropped_steps() const { return dropped_steps_; }
 

@@ -1,5 +1,5 @@
-// StepBuilder: turns the input at the end of a step into what each substep of the solver needs: head movement
-// and turn, wind and gusts, colliders in head-relative world axes. Simulation thread; deterministic.
+// StepBuilder: computes the inputs of each substep of the solver from the input at the end of a step: head
+// motion, wind, gusts, and colliders in head-relative world axes. Simulation thread; deterministic.
 #pragma once
 
 #include <optional>
@@ -18,32 +18,31 @@ namespace strandcast {
 struct SceneStep {
   Pose world_from_head;             // at the end of the step
   std::vector<StepInput> substeps;  // scene.substeps of them
-  /// Strands go along as they are to this rotation of the head (Solver::rebase) before the first substep: the
-  /// head jumped, or inputs pass faster than the simulation. World from head.
+  /// Rotation of the head (world from head) to which strands are carried rigidly (Solver::rebase()) before
+  /// the first substep. Set if the head jumped, or if inputs pass faster than the simulation.
   std::optional<glm::dquat> carried_to_rotation;
 };
 
-/// What part of the head's way in a step the strands feel; they go along as they are with the rest. 1 where
-/// motion passes no faster than simulated time. Where `rate` times as much motion passes, 1 / rate^2: a step
-/// stands for `rate` steps, and so large is the head's acceleration as it was (its speed is 1 / rate of what
-/// it was, and changes in 1 / rate of the time). With the whole way it would be rate^2 times as large, and
-/// hair stands on end.
+/// Returns the share of the head's motion in a step that strands feel; they are carried along with the rest.
+/// It is 1 if inputs pass no faster than simulated time. At input rate `rate` it is 1 / rate^2, so that
+/// accelerations keep their true size: a step covers `rate` steps of motion, which would scale them by rate^2
+/// and make hair stand on end.
 double felt_share(double rate);
 
 class StepBuilder {
  public:
-  /// `colliders` in head space.
+  /// Starts with a scene; `colliders` are in head space.
   StepBuilder(const SceneDesc& scene, std::vector<SphereCollider> colliders);
 
-  /// Changed scene values; the head stays where it is.
+  /// Takes changed scene values; the head stays where it is.
   void change(const SceneDesc& scene, std::vector<SphereCollider> colliders);
 
-  /// The neck that the head's colliders have; without one neck and chest are as the head is. Those that a
-  /// scene lists itself go along with the head alone, and so does the bust then.
+  /// Sets the neck that moves the head's own colliders. Without one, and with colliders that the scene lists,
+  /// everything moves rigidly with the head.
   void set_bust(const BustRig& rig) { bust_rig_ = rig; }
 
-  /// The step that ends at `end_time_s` of simulated time: how the head moves, without wind and colliders.
-  /// `input_rate`: time of the inputs since the last step per simulated time (InputClock).
+  /// Begins the step that ends at `end_time_s` of simulated time: computes the head's motion, without wind
+  /// and colliders. `input_rate`: input time per simulated time (InputClock).
   void begin(const InputFrame& input, double end_time_s, double input_rate = 1.0);
   // What the facts add to it.
   void add_wind();
@@ -51,27 +50,27 @@ class StepBuilder {
   void add_colliders();
   void add_follicle_limit();
   void add_body();
-  /// Valid until the next begin().
+  /// Returns the step; valid until the next begin().
   const SceneStep& step() const { return step_; }
 
-  /// All of that; wind, gusts and the limit of the roots for these facts.
+  /// Begins and completes a step: adds wind, gusts and the root limit that these facts require.
   const SceneStep& build(const InputFrame& input, const SceneFeatures& features, double end_time_s);
 
-  /// The same as others need it who take the step too.
+  /// Return the same step in the form that others need to simulate it too.
   StepScene step_scene(const SceneFeatures& features) const;
   StepTick step_tick(uint64_t tick) const;
 
-  /// Joints that shapes of the body need and the input of the newest step does not have, a sentence for each.
+  /// Returns a sentence for each joint that the body's shapes need and the newest input lacks.
   const std::vector<std::string>& missing_joints() const { return missing_joints_; }
-  /// Places of the body's shapes at the end of the newest step.
+  /// Returns the body's capsules at the end of the newest step.
   const std::vector<BodyCapsule>& body_capsules() const { return capsules_; }
 
   const Pose& world_from_head() const { return world_from_head_; }
-  /// Of the chest at the end of the newest step.
+  /// Returns the pose of the chest at the end of the newest step.
   BustCode bust() const { return has_bust() ? bust_ : kRigidBust; }
-  /// Of the head joint during the last substep of the newest step, world.
+  /// Returns the velocity of the head joint during the last substep of the newest step, world.
   glm::dvec3 head_velocity_mps() const;
-  /// Gravity that the groom has its shape under, head space.
+  /// Returns the gravity under which the groom has its shape, in head space.
   const glm::dvec3& groom_gravity_in_head_mps2() const { return groom_gravity_in_head_mps2_; }
 
  private:
@@ -101,8 +100,8 @@ class StepBuilder {
   std::vector<glm::dvec3> head_position_m_;  // at the end of each substep, world
 };
 
-/// Waves that vary the wind over the size of a head: the part of the turbulence (von Karman, inertial range)
-/// between their wavelengths, carried by the mean wind; each is divergence-free. Empty without gusts.
+/// Makes waves that vary the wind over the size of a head: the turbulence (von Karman, inertial range)
+/// between their wavelengths, carried by the mean wind. Each wave is divergence-free. Empty without gusts.
 std::vector<GustWave> make_gust_waves(const WindDesc& wind);
 
 }  // namespace strandcast

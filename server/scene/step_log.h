@@ -1,4 +1,4 @@
-// StepLog: what the last steps were made of, for snapshots to carry (StepTrail). Simulation thread.
+// StepLog: inputs of the last steps, which snapshots carry (StepTrail). Simulation thread.
 #pragma once
 
 #include <memory>
@@ -10,14 +10,14 @@ namespace strandcast {
 
 class StepLog {
  public:
-  /// nullptr: nobody else can take the steps.
+  /// Sets the model of the steps; nullptr if nobody else can simulate them.
   void set_model(std::shared_ptr<const StepModel> model) { model_ = std::move(model); }
-  /// The scene of the steps from now on.
+  /// Sets the scene of the steps from now on.
   void set_scene(const StepScene& scene);
   void add(const StepTick& tick);
-  /// StepKernel::cost of the model; 0 without one.
+  /// Returns StepKernel::cost of the model; 0 without one.
   double step_cost() const;
-  /// As it is now; nullptr while there is no model.
+  /// Returns the current trail; nullptr while there is no model.
   std::shared_ptr<const StepTrail> trail() const;
 
  private:

@@ -1,5 +1,4 @@
-// BandedSystem: the linear systems of the double-precision reference solvers of strands. Header only; one
-// thread.
+// BandedSystem: linear systems of the double-precision reference solvers of strands. Header only; one thread.
 #pragma once
 
 #include <algorithm>
@@ -10,15 +9,15 @@
 
 namespace strandcast {
 
-/// Symmetric positive matrix with kUnknowns per vertex, whose blocks reach kBlocks - 1 vertices off the
-/// diagonal, solved by scalar Cholesky. The first three unknowns of a vertex are a vector.
+/// Symmetric positive definite matrix with kUnknowns per vertex, whose blocks reach kBlocks - 1 vertices off
+/// the diagonal. Solved by scalar Cholesky. The first three unknowns of a vertex are a vector.
 template <size_t kUnknowns, size_t kBlocks>
 class BandedSystem {
  public:
   explicit BandedSystem(size_t vertex_count)
       : band_(kUnknowns * vertex_count * kWidth, 0.0), right_side_(kUnknowns * vertex_count, 0.0) {}
 
-  /// Rows and columns are unknowns; of a pair above the diagonal nothing is added.
+  /// Adds a value at a row and column of unknowns; entries above the diagonal are ignored.
   void add(size_t row, size_t column, double value) {
     if (column <= row) at(row, column) += value;
   }
@@ -33,7 +32,7 @@ class BandedSystem {
     for (size_t c = 0; c < 3; ++c) add_right(kUnknowns * i + c, force[static_cast<int>(c)]);
   }
 
-  /// The solution for each vertex, or nothing when a pivot is not positive. Overwrites the system.
+  /// Returns the solution for each vertex, or nothing if a pivot is not positive. Overwrites the system.
   std::vector<glm::vec<static_cast<int>(kUnknowns), double>> solve() {
     const size_t n = right_side_.size();
     for (size_t i = 0; i < n; ++i) {

@@ -1,6 +1,6 @@
-// BendLimit: the pass that keeps the angles between a strand's segments within limits after each substep of
-// whatever model's kernel ran (shaders/sim/bend_limit.comp). Strands whose tip is held too are left alone:
-// their lengths could not be kept. From the thread of its executor.
+// BendLimit: a pass that limits the angles between a strand's segments after each substep of any model
+// (shaders/sim/bend_limit.comp). Strands with a pinned tip are not changed, because their lengths could not
+// be kept. Runs on its executor's thread.
 #pragma once
 
 #include <memory>
@@ -15,13 +15,13 @@ BendAngles bend_angles(const BendLimitDesc& limits);
 
 class BendLimit {
  public:
-  /// As Executor::make_program().
+  /// Makes the pass; errors as Executor::make_program().
   static Result<BendLimit> make(Executor& executor, const SceneFeatures& features, const StrandLayout& layout,
                                 const CarriedPlanes& carried, const BendLimitDesc& limits);
 
-  /// Whether strands of this layout are moved at all.
+  /// Returns whether the pass moves strands of this layout.
   static bool holds(const StrandLayout& layout) { return layout.pinned_tail_count == 0; }
-  /// `strands`: the planes of the state.
+  /// Runs the pass after a substep; `strands` are the planes of the state.
   void run(const StepBlock& step, BoundPlanes strands, const CarriedPlanes& carried);
   uint64_t size_bytes() const { return program_->size_bytes(); }
 

@@ -1,7 +1,7 @@
-// BodyCollider: the pass that keeps strands out of the body's capsules and planes after each substep of
-// whatever model's kernel ran (shaders/sim/body_collider.comp, which says how; in double: reference_body.h).
-// Before the head's distance field, which has the last word. Strands whose tip is held too are left alone:
-// their lengths could not be kept. From the thread of its executor.
+// BodyCollider: a pass that keeps strands out of the body's capsules and planes after each substep of any
+// model. Algorithm: shaders/sim/body_collider.comp; in double precision: reference_body.h. It runs before the
+// pass of the head's distance field, which decides last. Strands with a pinned tip are not changed, because
+// their lengths could not be kept. Runs on its executor's thread.
 #pragma once
 
 #include <memory>
@@ -13,16 +13,17 @@ namespace strandcast {
 
 class BodyCollider {
  public:
-  /// For the strands as they are, which stay where they are in the first run. As Executor::make_program() and
-  /// make_table().
+  /// Makes the pass for the strands in their present state; its first run does not move them. Errors as
+  /// Executor::make_program() and make_table().
   static Result<BodyCollider> make(Executor& executor, const SceneFeatures& features,
                                    const StrandState& strands, const CarriedPlanes& carried);
 
-  /// Whether strands of this layout are moved at all.
+  /// Returns whether the pass moves strands of this layout.
   static bool holds(const StrandLayout& layout) {
     return layout.pinned_tail_count == 0 && layout.pinned_root_count < layout.vertex_count;
   }
-  /// `strands`: the planes of the state, of which `step`, made of `input`, was a substep.
+  /// Runs the pass after the substep `step`, which was made of `input`; `strands` are the planes of the
+  /// state.
   void run(const StepBlock& step, const StepInput& input, BoundPlanes strands, const CarriedPlanes& carried);
   uint64_t size_bytes() const;
 

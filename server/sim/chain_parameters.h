@@ -1,5 +1,5 @@
-// Parameters of the models with the bending and twist stiffness of a hair on top of the shared ones: chains
-// of rigid segments and helical pieces. Plain data, any thread.
+// Parameters of models with a hair's bending and twist stiffness: chains of rigid segments and helical
+// pieces. They extend the shared parameters. Plain data, any thread.
 #pragma once
 
 #include <string>
@@ -17,16 +17,18 @@ struct ChainParameters {
   uint32_t effort = 1;                 // of the row's effort parameter: solves, sweeps, elements
 };
 
-/// The shared entries that such a model has (no velocity correction), and its own without the effort.
+/// Returns the shared entries that such a model has (without velocity correction) and its own, except the
+/// effort parameter.
 std::vector<SolverParameterInfo> chain_parameter_infos();
 
-/// Reads its own out of a completed map; the effort from the entry of that name, rounded.
+/// Reads these parameters from a completed map; the effort comes from the entry `effort_name`, rounded.
 ChainParameters read_chain_parameters(const SolverParameters& parameters, const std::string& effort_name);
 
-/// For SolverRow::as_hair: true constants, no pull to the groomed shape, no damping, no drag.
+/// Returns the parameters for SolverRow::as_hair: physical constants without a pull to the groomed shape,
+/// damping or drag.
 SolverParameters chain_as_hair(const HairConstants& hair);
 
-/// The kernel of a model of rigid segments, shaders/sim/NAME.comp on top of chain.glsl.
+/// Makes the kernel solver of a model of rigid segments: shaders/sim/NAME.comp, which includes chain.glsl.
 Result<std::unique_ptr<Solver>> make_chain_kernel(const std::string& name, const std::string& effort_name,
                                                   const SolverParameters& parameters,
                                                   const SolverContext& context);

@@ -1,4 +1,4 @@
-// Directions in double precision, as the reference solvers need them. Pure functions, any thread.
+// Directions in double precision for the reference solvers. Pure functions, any thread.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -6,16 +6,17 @@
 
 namespace strandcast {
 
-/// The vector's direction, or the other one where it is too short to have any.
+/// Returns the unit direction of a vector, or `otherwise` if it is too short to have one.
 glm::dvec3 direction_or(const glm::dvec3& vector, const glm::dvec3& otherwise);
 
-/// Smallest rotation from one unit vector to another; of opposite ones, any.
+/// Returns the smallest rotation from one unit vector to another; an arbitrary one of them for opposite
+/// vectors.
 glm::dquat smallest_rotation(const glm::dvec3& from, const glm::dvec3& to);
 
-/// A unit vector at right angles to one.
+/// Returns a unit vector perpendicular to `direction`.
 glm::dvec3 any_perpendicular(const glm::dvec3& direction);
 
-/// The matrix that takes x to v x x.
+/// Returns the matrix that maps x to the cross product v x x.
 glm::dmat3 cross_matrix(const glm::dvec3& v);
 
 }  // namespace strandcast

@@ -1,7 +1,7 @@
-// FieldCollider: the pass that keeps strands out of the head's distance field after each substep of whatever
-// model's kernel ran (shaders/sim/field_collider.comp, which says how; in double: reference_field.h). Behind
-// the follicle limit, which turns roots: what it ends with is outside of the head. Strands whose tip is held
-// too are left alone: their lengths could not be kept. From the thread of its executor.
+// FieldCollider: a pass that keeps strands out of the head's distance field after each substep of any model.
+// Algorithm: shaders/sim/field_collider.comp; in double precision: reference_field.h. It runs after the
+// follicle limit, which rotates roots, so that strands end outside the head. Strands with a pinned tip are
+// not changed, because their lengths could not be kept. Runs on its executor's thread.
 #pragma once
 
 #include <memory>
@@ -14,16 +14,17 @@ namespace strandcast {
 
 class FieldCollider {
  public:
-  /// For the strands as they are. As Executor::make_program() and make_table().
+  /// Makes the pass for the strands in their present state. Errors as Executor::make_program() and
+  /// make_table().
   static Result<FieldCollider> make(Executor& executor, const SceneFeatures& features,
                                     const StrandState& strands, const CarriedPlanes& carried,
                                     const DistanceField& field);
 
-  /// Whether strands of this layout are moved at all.
+  /// Returns whether the pass moves strands of this layout.
   static bool holds(const StrandLayout& layout) {
     return layout.pinned_tail_count == 0 && layout.pinned_root_count < layout.vertex_count;
   }
-  /// `strands`: the planes of the state, of which `step` was a substep.
+  /// Runs the pass after the substep `step`; `strands` are the planes of the state.
   void run(const StepBlock& step, BoundPlanes strands, const CarriedPlanes& carried);
   uint64_t size_bytes() const;
 

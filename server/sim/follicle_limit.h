@@ -1,7 +1,7 @@
-// FollicleLimit: the pass that holds roots after each substep of whatever model's kernel ran
-// (shaders/sim/follicle_limit.comp). A strand leans from its groomed direction only as far as a follicle lets
-// it; what hangs on its first free segment goes along. Strands whose tip is held too are left alone: their
-// lengths could not be kept. From the thread of its executor.
+// FollicleLimit: a pass that limits how far a strand's root leans from its groomed direction, after each
+// substep of any model (shaders/sim/follicle_limit.comp). The rest of the strand moves along with its first
+// free segment. Strands with a pinned tip are not changed, because their lengths could not be kept. Runs on
+// its executor's thread.
 #pragma once
 
 #include <memory>
@@ -12,7 +12,7 @@
 
 namespace strandcast {
 
-/// Planes of a model that go along with strands that are moved, where it has them; null = it has none.
+/// Planes of a model that must be moved along when a pass moves strands; null = the model has none.
 struct CarriedPlanes {
   StrandPlane* way = nullptr;   // of every vertex in the last substep; world, m
   StrandPlane* axis = nullptr;  // of every segment; world. Only with `way`
@@ -22,13 +22,13 @@ struct CarriedPlanes {
 
 class FollicleLimit {
  public:
-  /// As Executor::make_program().
+  /// Makes the pass; errors as Executor::make_program().
   static Result<FollicleLimit> make(Executor& executor, const SceneFeatures& features,
                                     const StrandLayout& layout, const CarriedPlanes& carried);
 
-  /// Whether this substep's strands are held: the input has a limit, and the strands have free tips.
+  /// Returns whether the pass acts in this substep: the input has a limit and the strands have free tips.
   static bool holds(const StepInput& input, const StrandLayout& layout);
-  /// `strands`: the planes of the state.
+  /// Runs the pass after a substep; `strands` are the planes of the state.
   void run(const StepBlock& step, size_t collider_count, BoundPlanes strands, const CarriedPlanes& carried);
   uint64_t size_bytes() const { return program_->size_bytes(); }
 

@@ -1,6 +1,6 @@
-// FollowedSolver: a solver of a part of the hair, the first strands or some vertices of each, that gives all
-// of it: the rest follows (StrandFollow, VertexFollow) when somebody reads, and takes no step. From the
-// thread of the solver that it has.
+// FollowedSolver: simulates a part of the hair with another solver: the first strands, or some vertices of
+// each. The rest follows without simulation (StrandFollow, VertexFollow) and is computed when the state is
+// read. Runs on the inner solver's thread.
 #pragma once
 
 #include <memory>
@@ -14,7 +14,7 @@
 
 namespace strandcast {
 
-/// What of the hair is simulated.
+/// Part of the hair that is simulated.
 struct SimulatedPart {
   double strand_share = 1.0;   // the first strands; in (0, 1]
   uint32_t vertex_stride = 1;  // every so many of a strand's vertices, at least 1
@@ -23,14 +23,14 @@ struct SimulatedPart {
   bool operator==(const SimulatedPart&) const = default;
 };
 
-/// As scene and facts decide; all of hair that cannot follow.
+/// Returns the part that scene and facts call for; all of it if the groom's strands cannot follow others.
 SimulatedPart simulated_part(const SceneDesc& scene, const RuntimeFacts& facts, const Groom& groom);
-/// Of a uniform groom that can_follow().
+/// Returns the groom of the simulated part; `groom` must be uniform and satisfy can_follow().
 Groom simulated_groom(const Groom& groom, const SimulatedPart& part);
 
 class FollowedSolver : public Solver {
  public:
-  /// `guides` has strands of its own.
+  /// Wraps `guides`, which must own its strands.
   FollowedSolver(std::unique_ptr<Solver> guides, SimulatedPart part)
       : guides_(std::move(guides)), part_(part) {}
 
@@ -38,16 +38,16 @@ class FollowedSolver : public Solver {
   void substep(const StepInput& input) override;
   void gather(const StepInput& input) override { guides_->gather(input); }
   void follow_guides() override;
-  /// Velocities of the strands that follow: how they go on while the guides move as they do.
+  /// Copies out the state; following strands have the velocities of their present motion with the guides.
   void read(SolverState& state) override;
-  /// Their velocities are the mean of their guides'.
+  /// Returns the state; the velocity of a following strand is the mean of its guides'.
   SolverBlocks read_blocks() override;
-  /// Of the first strands; the others follow them from here on.
+  /// Sets the first strands; the others follow them from then on.
   void write(const SolverState& state) override;
   void rebase(const glm::dquat& world_from_head_rotation) override;
   uint32_t strand_count() const override { return follow_ ? follow_->strand_count() : 0; }
   uint32_t guide_count() const { return follow_ ? follow_->guide_count() : 0; }
-  /// Of a strand, that are simulated.
+  /// Returns the number of simulated vertices of a strand.
   uint32_t simulated_vertices() const {
     return vertices_ ? static_cast<uint32_t>(vertices_->kept().size()) : 0;
   }
@@ -75,7 +75,7 @@ class FollowedSolver : public Solver {
   StrandBlocks velocity_blocks_;
 };
 
-/// The groom with its first strands alone.
+/// Returns a groom with the first `count` strands only.
 Groom first_strands(const Groom& groom, uint32_t count);
 
 }  // namespace strandcast

@@ -1,6 +1,6 @@
-// KernelSolver: what solvers with a kernel share around it: the strands' state, the step's block, load, read,
-// write and rebase. A model says what its kernel is, and what it keeps beside the state. From the thread of
-// its executor.
+// KernelSolver: common part of the solvers with a kernel: state of the strands, uniform block of a step,
+// load, read, write and rebase. A model provides its kernel and its data besides the state. Runs on its
+// executor's thread.
 #pragma once
 
 #include <memory>
@@ -38,29 +38,29 @@ class KernelSolver : public Solver {
  protected:
   KernelSolver(const SolverContext& context, const StrandParameters& parameters);
 
-  /// The strands are known: allocates. Changes nothing of the state.
+  /// Allocates the model's data once the strands are known; must not change the state.
   virtual void prepare() {}
-  /// For the strands as they are, after prepare().
+  /// Returns the kernel for the strands in their present state; called after prepare().
   virtual KernelDesc kernel() const = 0;
-  /// Starts without a history from the strands as they are, when the kernel is compiled.
+  /// Starts without a history from the present strands, after the kernel was compiled.
   virtual void begin() {}
-  /// Puts in the planes that the model keeps beside the state, as far as its kernel touches them.
+  /// Adds the model's own planes, as far as its kernel uses them.
   virtual void bind(BoundPlanes&) const {}
-  /// Before a substep, for what depends on its input.
+  /// Adapts the model to the input of the coming substep.
   virtual void adapt(const StepInput&) {}
-  /// Strands that somebody else moved start without a history.
+  /// Clears the history of strands that were moved from outside.
   virtual void forget(const std::vector<bool>&) {}
-  /// What is kept beside the state of where vertices were and how segments are turned, to go along when a
-  /// substep's strands are moved once more.
+  /// Returns the model's planes of earlier positions and of segment orientations. A pass that moves strands
+  /// must update these too.
   virtual CarriedPlanes carried() const { return {}; }
-  /// What is kept beside the state turns with it.
+  /// Rotates the model's data along with the state.
   virtual void turn_memory(const glm::dquat&) {}
   virtual uint64_t model_bytes() const { return 0; }
 
   const StrandLayout& layout() const { return strands_->layout(); }
   StrandState& state() { return *strands_; }
   const StrandState& state() const { return *strands_; }
-  /// (rows x strand_count) values.
+  /// Makes a plane with (rows x strand_count) values.
   std::unique_ptr<StrandPlane> make_plane(const std::string& label, std::span<const glm::vec4> values) const {
     return executor_.make_plane(label, layout().strand_count, values);
   }

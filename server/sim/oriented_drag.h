@@ -1,5 +1,5 @@
-// OrientedDrag: the pass that makes air drag hair less along its length than across, before each substep of
-// whatever model's kernel (shaders/sim/oriented_drag.comp). From the thread of its executor.
+// OrientedDrag: a pass that makes the drag of air smaller along a hair than across it, before each substep of
+// any model (shaders/sim/oriented_drag.comp). Runs on its executor's thread.
 #pragma once
 
 #include <memory>
@@ -10,13 +10,13 @@ namespace strandcast {
 
 class OrientedDrag {
  public:
-  /// As Executor::make_program(). `along_share`: of the drag across, what there is along, 0..1. `way`: the
-  /// model's plane of how every vertex moved in the last substep, where its stored velocities are not that;
-  /// may be null.
+  /// Makes the pass; errors as Executor::make_program(). `along_share`: drag along the hair relative to that
+  /// across, 0..1. `way`: the model's plane of displacements in the last substep if its stored velocities
+  /// differ from them; else null.
   static Result<OrientedDrag> make(Executor& executor, const SceneFeatures& features,
                                    const StrandLayout& layout, const StrandPlane* way, double along_share);
 
-  /// `strands`: the planes of the state, before the substep.
+  /// Runs the pass before a substep; `strands` are the planes of the state.
   void run(const StepBlock& step, BoundPlanes strands, StrandPlane* way);
   uint64_t size_bytes() const { return program_->size_bytes(); }
 

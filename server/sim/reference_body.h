@@ -1,5 +1,5 @@
-// What double-precision strands do about a body of capsules and planes. Written from the geometry, without a
-// line in common with shaders/sim/body_collider.comp.
+// Collision of double-precision strands with a body of capsules and planes. Written from the geometry,
+// without sharing code with shaders/sim/body_collider.comp.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,11 @@
 
 namespace strandcast {
 
-/// How far a point is outside of the body, m; negative inside. Huge where there is none.
+/// Returns the distance of a point from the body, m; negative inside, huge without a body.
 double distance_to_body_m(const BodyInput& body, const glm::dvec3& point_m);
 double distance_to_capsule_m(const BodyCapsule& capsule, const glm::dvec3& point_m);
 
-/// One strand after its substep, seen from the head: m in head space.
+/// One strand after its substep, in head space (m).
 struct ReferenceBodyStrand {
   std::span<const glm::dvec3> before_m;  // where it was after the substep before
   std::span<const double> arc;           // 0 at the root, 1 at the tip
@@ -23,8 +23,8 @@ struct ReferenceBodyStrand {
   std::span<glm::dvec3> position_m;
 };
 
-/// Turns segments out of the body (BodyResponse::Turn and Sphere) or moves vertices (Project). False when
-/// nothing had to move.
+/// Moves a strand out of the body by rotating segments (BodyResponse::Turn and Sphere) or moving vertices
+/// (Project). Returns false if nothing had to move.
 bool keep_out_of(const BodyInput& body, const ReferenceBodyStrand& strand);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// ReferenceChain: what the double-precision references of chains of rigid segments share. Frames are
-// quaternions that take x to the first axis across a segment and z to its direction.
+// ReferenceChain: common part of the double-precision references of chains of rigid segments. Frames are
+// quaternions that map x to the first axis across a segment and z to its direction.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -12,14 +12,14 @@
 
 namespace strandcast {
 
-/// The frame turned by the smallest rotation that brings it to another direction.
+/// Returns the frame rotated by the smallest rotation to another direction.
 glm::dquat carried_frame(const glm::dquat& frame, const glm::dvec3& along);
 
-/// Moment that turns `to` away from `from` over the stiffness: their angle about the axis between them; from
-/// a right angle on it falls again.
+/// Moment, divided by the stiffness, that bends `to` back to `from`: their angle about the axis between them,
+/// which decreases again beyond a right angle.
 glm::dvec3 bend_between(const glm::dvec3& from, const glm::dvec3& to);
 
-/// One segment during one substep; masses are lengths, everything is divided by the mass per length.
+/// One segment during one substep. Everything is divided by the mass per length, so masses are lengths.
 struct ChainSegment {
   double length_m = 0.0;                     // as it is
   double lever_m = 0.0;                      // as it counts in the matrix
@@ -43,17 +43,18 @@ class ReferenceChain : public ReferenceStrands {
   ReferenceChain(const StrandParameters& shared, const ChainParameters& parameters)
       : ReferenceStrands(shared), parameters_(parameters) {}
 
-  /// Turns all segments once; false when something came out broken.
+  /// Rotates all segments once; returns false if a result is not finite.
   virtual bool turn_segments(ReferenceChainState& chain) const = 0;
 
-  /// Stiffness of the joint before segment i, moment per angle; `tension` is what stretches the segment.
+  /// Returns the stiffness of the joint before segment i, as moment per angle; `tension` stretches the
+  /// segment.
   double bend_stiffness(const ReferenceChainState& chain, size_t i, double tension_m2ps2) const;
-  /// Turns a segment by a rotation vector, within the limit per round.
+  /// Rotates a segment by a rotation vector, within the limit per round.
   static void turn(ChainSegment& segment, const glm::dvec3& rotation);
   const ChainParameters& parameters() const { return parameters_; }
 
  private:
-  /// The spin of every segment against the frame that is carried along without twist.
+  /// Spin of every segment relative to its frame that is transported without twist.
   size_t memory_size() const final { return layout().vertex_count; }
   void solve(ReferenceStrand& strand) const final;
   glm::dvec3 rest_m(const ReferenceStrand& strand, uint32_t i) const;

@@ -1,5 +1,5 @@
-// What the double-precision reference solvers do about colliders and moving air. Written from the equations,
-// without a line in common with the shaders.
+// Collisions and moving air of the double-precision reference solvers. Written from the equations, without
+// sharing code with the shaders.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -11,13 +11,15 @@
 namespace strandcast {
 
 inline constexpr double kTinyLengthM = 1e-10;
-/// Rounds of answers to a field or a body: two, and more where so much is left.
+/// Number of rounds of resolving contacts with a field or body: at least two, and more while this much
+/// penetration remains.
 inline constexpr int kMostRounds = 5;
 inline constexpr double kResidueM = 5e-5;
-/// An end that the middle's turn moved by more than twice this may have met something else.
+/// Displacement beyond which an end moved by the middle's rotation is checked again; it may have met
+/// something else at twice this distance.
 inline constexpr double kLookAgainM = 2e-4;
 
-/// A collider as the solvers take it, within the limits of strand_layout.h.
+/// A collider as the solvers use it, within the limits of strand_layout.h.
 struct ReferenceSphere {
   glm::dvec3 center_m{0.0};
   double radius_m = 0.0;
@@ -25,19 +27,19 @@ struct ReferenceSphere {
 size_t sphere_count(const StepInput& input);
 ReferenceSphere sphere_of(const StepInput& input, size_t index);
 
-/// The sphere that the point is deepest inside of, by r^2 - d^2; its radius is 0 when the point is in none.
+/// Returns the sphere that contains the point most deeply, by r^2 - d^2; its radius is 0 if none does.
 ReferenceSphere deepest_sphere(const StepInput& input, const glm::dvec3& point_m);
 
-/// Times a point inside several colliders is pushed, out of the deepest first.
+/// Returns how often a point inside several colliders is pushed, each time out of the deepest.
 int push_rounds(const StepInput& input);
 
-/// Coulomb friction in displacements: sliding over the collider, which turns rigidly with the head, is undone
-/// up to the friction coefficient times the depth that the collider has to push back. `carry` is the turn of
-/// the head during the substep; the point was at `old_m` before it.
+/// Applies Coulomb friction to a displacement. Sliding over the collider, which rotates rigidly with the
+/// head, is undone up to the friction coefficient times the penetration depth. `carry` is the head's rotation
+/// during the substep; `old_m` is the point before it.
 glm::dvec3 held_by_friction(const glm::dvec3& old_m, const glm::dvec3& point_m, const glm::dquat& carry,
                             double friction, const ReferenceSphere& sphere);
 
-/// A segment's end, moved by a collider.
+/// A segment whose end a collider moves.
 struct ReferenceSegment {
   glm::dvec3 old_m{0.0};  // of the end, before the substep
   glm::dvec3 start_m{0.0};
@@ -46,19 +48,20 @@ struct ReferenceSegment {
   std::optional<glm::dvec3> groomed_m = {};  // where the end may stay, inside of a sphere or not
 };
 
-/// The end turned about the start until it is outside all spheres (two rounds, out of the deepest first) and
-/// held by Coulomb friction; `carry` is the turn of the head during the substep.
+/// Rotates the end about the start until it is outside all spheres (two rounds, out of the deepest first),
+/// then applies Coulomb friction. `carry` is the head's rotation during the substep.
 glm::dvec3 pushed_out(const StepInput& input, const glm::dquat& carry, double friction,
                       ReferenceSegment segment);
 
-/// Turns a segment about its start until its end lies on the sphere (center, radius): both equations of 003
-/// figure 4.1 at once. The nearest end that can be had when the two spheres do not meet.
+/// Rotates a segment about its start until its end lies on the sphere (center, radius): both equations of 003
+/// figure 4.1 at once. Returns the nearest possible end if the two spheres do not intersect.
 glm::dvec3 turned_onto_sphere(const ReferenceSegment& segment, const glm::dvec3& center, double radius);
 
-/// Wind and gusts at a point relative to the head joint, within the limits of strand_layout.h.
+/// Returns the velocity of wind and gusts at a point relative to the head joint, within the limits of
+/// strand_layout.h.
 glm::dvec3 air_velocity_mps(const StepInput& input, const glm::dvec3& point_m);
 
-/// The vector, no longer than `longest`.
+/// Returns the vector, shortened to `longest` if it is longer.
 glm::dvec3 shortened(const glm::dvec3& value, double longest);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// What double-precision strands do about a head that is a distance field. Written from the geometry, without
-// a line in common with shaders/sim/field_collider.comp.
+// Collision of double-precision strands with a head's distance field. Written from the geometry, without
+// sharing code with shaders/sim/field_collider.comp.
 #pragma once
 
 #include <cstdint>
@@ -10,10 +10,10 @@
 
 namespace strandcast {
 
-/// No vertex comes nearer to the skin, unless the groom has it there.
+/// Smallest distance of a vertex from the skin, unless the groom has it closer.
 inline constexpr double kFieldClearanceM = 0.0005;
 
-/// One strand after its substep, seen from the head: m in head space.
+/// One strand after its substep, in head space (m).
 struct ReferenceFieldStrand {
   std::span<const glm::dvec3> groomed_m;
   std::span<const glm::dvec3> before_m;  // where it was after the substep before
@@ -22,12 +22,12 @@ struct ReferenceFieldStrand {
   std::span<glm::dvec3> position_m;
 };
 
-/// Turns segments whose end or middle is too near to the skin about their start until they are not (two
-/// rounds for the end, then one for the middle), at their lengths; ends are held by friction. What hangs on a
-/// moved vertex follows it towards where it was. False when nothing had to move.
+/// Rotates segments about their starts until end and middle have their clearance: two rounds for the end,
+/// then one for the middle. Lengths are kept, and friction holds the ends. The part beyond a moved vertex
+/// follows it towards its former position. Returns false if nothing had to move.
 bool keep_out_of(const DistanceField& field, const ReferenceFieldStrand& strand);
 
-/// The clearance of a point that the groom has there.
+/// Returns the clearance of a point with this groomed position.
 double field_clearance_m(const DistanceField& field, const glm::dvec3& groomed_m);
 
 }  // namespace strandcast

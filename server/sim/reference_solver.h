@@ -1,6 +1,6 @@
-// ReferenceSolver: what all double-precision solvers share around their equations: the strands' state in
-// double on the processor, load, read, write and rebase. A model says how one strand steps, and what it keeps
-// beside the state. One thread; slow on purpose.
+// ReferenceSolver: common part of all double-precision solvers: state of the strands in double on the
+// processor, load, read, write and rebase. A model defines how one strand steps, and its data besides the
+// state. One thread; deliberately simple and slow.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -14,7 +14,7 @@
 
 namespace strandcast {
 
-/// One substep as every strand sees it, within the limits of strand_layout.h.
+/// Inputs of one substep that are the same for every strand, within the limits of strand_layout.h.
 struct ReferenceStep {
   const StepInput* input = nullptr;
   double h_s = 0.0;
@@ -25,7 +25,7 @@ struct ReferenceStep {
   HeadPath before;
 };
 
-/// A position or velocity that is a number of this world.
+/// Returns whether a position or velocity is finite and of plausible size.
 bool is_sane(const glm::dvec3& value);
 
 class ReferenceSolver : public Solver {
@@ -41,20 +41,20 @@ class ReferenceSolver : public Solver {
  protected:
   explicit ReferenceSolver(uint32_t most_vertices = kMaxVertexCount) : most_vertices_(most_vertices) {}
 
-  /// Of one strand, a vertex each: position (head-relative world) and velocity (world) before the substep are
-  /// replaced by those after it.
+  /// Advances one strand: replaces its positions (head-relative world) and velocities (world) before the
+  /// substep by those after it.
   virtual void step_strand(const ReferenceStep& step, uint32_t strand_index, std::span<glm::dvec3> position_m,
                            std::span<glm::dvec3> velocity_mps) = 0;
-  /// A groom was loaded: layout() and the state are known.
+  /// Called after a groom was loaded; layout() and the state are valid.
   virtual void on_load() {}
-  /// Before the strands of a substep.
+  /// Called before the strands of a substep.
   virtual void on_step(const ReferenceStep&) {}
-  /// The strand was put somewhere else: what is kept of its past goes.
+  /// Clears the history of a strand that was moved from outside.
   virtual void forget(uint32_t /*strand_index*/) {}
-  /// After its substep the strand was moved from here to position_m(): what is kept of its way and of its
-  /// segments' directions goes along.
+  /// Called when a strand was moved after its substep from `before_m` to position_m(); the model must move
+  /// its stored displacements and segment directions along.
   virtual void go_along(uint32_t /*strand_index*/, std::span<const glm::dvec3> /*before_m*/) {}
-  /// What is kept beside the state turns with it.
+  /// Rotates the model's data along with the state.
   virtual void turn_memory(const glm::dquat&) {}
   virtual uint64_t model_bytes() const { return 0; }
 
@@ -63,7 +63,7 @@ class ReferenceSolver : public Solver {
   std::span<const glm::dvec3> position_m(uint32_t strand_index) const {
     return std::span(position_m_).subspan(size_t{strand_index} * layout_.vertex_count, layout_.vertex_count);
   }
-  /// As loaded: nothing moved a strand since.
+  /// Returns whether no strand has moved since the groom was loaded.
   bool is_at_rest() const { return is_at_rest_; }
 
  private:

@@ -1,5 +1,5 @@
-// ReferenceStrands: what the double-precision solvers share whose forces are explicit and whose vertices are
-// placed one after the other. Written from the equations, without a line in common with the shaders.
+// ReferenceStrands: common part of the double-precision solvers with explicit forces, which place vertices
+// one after another. Written from the equations, without sharing code with the shaders.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -12,7 +12,7 @@
 
 namespace strandcast {
 
-/// One strand during one substep, in head-relative world axes, seen from the moving head joint.
+/// One strand during one substep, in head-relative world axes, in the frame of the moving head joint.
 struct ReferenceStrand {
   uint32_t index = 0;
   std::vector<glm::dvec3> target_m;      // groomed shape, turned with the head
@@ -34,18 +34,18 @@ class ReferenceStrands : public ReferenceSolver {
   /// Moves placed_m of all vertices that are not pinned, by place() or rigidly with their segment.
   virtual void solve(ReferenceStrand& strand) const = 0;
 
-  /// Numbers that the model keeps per strand besides positions and velocities; they start from 0.
+  /// Returns how many numbers the model stores per strand besides positions and velocities; they start at 0.
   virtual size_t memory_size() const { return 0; }
   std::span<double> memory_of(uint32_t strand_index);
-  /// A groom was loaded: layout() is known.
+  /// Called after a groom was loaded; layout() is valid.
   virtual void prepare() {}
 
-  /// Puts vertex i as near to its prediction as its segment's length from vertex i-1, the colliders and the
-  /// reach of a pinned tail allow.
+  /// Places vertex i as close to its prediction as possible at its segment's length from vertex i-1, outside
+  /// of colliders and within the reach of a pinned tail.
   void place(ReferenceStrand& strand, uint32_t i) const;
-  /// Where forces alone take vertex i from old_m.
+  /// Returns where forces alone move vertex i from old_m.
   virtual glm::dvec3 predict(const ReferenceStrand& strand, uint32_t i) const;
-  /// The way that vertex i's velocity is made of.
+  /// Returns the displacement from which the velocity of vertex i is computed.
   virtual glm::dvec3 way_m(const ReferenceStrand& strand, uint32_t i) const {
     return strand.placed_m[i] - strand.old_m[i];
   }
@@ -57,14 +57,15 @@ class ReferenceStrands : public ReferenceSolver {
   uint32_t step_index() const { return step_.before.step_index; }  // since load()
   glm::dquat carry() const { return step_.carry; }                 // turn of the head
   glm::dvec3 head_velocity_mps() const { return step_.head_velocity_mps; }
-  /// Velocity of a point at `arm_m` from another by the head's turn in the substep before.
+  /// Returns the velocity, due to the head's rotation in the previous substep, of a point at `arm_m` from
+  /// another.
   glm::dvec3 previous_turn_mps(const glm::dvec3& arm_m) const { return step_.before.turn_per_s * arm_m; }
-  /// Whether the state of vertex i before the substep was finite and of this world.
+  /// Returns whether the state of vertex i before the substep was finite and plausible.
   bool was_intact(const ReferenceStrand& strand, uint32_t i) const { return strand.is_intact[i]; }
-  /// Of this strand, over the mean; and the drag that goes with it.
+  /// Thickness of this strand relative to the mean, and the drag that follows from it.
   double thickness(const ReferenceStrand& strand) const;
   double air_drag_per_s(const ReferenceStrand& strand) const;
-  /// Pull to the groomed shape, 1/s^2, and what is left of gravity when it carries its share.
+  /// Pull to the groomed shape, 1/s^2, and the part of gravity that remains when the pull carries its share.
   double style_stiffness_per_s2(const ReferenceStrand& strand, uint32_t i) const;
   glm::dvec3 uncarried_gravity_mps2(const ReferenceStrand& strand, uint32_t i) const;
   bool is_pinned(uint32_t i) const { return i < layout().pinned_root_count || i >= layout().tail_begin(); }

@@ -1,4 +1,4 @@
-// The shortest turn from one direction to another, on vectors. Pure functions.
+// The shortest rotation between two directions, applied to vectors. Pure functions.
 #pragma once
 
 #include <cmath>
@@ -6,8 +6,8 @@
 
 namespace strandcast {
 
-/// `v` turned as `from` is turned to `to` on the shortest way; both are unit vectors, or without a direction.
-/// Keeps its length.
+/// Rotates `v` by the shortest rotation from `from` to `to`, which must be unit vectors or zero. Keeps its
+/// length.
 inline glm::vec3 shortest_turn(const glm::vec3& v, const glm::vec3& from, const glm::vec3& to) {
   constexpr float kOpposite = 1e-4f;
   const float cosine = glm::dot(from, to);

@@ -1,6 +1,5 @@
-// Solver: one strand model behind a small interface; the table in solver_registry.h lists all of them. A
-// solver is used from one thread, that of its executor if it has one. A solver never allocates in
-// substep().
+// Solver: interface of a strand model; the table in solver_registry.h lists all models. A solver is used from
+// one thread, that of its executor if it has one. It never allocates in substep().
 #pragma once
 
 #include <cstdint>
@@ -22,13 +21,15 @@
 
 namespace strandcast {
 
-/// State as read back, head-relative world axes. (vertex_count x strand_count) vertex-major, strand fastest.
+/// State that was read back, in head-relative world axes, (vertex_count x strand_count), vertex-major, strand
+/// fastest.
 struct SolverState {
   std::vector<glm::vec3> position_m;
   std::vector<glm::vec3> velocity_mps;
 };
 
-/// The same to be read where it lies, or where it was put: rows are vertices. w is the solver's own.
+/// The same state as views of the memory where it is stored: rows are vertices. The meaning of w is private
+/// to the solver.
 struct SolverBlocks {
   StrandBlocksView position_m;
   StrandBlocksView velocity_mps;
@@ -41,39 +42,40 @@ class StrandState;
 class Solver {
  public:
   virtual ~Solver() = default;
-  /// Sets every strand to rest under the given head rotation; allocates. `groom` is uniform.
+  /// Sets every strand to rest under the given head rotation; allocates. `groom` must be uniform.
   virtual Status load(const Groom& groom, const glm::dquat& world_from_head_rotation) = 0;
-  /// Advances by input.h_s.
+  /// Advances the strands by input.h_s seconds.
   virtual void substep(const StepInput& input) = 0;
-  /// Computes what the substeps of a step share, ahead of the first one, which else does it: for whoever
-  /// times it.
+  /// Computes data shared by the substeps of a step before the first one, which otherwise does it; lets
+  /// callers time it.
   virtual void gather(const StepInput&) {}
-  /// Computes the strands that follow others, ahead of the next read_blocks(), which else does it: for
-  /// whoever times it.
+  /// Computes the strands that follow guides, before the next read_blocks(), which otherwise does it; lets
+  /// callers time it.
   virtual void follow_guides() {}
-  /// Copies the state out; resizes `state` on first use only.
+  /// Copies the state out; resizes `state` only on first use.
   virtual void read(SolverState& state) = 0;
-  /// As read(), in blocks of strands; without a copy where the solver keeps its strands so. Valid until the
-  /// next call to this solver. Allocates on first use only.
+  /// Returns the state in blocks of strands, without a copy if the solver stores strands in blocks. Valid
+  /// until the next call to this solver. Allocates only on first use.
   virtual SolverBlocks read_blocks();
-  /// Replaces positions and velocities (same layout as read). A strand that is given what it has goes on as
-  /// if nothing had happened; another one starts without a history.
+  /// Replaces positions and velocities (layout as in read()). A strand whose values are unchanged continues
+  /// as before; any other starts without a history.
   virtual void write(const SolverState& state) = 0;
-  /// The head has jumped to this rotation, wherever it is: strands jump along with all that the model knows
-  /// of them. Seen from the head nothing has changed.
+  /// Rotates strands and the model's data to this head rotation after a jump of the head. In head space
+  /// nothing changes.
   virtual void rebase(const glm::dquat& world_from_head_rotation) = 0;
-  /// Of the groom that it was loaded with; 0 = none.
+  /// Returns the strand count of the loaded groom; 0 = none.
   virtual uint32_t strand_count() const = 0;
-  /// Bytes the solver keeps on its device.
+  /// Returns the bytes that the solver uses on its device.
   virtual uint64_t memory_bytes() const = 0;
 
-  /// What somebody else needs to take the same steps; nullptr for a model without a kernel that others run.
-  /// Reads planes back.
+  /// Returns the data that others need to simulate the same steps; nullptr for a model whose kernel others
+  /// cannot run. Reads planes back.
   virtual std::shared_ptr<const StepModel> step_model() { return nullptr; }
 
-  /// The strands that it works on when an executor keeps these; nullptr for a solver that has its own.
+  /// Returns the strands in an executor that the solver works on; nullptr for a solver that stores its own.
   virtual const StrandState* strands() const { return nullptr; }
-  /// Goes on with strands() as another solver left them; allocates. On an error the other one may go on.
+  /// Continues with strands() in the state in which another solver left them; allocates. After an error the
+  /// other solver may continue.
   virtual Status follow() { return {}; }
 
  private:
@@ -83,18 +85,19 @@ class Solver {
   StrandBlocks velocity_mps_in_blocks_;
 };
 
-/// How a head moves: of its joint, and about it; world.
+/// Motion of a head: velocity of its joint, and rotation about it; world.
 struct HeadMotion {
   glm::dvec3 velocity_mps{0.0};
   glm::dvec3 spin_radps{0.0};
 };
-/// Between two poses, so long after each other.
+/// Returns the head's motion between two poses that are `passed_s` apart.
 HeadMotion head_motion(const Pose& from, const Pose& to, double passed_s);
-/// All strands move as the head does from here on, as one that has been carried by it: nothing pulls at them.
+/// Gives all strands the velocity of the moving head, as if it had carried them, so that nothing pulls at
+/// them.
 void move_with_head(Solver& solver, const HeadMotion& motion);
 
-/// `to` goes on where `from` is, with the same strands: at once when both work on the same strands, else by
-/// way of a copy. On an error `from` is as it was.
+/// Lets `to` continue from the state of `from` with the same strands: directly if both work on the same
+/// strands, otherwise by a copy. After an error `from` is unchanged.
 Status hand_over(Solver& from, Solver& to, const Groom& groom, const glm::dquat& world_from_head_rotation);
 
 }  // namespace strandcast

@@ -1,7 +1,7 @@
-// StrandFollow: where strands are that are not simulated. Each goes with one to three of the first strands,
-// its guides: those whose roots and groomed shapes are nearest. Every segment of it turns as theirs do from
-// the groom on, so that it is groomed where they are, and keeps its length. No GL; one thread, with
-// the shared workers.
+// StrandFollow: computes the strands that are not simulated. Each follows one to three of the first strands,
+// its guides, whose roots and groomed shapes are nearest. Each of its segments rotates as theirs have since
+// the groom, so it matches the groom where they do and keeps its length. No GL; one thread, with the shared
+// workers.
 #pragma once
 
 #include <array>
@@ -18,20 +18,20 @@ inline constexpr uint32_t kMaxGuidesOfStrand = 3;
 
 class StrandFollow {
  public:
-  /// `groom` is uniform, its first `guide_count` strands (at least one) are simulated. Roots that follow the
-  /// head stay where it has them.
+  /// Chooses the guides. `groom` must be uniform; its first `guide_count` strands (at least one) are
+  /// simulated. Pinned roots keep their positions on the head.
   StrandFollow(const Groom& groom, uint32_t guide_count);
 
-  /// All strands from the first ones: (vertex_count x guide_count) to (vertex_count x strand_count), both in
-  /// head space, the strand fastest.
+  /// Computes all strands from the guides: (vertex_count x guide_count) to (vertex_count x strand_count),
+  /// both in head space, strand fastest.
   void follow(std::span<const glm::vec3> guides_in_head_m, std::span<glm::vec3> all_in_head_m) const;
-  /// The guides' mean of something that they have at each vertex.
+  /// Computes a per-vertex quantity of all strands as the weighted mean of their guides'.
   void blend(std::span<const glm::vec3> of_guides, std::span<glm::vec3> of_all) const;
 
   uint32_t strand_count() const { return strand_count_; }
   uint32_t guide_count() const { return guide_count_; }
   uint32_t vertex_count() const { return vertex_count_; }
-  /// Vertices from the root on that go with the head.
+  /// Returns the number of vertices, from the root on, that move with the head.
   uint32_t pinned_count() const { return pinned_count_; }
   uint64_t size_bytes() const;
 
@@ -55,9 +55,9 @@ class StrandFollow {
   std::vector<glm::vec3> guides_direction_;  // of the guides' mean, unit
 };
 
-/// Whether strands of this groom can follow others: no tips are held.
+/// Returns whether strands of this groom can follow others: their tips must not be pinned.
 bool can_follow(const Groom& groom);
-/// How many of so many strands are simulated for this share: at least one.
+/// Returns how many of `strand_count` strands are simulated for this share: at least one.
 uint32_t guide_count(uint32_t strand_count, double share);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// StrandKernel: a solver with one kernel run per substep. From the thread of its executor.
+// StrandKernel: a solver that runs one kernel per substep. Runs on its executor's thread.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace strandcast {
 
-/// What tells one kernel from another.
+/// Properties that distinguish one kernel from another.
 struct StrandKernelDesc {
   std::string name;            // labels
   std::string shader_path;     // below shaders/

@@ -1,5 +1,5 @@
-// StrandLayout: a groom in the order the strand kernels use, vertex-major with the strand index fastest.
-// Plain data, any thread; no GL.
+// StrandLayout: a groom in the order of the strand kernels, vertex-major with the strand index fastest. Plain
+// data, any thread; no GL.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,8 @@
 
 namespace strandcast {
 
-/// Element of vertex `vertex_index` of strand `strand_index`: vertex_index * strand_count + strand_index.
+/// Layout of a groom. The element of vertex `vertex_index` of strand `strand_index` is vertex_index *
+/// strand_count + strand_index.
 struct StrandLayout {
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;       // per strand
@@ -28,16 +29,17 @@ struct StrandLayout {
   size_t index(uint32_t vertex_index, uint32_t strand_index) const {
     return static_cast<size_t>(vertex_index) * strand_count + strand_index;
   }
-  /// First vertex of the pinned tail, vertex_count when the tip is free.
+  /// First vertex of the pinned tail; vertex_count if the tip is free.
   uint32_t tail_begin() const { return vertex_count - pinned_tail_count; }
   StrandCounts counts() const { return {strand_count, vertex_count, pinned_root_count, tail_begin()}; }
 };
 
-/// Vertices per strand of a reference that no kernel has to follow: converged solutions of reports.
+/// Largest number of vertices per strand of a reference solution without a kernel, as reports use for
+/// converged solutions.
 inline constexpr uint32_t kMaxReferenceVertexCount = 256;
 
-/// BadInput unless all strands have the same vertex count (2..most_vertices) and the same pinned vertices: a
-/// run at the root, optionally a run at the tip, nothing between.
+/// Makes the layout. BadInput unless all strands have the same vertex count (2..most_vertices) and the same
+/// pinned vertices: a run at the root, optionally one at the tip, none between.
 Result<StrandLayout> make_strand_layout(const Groom& groom, uint32_t most_vertices = kMaxVertexCount);
 
 }  // namespace strandcast

@@ -1,6 +1,6 @@
-// StrandState: strands between two substeps where an executor keeps them: rest, position and velocity of
-// every vertex, and how the head moved. It belongs to whoever runs the simulation; solvers are passes that
-// read and write it, and one may follow another on the same state. It goes before its executor. From one
+// StrandState: state of the strands between substeps in an executor: rest, position and velocity of every
+// vertex, and the head's motion. It belongs to the owner of the simulation. Solvers are passes that read and
+// write it, and one may succeed another on the same state. It must be destroyed before its executor. One
 // thread.
 #pragma once
 
@@ -21,33 +21,34 @@ class StrandState {
  public:
   explicit StrandState(Executor& executor) : executor_(executor) {}
   /// Sets every strand to rest under the given head rotation; allocates. BadInput as make_strand_layout(),
-  /// LimitExceeded when the executor's planes would be too small; the state is then as before.
+  /// LimitExceeded if the executor's planes are too small. After an error the state is unchanged.
   Status load(const Groom& groom, const glm::dquat& world_from_head_rotation);
 
-  /// Counts, pinned vertices and rest lengths; `rest` of it as well, `arc` is in the planes only.
+  /// Returns counts, pinned vertices, rest lengths and `rest`; `arc` is stored in the planes only.
   const StrandLayout& layout() const { return layout_; }
   const HeadPath& head() const { return head_; }
-  /// As loaded: nothing moved a strand since.
+  /// Returns whether no strand has moved since the groom was loaded.
   bool is_at_rest() const { return is_at_rest_; }
 
-  /// The planes that every kernel works on; the model's own are nullptr.
+  /// Returns the planes that every kernel uses; the model's own are nullptr.
   BoundPlanes planes() const;
-  /// The kernels of a substep are on their way.
+  /// Notes that the kernels of a substep were started.
   void advance(const StepInput& input);
 
-  /// Copies the state out; resizes `state` on first use only.
+  /// Copies the state out; resizes `state` only on first use.
   void read(SolverState& state);
-  /// Positions with arc 0..1, velocities with what the model keeps beside them; as Solver::read_blocks().
+  /// Returns positions with arc 0..1 in w, and velocities with the model's value in w; as
+  /// Solver::read_blocks().
   SolverBlocks read_blocks();
-  /// Replaces positions and velocities. Returns which strands are not as they were: what a model keeps beside
-  /// their velocity is 0 again.
+  /// Replaces positions and velocities. Returns which strands have changed; the model's values of these are
+  /// reset to 0.
   std::vector<bool> write(const SolverState& state);
-  /// What the last model kept beside the velocities is 0 again.
+  /// Resets to 0 the values that the last model stored beside the velocities.
   void forget_model();
-  /// What the model keeps beside the velocity of every vertex, (vertex_count x strand_count).
+  /// Sets the model's value beside the velocity of every vertex, (vertex_count x strand_count).
   void write_model(const std::vector<float>& values);
-  /// The head has jumped to this rotation; strands jump along and are in head space what they were. Returns
-  /// the turn.
+  /// Rotates the strands with a head that jumped to this rotation; in head space nothing changes. Returns the
+  /// rotation applied.
   glm::dquat rebase(const glm::dquat& world_from_head_rotation);
 
   uint64_t memory_bytes() const;

@@ -1,5 +1,5 @@
-// Stiffness and friction of hair as artists set them (common/scene/hair_controls.h), in the terms of whatever
-// solver runs. Pure logic, any thread.
+// Applies the artist's factors of stiffness and friction (common/scene/hair_controls.h) to the parameters of
+// the running solver. Pure logic, any thread.
 #pragma once
 
 #include "common/kernels/volume/volume_desc.h"
@@ -7,11 +7,11 @@
 
 namespace strandcast {
 
-/// Complete parameters of a row with everything that resists bending, or pulls to the groomed shape, so many
-/// times as stiff, within the row's ranges. A style margin goes along, so that rods are not stiffened back to
-/// where they were. 1 changes nothing.
+/// Multiplies every parameter of a row that resists bending or pulls to the groomed shape by `times`, within
+/// the row's ranges. `complete` must have all parameters. A style margin is scaled too, or rods would be
+/// stiffened back. 1 changes nothing.
 SolverParameters stiff_parameters(const SolverRow& row, SolverParameters complete, double times);
-/// So much more friction between strands, where there is any.
+/// Multiplies the friction between strands by `times`.
 VolumeDesc held_volume(VolumeDesc volume, double times);
 
 }  // namespace strandcast

@@ -1,6 +1,5 @@
-// What of a scene has a name and a value: every field, and every parameter of its solver, with unit, range
-// and default, as one list for whoever asks. It is made of the lists that there are: scene_fields.h and the
-// table of solvers. Pure functions, any thread.
+// Lists every field of a scene and every parameter of its solver with value, unit, range and default. The
+// list is made from scene_fields.h and the table of solvers. Pure functions, any thread.
 #pragma once
 
 #include <string>
@@ -11,13 +10,14 @@
 
 namespace strandcast {
 
-/// In the order of scene.proto.
+/// Returns the parameters in the order of scene.proto.
 std::vector<ParameterInfo> list_parameters(const SceneDesc& scene);
 
-/// Whether a path begins with one of the prefixes, which commas part; all begin with an empty one.
+/// Returns whether a path begins with one of the comma-separated prefixes; an empty prefix matches all.
 bool begins_so(const std::string& path, const std::string& prefixes);
 
-/// Those whose path begins so; of these at most kMaxListedParameters from the first-th on.
+/// Returns the parameters whose path matches the request, at most kMaxListedParameters from its first index
+/// on.
 ParameterList list_of(const std::vector<ParameterInfo>& parameters, const ParameterRequest& request);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// SimDetail: decides how much is simulated, from what readers see of the hair and for how long. Up at once,
-// so that nobody sees too little; down a level at a time and only after a while, so that nothing flickers.
+// SimDetail: chooses how much is simulated from the size at which readers see the hair. The level rises at
+// once, so that nobody sees too little. It falls one level at a time after a delay, so that nothing flickers.
 // Pure logic: times are passed in.
 #pragma once
 
@@ -12,31 +12,31 @@
 
 namespace strandcast {
 
-/// Size of the hair on the largest screen below which a level begins, of DetailDesc::full_at_px.
+/// Size of the hair on the largest screen below which each level begins, relative to DetailDesc::full_at_px.
 inline constexpr double kLevelShares[kDetailLevels - 1] = {1.0, 0.5, 0.25, 0.125, 0.0625};
 
-/// What all readers together see.
+/// What all readers together see of the hair.
 struct ReaderSight {
   bool has_readers = false;
-  /// Height of the hair on the largest screen; infinity: somebody did not say, or takes states down. 0: it is
-  /// in no picture.
+  /// Height of the hair on the largest screen in pixels. Infinity: a reader did not say, or records states.
+  /// 0: the hair is in no picture.
   double hair_px = std::numeric_limits<double>::infinity();
 };
 
-/// The level for hair of this height, without memory.
+/// Returns the level for hair of this height, without hysteresis.
 DetailLevel level_for(const DetailDesc& desc, double hair_px);
 
 class SimDetail {
  public:
   explicit SimDetail(const DetailDesc& desc) : desc_(desc) {}
-  /// Counts from the next update().
+  /// Changes the description from the next update() on.
   void change(const DetailDesc& desc) { desc_ = desc; }
 
-  /// Call often. True when the level changed.
+  /// Updates the level; call it often. Returns true if it has changed.
   bool update(const ReaderSight& sight, int64_t time_ns);
 
   DetailLevel level() const { return level_; }
-  /// For a person; empty at Full.
+  /// Returns why the level is not Full, for a person; empty at Full.
   const std::string& reason() const { return reason_; }
 
  private:

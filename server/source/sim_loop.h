@@ -1,6 +1,6 @@
-// SimLoop: the simulation thread with its executor: takes input, steps the solver, publishes. Commands and
-// facts reach it through a queue and are carried out between two steps, commands one at a time and within
-// kJobShare of the time. It never waits for a viewer.
+// SimLoop: the simulation thread with its executor: reads input, steps the solver, publishes. Commands and
+// facts arrive through a queue and are carried out between two steps. Commands run one at a time and take at
+// most kJobShare of the time. It never waits for a viewer.
 #pragma once
 
 #include <atomic>
@@ -39,7 +39,7 @@
 
 namespace strandcast {
 
-/// Sees every published state; for tests and recordings. Must return quickly.
+/// Observer of every published state, for tests and recordings. Must return quickly.
 using SnapshotObserver = std::function<void(const std::shared_ptr<const Snapshot>&)>;
 
 struct SimLoopConfig {
@@ -53,30 +53,31 @@ struct SimLoopConfig {
   bool is_lockstep = false;  // simulated time goes on by commands only
 };
 
-/// Commands that may wait for the simulation thread; each can cost a new solver.
+/// Largest number of commands that may wait for the simulation thread; each can require a new solver.
 inline constexpr size_t kMaxPendingJobs = 32;
-/// Share of the time that commands take at most: a new solver for each of many does not stop the hair.
+/// Largest share of the time that commands may take, so that many changes of solver do not stop the hair.
 inline constexpr double kJobShare = 0.25;
-/// The stream is coded otherwise at most this often, with the newest settings: each time costs every viewer a
-/// keyframe.
+/// Shortest time between two changes of the stream's coding, since each costs every viewer a keyframe. The
+/// newest settings are used.
 inline constexpr int64_t kStreamChangeNs = 500'000'000;
-/// Readers hear of another look at most this often, of the newest.
+/// Shortest time between two reports of a new look; only the newest is reported.
 inline constexpr int64_t kLookChangeNs = 100'000'000;
-/// While nobody reads and hair goes with the head, the loop wakes only this often, for what it tells of
-/// itself.
+/// Interval at which the loop wakes to report its state while nobody reads and hair only follows the head.
 inline constexpr int64_t kAsleepNs = 500'000'000;
-/// Hair that wakes has the speed of the head over so many steps: samples come in jerks.
+/// Number of steps over which the head's velocity is averaged when hair wakes up, since input samples arrive
+/// unevenly.
 inline constexpr int kHeadPathSteps = 4;
 
 class SimLoop {
  public:
-  /// Answer to a command, on the simulation thread; on the caller's when kMaxPendingJobs wait already.
+  /// Receives the answer to a command on the simulation thread, or on the caller's if kMaxPendingJobs already
+  /// wait.
   using Reply = StateSource::Reply;
 
-  /// Starts the thread and waits until the solver is loaded and the rest state published, or for the error.
-  /// `hub` and `sink` outlive the loop.
+  /// Starts the thread. Returns when the solver is loaded and the rest state is published, or with an error.
+  /// `hub` and `sink` must outlive the loop.
   static Result<std::unique_ptr<SimLoop>> start(SimLoopConfig config, InputHub& hub, StateSink& sink);
-  /// stop(), if it was not called.
+  /// Calls stop() if it was not called.
   ~SimLoop();
   SimLoop(const SimLoop&) = delete;
   SimLoop& operator=(const SimLoop&) = delete;
@@ -84,18 +85,19 @@ class SimLoop {
   // From any thread; return at once.
   void post(const ControlCommand& command, Reply reply, const std::string& who = {});
   void post(const SetParameter& parameter, Reply reply, const std::string& who = {});
-  /// What is wanted; has_wind_stream is found by the loop itself.
+  /// Sets what the readers demand; the loop itself determines has_wind_stream.
   void set_demand(const SourceDemand& demand);
-  /// As StateSource::set_tap(); `tap` outlives the loop, or on_tapped of the next one.
+  /// Does what StateSource::set_tap() does; `tap` must exist until the loop ends or on_tapped is called for
+  /// the next tap.
   void set_tap(StepTap* tap, StateSource::OnTapped on_tapped);
   SimStats stats() const;
-  /// As it runs now.
+  /// Returns the scene as it runs.
   SceneDesc scene() const;
-  /// Of strands that have another shape than the content that it began with; null: they have not.
+  /// Returns the asset of strands whose shape has changed since the start; null if it has not.
   std::shared_ptr<const SceneAsset> asset() const;
-  /// Ends the thread after the substep or command that is under way. From one thread.
+  /// Ends the thread after the current substep or command. Call it from one thread only.
   void stop();
-  /// Why the simulation ended; nothing while it runs.
+  /// Returns why the simulation ended; empty while it runs.
   std::optional<Error> failure() const;
 
  private:
@@ -110,7 +112,8 @@ class SimLoop {
     bool is_prepared = false;                          // what takes long of it is done
     std::shared_ptr<const SceneContent> content = {};  // of other lengths or curls, loaded by then
 
-    /// What waits for its turn; all else is carried out before the next step.
+    /// Returns whether the job is a command that waits for its turn; other jobs are all carried out before
+    /// the next step.
     bool is_command() const {
       return std::holds_alternative<ControlCommand>(what) || std::holds_alternative<SetParameter>(what);
     }
@@ -128,7 +131,7 @@ class SimLoop {
   void carry_out_in_turn(const Job& job);
   bool starts_to_prepare(const Job& job);
   void carry_out(const Job& job);
-  /// Nothing: the answer comes later.
+  /// Carries out a command; an empty result means that the answer comes later.
   std::optional<Notice> command(const ControlCommand& command, const Reply& reply);
   void finish_steps();
   Notice change(const std::string& assignment, std::shared_ptr<const SceneContent> content);

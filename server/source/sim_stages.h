@@ -1,6 +1,5 @@
-// SimStages: what the simulation thread runs in a step and when it publishes, as passes in two lists. The
-// loop runs them, --explain prints and times the same ones. They own nothing that they work on. Simulation
-// thread.
+// SimStages: the stages of a simulation step and of publishing, as passes in two lists. The loop runs them;
+// --explain prints and times the same passes. They own none of the objects they work on. Simulation thread.
 #pragma once
 
 #include <atomic>
@@ -19,10 +18,10 @@
 
 namespace strandcast {
 
-/// While nobody watches, states are read back only this often, to find broken strands.
+/// Number of steps between reading back states while nobody watches; this still finds broken strands.
 inline constexpr uint64_t kIdlePublishSteps = 30;
 
-/// What the stages work on, and what they are told and give in one turn.
+/// Objects that the stages work on, with the inputs and outputs of one turn.
 struct StageTurn : gl::PassTurn {
   struct Setup {};  // nothing to prepare: solvers are built by whoever owns them
   StageTurn(StepBuilder& step_builder, Solver& of_strands, Publisher& of_snapshots)
@@ -54,26 +53,27 @@ struct StageSizes {
 
 class SimStages {
  public:
-  /// `reasons` are explain()'s for the facts that decide.
+  /// Plans the passes; `reasons` are explain()'s for the facts that decide.
   SimStages(const StageSizes& sizes, const std::vector<FeatureReason>& reasons);
-  /// Other facts, another solver or other substeps: the step is planned and timed anew.
+  /// Plans and times the step anew after a change of facts, solver or substeps.
   void plan_step(uint32_t substeps, const std::vector<FeatureReason>& reasons);
-  /// What the solver really keeps.
+  /// Sets the bytes that the solver actually uses.
   void set_solver_bytes(uint64_t size_bytes) { state_->bytes = size_bytes; }
-  /// Whether anybody reads what is published; only for the report, the loop decides when to publish.
+  /// Sets whether anybody reads what is published. It affects only the report; the loop decides when to
+  /// publish.
   void set_watched(bool is_watched) { is_watched_ = is_watched; }
 
-  /// Ends early when it is told to stop; then nothing may be published. Without a device its work is timed on
-  /// this thread.
+  /// Runs the step; it ends early if told to stop, and then its state must not be published. Without a
+  /// device, its time is measured on this thread.
   Status step(StageTurn& turn, gl::GpuTimer* device) { return step_->run(turn, device); }
   Status publish(StageTurn& turn) { return publish_->run(turn, nullptr); }
 
-  /// What the solver took of the last step.
+  /// Returns the solver's duration in the last step.
   double last_step_ms() const { return step_->last_ms("sim/step"); }
   gl::PassReports report() const;
 
  private:
-  /// `follows`: whether hair that takes no step follows what does.
+  /// Plans publishing; `follows`: whether strands that are not simulated follow simulated ones.
   void plan_publish(const FeatureReason& follows);
   struct KnownLater final : gl::Resource {
     KnownLater(std::string name, uint64_t bytes_at_most) : Resource(std::move(name)), bytes(bytes_at_most) {}

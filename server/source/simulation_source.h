@@ -1,4 +1,4 @@
-// The simulation as a source of states: loads the scene, then steps it on a thread of its own (SimLoop).
+// The simulation as a source of states: loads the scene, then steps it on its own thread (SimLoop).
 #pragma once
 
 #include <filesystem>
@@ -21,7 +21,7 @@ struct SimulationConfig {
   bool is_lockstep = false;  // simulated time goes on by commands only
 };
 
-/// Checks and loads the scene; the executor is opened by start(). `inputs` outlives the source.
+/// Checks and loads the scene; start() opens the executor. `inputs` must outlive the source.
 Result<std::unique_ptr<StateSource>> make_simulation(SimulationConfig config, InputHub& inputs);
 
 }  // namespace strandcast

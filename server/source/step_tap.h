@@ -1,5 +1,5 @@
-// What a simulation's steps are made of, told as they are taken (StepTap) and given again (StepScript): with
-// the scene it decides every bit of what is published.
+// Inputs and changes of a simulation's steps: reported while they are used (StepTap), or replayed
+// (StepScript). Together with the scene they determine every published bit.
 #pragma once
 
 #include <cstdint>
@@ -20,38 +20,39 @@ struct TakenStep {
   InputFrame input;
 };
 
-/// A command or assignment after the step `tick`.
+/// A command or assignment after step `tick`.
 struct PostedChange {
   uint64_t tick = 0;
   std::variant<ControlCommand, SetParameter> what;
   std::string who;  // asked for it; empty = nobody said
 };
 
-/// From now on states are published on another lattice; the present one is published again.
+/// Change of the lattice of published states; the present state is published again on it.
 struct LatticeChange {
   uint64_t tick = 0;
   StreamDesc stream;
 };
 
-/// Hears of all that on the simulation thread, each before the states that come of it; returns quickly.
+/// Observer of steps and changes on the simulation thread; called before the states that result from them.
+/// Must return quickly.
 class StepTap {
  public:
   virtual ~StepTap() = default;
   virtual void on_step(const TakenStep& step) = 0;
   virtual void on_change(const PostedChange& change) = 0;
-  /// To that change, once it is carried out.
+  /// Reports the answer to the preceding change, after it was carried out.
   virtual void on_answer(const Notice& answer) = 0;
   virtual void on_lattice(const LatticeChange& change) = 0;
 };
 
-/// What a simulation does instead of going by clock, inputs and commands.
+/// Drives a simulation by a script instead of clock, inputs and commands.
 class StepScript {
  public:
   struct End {};
   using Next = std::variant<End, TakenStep, PostedChange, LatticeChange>;
 
   virtual ~StepScript() = default;
-  /// On the simulation thread; after End nothing is asked any more.
+  /// Returns the next item; called on the simulation thread, and not again after End.
   virtual Next next() = 0;
 };
 

@@ -1,5 +1,5 @@
-// Wet hair, as far as it moves otherwise: water makes strands heavier and lets them lie closer and hold on to
-// each other. How it looks is the renderer's. Pure logic, any thread.
+// Effect of wetness on motion: water makes strands heavier, lets them lie closer and makes them stick
+// together. The renderer handles its look. Pure logic, any thread.
 #pragma once
 
 #include "common/kernels/volume/volume_desc.h"
@@ -7,26 +7,25 @@
 
 namespace strandcast {
 
-/// Hair that drips weighs so many times what it weighs dry.
+/// Mass of dripping hair relative to dry hair.
 inline constexpr double kWetMass = 2.5;
-/// Dripping hair may lie so many times as dense as in the groom, and takes on so much more of its neighbours'
-/// motion in a second.
+/// Rest density of dripping hair relative to the groom, and the additional friction between neighbours, 1/s.
 inline constexpr double kWetDensity = 3.0;
 inline constexpr double kWetFrictionPerS = 60.0;
 
-/// What a scene's strands move by: its parameters, complete, for hair as wet as it is drawn
-/// (look.shading.wetness) and as stiff as `hair` says. As complete_parameters().
+/// Returns the complete solver parameters of a scene's strands, adjusted for wetness (look.shading.wetness)
+/// and for the stiffness in `hair`. Errors as complete_parameters().
 Result<SolverParameters> moving_parameters(const SolverRow& row, const SceneDesc& scene);
-/// Whether another solver, or one of other parameters, is needed.
+/// Returns whether two scenes need different solvers or parameters.
 bool moves_otherwise(const SceneDesc& a, const SceneDesc& b);
 
-/// Complete parameters of a row as they are when hair is so wet, 0 .. 1: what is a rate or a stiffness per
-/// mass falls as the mass grows, within the row's ranges. 0 changes nothing. (Document 002, section 4.1.)
+/// Adjusts a row's complete parameters to hair of this wetness (0 .. 1): rates and stiffnesses per mass fall
+/// as the mass grows, within the row's ranges. 0 changes nothing.
 SolverParameters wet_parameters(const SolverRow& row, SolverParameters complete, double wetness);
-/// Likewise of a volume that acts; one that does not stays so.
+/// Adjusts a volume to this wetness; an inactive volume stays inactive.
 VolumeDesc wet_volume(VolumeDesc volume, double wetness);
-/// What strands of these moving_parameters() do to each other, with the friction that `hair` says: their air
-/// goes by the hair of a model that knows its radius and density.
+/// Returns the forces between strands for these moving_parameters(), with the friction in `hair`. Their air
+/// uses the radius and density of models that have them.
 VolumeDesc moving_volume(const SceneDesc& scene, const SolverParameters& moving);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// Demand: what one reader of the stream wants. What the server encodes, draws and reads back follows from the
-// demands of all readers and from nothing else: a session, a recorder and a relay ask alike.
+// Demand: what one reader of the stream wants. The demands of all readers alone decide what the server
+// encodes, draws and reads back; sessions, recorders and relays use the same mechanism.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace strandcast {
 
 using ReaderId = uint64_t;  // never reused by one hub; 0 = nobody
 
-/// Nothing by default.
+/// What a reader wants; by default nothing.
 struct Demand {
   std::optional<uint16_t>
       strand_stream;                   // strand frames of this stream_id: a class by a codec (stream_id_of)
@@ -24,15 +24,14 @@ struct Demand {
   bool has_inputs = false;  // motion and wind as they come in
 };
 
-/// Where readers say what they want.
+/// Interface through which readers state their demands.
 class DemandDesk {
  public:
   virtual ~DemandDesk() = default;
-  /// In place of what the reader wanted before. Gives the class of its pictures, 0 without pictures.
-  /// Unavailable or BadInput as PictureViews::assign, and NotFound for an unknown reader: then the demand of
-  /// before stays.
+  /// Replaces the reader's demand and returns the class of its pictures, 0 without pictures. Unavailable or
+  /// BadInput as in PictureViews::assign(), NotFound for an unknown reader; then the previous demand stays.
   virtual Result<PictureClass> set_demand(ReaderId reader, const Demand& demand) = 0;
-  /// What pictures are made to fit (fit_picture) before they are asked for.
+  /// Returns the budget that picture sizes must fit (fit_picture()) before they are demanded.
   virtual PictureBudget picture_budget() const = 0;
 };
 

@@ -1,5 +1,5 @@
-// StateSource: where published states come from: a simulation, a recording that is played again, another
-// server. Exactly one feeds a hub.
+// StateSource: origin of published states: a simulation, a replayed recording or another server. Each hub has
+// exactly one.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,8 @@
 
 namespace strandcast {
 
-/// Totals since start, and the present state. A source that simulates nothing leaves most of it alone.
+/// Totals since start and the present state. A source that does not simulate leaves most fields at their
+/// defaults.
 struct SimStats {
   uint64_t tick = 0;
   double step_median_ms = 0.0;  // solver, all substeps
@@ -52,17 +53,17 @@ struct SimStats {
   int64_t busy_ns = 0;          // that its thread has been at one turn of its loop; 0 = it waits
 };
 
-/// Takes what a source makes. Any thread; nothing waits for a reader.
+/// Receiver of a source's output. Any thread; the source never waits for readers.
 class StateSink {
  public:
   virtual ~StateSink() = default;
-  /// On the lattice of the newest change_stream(), or of the scene.
+  /// Takes a state, which is on the lattice of the newest change_stream() call, or of the scene.
   virtual void put(std::shared_ptr<const Snapshot> state) = 0;
-  /// Before the first state of it.
+  /// Changes the stream's coding; called before its first state.
   virtual void change_stream(const StreamDesc& stream) = 0;
-  /// The scene looks so from now on; before the first call as it did at the start.
+  /// Changes the look from now on; before the first call it is that of the start.
   virtual void change_look(const LookChange& look) = 0;
-  /// Strands have this shape at rest from the next state on; there are as many as before.
+  /// Changes the rest shape from the next state on; the number of strands stays.
   virtual void change_shape(std::shared_ptr<const SceneAsset> asset) = 0;
 };
 
@@ -70,18 +71,18 @@ class StepTap;
 
 class StateSource {
  public:
-  /// Answer to a command, on any thread.
+  /// Receives the answer to a command, on any thread.
   using Reply = std::function<void(Notice)>;
-  /// What is told of a tap that is there, or gone, from the state of this step on.
+  /// Receives the step from which on a tap is in use, or no longer in use.
   using OnTapped = std::function<void(uint64_t tick)>;
 
   virtual ~StateSource() = default;
-  /// The strands at rest and what else viewers draw; the newest of StateSink::change_shape(). Any thread.
+  /// Returns the rest shape and other data that viewers draw, as of the newest change_shape(). Any thread.
   virtual std::shared_ptr<const SceneAsset> asset() const = 0;
-  /// Returns when the first state was put, or with the error. States are on the lattice of `stream`. `sink`
-  /// outlives the source. Call once.
+  /// Starts the source. Returns after the first state was put, or with an error. States are on the lattice of
+  /// `stream`. `sink` must outlive the source. Call it once.
   virtual Status start(StateSink& sink, const StreamDesc& stream) = 0;
-  /// Puts nothing more from its return on.
+  /// Stops the source; after the return nothing is put any more.
   virtual void stop() = 0;
 
   // From any thread; return at once and do not call the sink.
@@ -89,13 +90,13 @@ class StateSource {
   // `who` asked for it, for people who look at a recording.
   virtual void post(const ControlCommand& command, Reply reply, const std::string& who) = 0;
   virtual void post(const SetParameter& parameter, Reply reply, const std::string& who) = 0;
-  /// Whoever hears of every step from now on (null: nobody), in place of who did; `on_tapped` comes on any
-  /// thread, never once the source has stopped or failed. One that takes no steps has nothing to tell.
+  /// Replaces the tap that hears of every step (null: none). `on_tapped` is called on any thread, but never
+  /// after the source has stopped or failed. A source without steps only calls `on_tapped`.
   virtual void set_tap(StepTap* /*tap*/, OnTapped on_tapped) { on_tapped(stats().tick); }
   virtual SimStats stats() const = 0;
-  /// The scene as it runs, to be run again elsewhere on this machine; nothing where there is none.
+  /// Returns the scene as it runs, so that it can be run elsewhere on this machine; empty if there is none.
   virtual std::optional<SceneDesc> scene() const { return std::nullopt; }
-  /// Why it ended by itself; nothing while it runs.
+  /// Returns why the source ended by itself; empty while it runs.
   virtual std::optional<Error> failure() const = 0;
 };
 

@@ -1,5 +1,5 @@
-// StreamHub: one source of states, any number of readers, and between them the encoders and the frame
-// renderer, of which those run that somebody wants. Any thread, unless said otherwise.
+// StreamHub: connects one source of states with any number of readers. Between them are the encoders and the
+// frame renderer, which run only while a reader wants their output. Any thread, unless stated otherwise.
 #pragma once
 
 #include <cstdint>
@@ -30,37 +30,41 @@ struct StreamHubConfig {
   std::shared_ptr<const SceneAsset> asset;
   MakePicturePainter make_painter;  // called when somebody wants pictures
   LookChange look = {};             // that the painters are made with
-  /// Makes `make_painter` anew for strands of another shape; empty: they have one.
+  /// Makes a new `make_painter` after a change of rest shape; empty if the shape never changes.
   std::function<MakePicturePainter(const std::shared_ptr<const SceneAsset>&, const LookDesc&)> painter_of =
       {};
 };
 
 class StreamHub : public StateSink, public DemandDesk {
  public:
-  /// NotFound for an unknown codec. Starts no thread but that of the frames, which sleeps.
+  /// Makes the hub. NotFound for an unknown codec. Starts only the frame thread, which sleeps.
   static Result<std::unique_ptr<StreamHub>> make(StreamHubConfig config);
-  /// stop(), if it was not called.
+  /// Calls stop() if it was not called.
   ~StreamHub() override;
   StreamHub(const StreamHub&) = delete;
   StreamHub& operator=(const StreamHub&) = delete;
 
-  /// `reader` outlives its demands: until remove() or stop(). One reader may have many, each with an id and
-  /// shares of its own; it then gets what any of them asks for, once.
+  /// Adds a demand slot of a reader, which must exist until remove() or stop(). A reader may have several
+  /// slots with ids and shares of their own; it then receives the union of them once.
   ReaderId add(StreamReader& reader, const ReaderTraits& traits = {});
   Result<PictureClass> set_demand(ReaderId reader, const Demand& demand) override;
   PictureBudget picture_budget() const override;
-  /// Before the first demand for pictures; until then it is that of a machine without a GPU.
+  /// Sets the budget, before the first demand for pictures. Until then it is that of a machine without a GPU.
   void set_picture_budget(const PictureBudget& budget);
-  /// Nothing is given for this demand any more from the return on. Not from within the reader.
+  /// Removes a demand; after the return nothing is delivered for it. Must not be called from within the
+  /// reader.
   void remove(ReaderId reader);
-  /// Told whenever the demands have changed, and at once.
+  /// Sets the function that receives the total demand, at once and whenever it changes.
   void set_source(std::function<void(const SourceDemand&)> on_demand);
 
-  /// A keyframe of this stream for those who begin; comes with the next state. From a reader's functions too.
+  /// Requests a keyframe of this stream for new readers; it comes with the next state. May be called from a
+  /// reader's functions.
   void request_keyframe(uint16_t stream_id);
-  /// The newest picture of a class again, whole. From a reader's functions too.
+  /// Requests the newest picture of a class again, as a whole picture. May be called from a reader's
+  /// functions.
   void request_whole(PictureClass picture_class);
-  /// What pictures show has changed beside this stream. From any reader's functions too.
+  /// Requests new pictures because something outside of this stream has changed. May be called from any
+  /// reader's functions.
   void redraw();
 
   void put(std::shared_ptr<const Snapshot> state) override;
@@ -73,27 +77,27 @@ class StreamHub : public StateSink, public DemandDesk {
   void tell_camera(uint64_t viewer, const CameraDesc& camera);
 
   StreamDesc stream() const;
-  /// What strands are served by: the scene's codec, and the one for who cannot decode it. Of each there are
-  /// all classes, whose streams are called by stream_id_of(); no stream is encoded that nobody demands.
+  /// Returns the codecs of the strands: the scene's and its fallback. Each has all classes, whose streams are
+  /// numbered by stream_id_of(). Only demanded streams are encoded.
   const std::vector<std::string>& strand_codecs() const { return codecs_; }
-  /// The newest.
+  /// Returns the newest look.
   LookChange look() const;
   std::vector<StrandClass> strand_classes() const;
   std::map<uint32_t, PictureView> picture_views() const;
   uint32_t strand_readers(uint16_t stream_id) const;
   SourceDemand total() const;
   FrameCounters frame_counters() const;
-  /// As FrameWorker::take_motions().
+  /// Does what FrameWorker::take_motions() does.
   std::vector<PictureMotion> take_picture_motions();
-  /// Of all streams that were ever needed, by stream_id.
+  /// Returns the counters of all streams that were ever encoded, by stream_id.
   std::map<uint16_t, StrandEncodeCounters> encode_counters() const;
-  /// What the encoders run, and the frame thread; nothing of it while there is nothing to draw.
+  /// Return the passes of the encoders and of the frame thread; the latter are empty while nothing is drawn.
   gl::PassReports strand_passes() const;
   gl::PassReports picture_passes() const;
-  /// Why no pictures can be drawn; nothing while all is well.
+  /// Returns why pictures cannot be drawn; empty while they can.
   std::optional<Error> picture_failure() const;
 
-  /// Ends all threads; the source has stopped before. Readers get nothing more.
+  /// Ends all threads; the source must have stopped. Readers receive nothing more.
   void stop();
 
  private:

@@ -1,6 +1,6 @@
-// StreamReader: whoever takes something out of the stream: the network for its sessions, a recorder, a relay.
-// It gets what its demands ask for, on the thread that made it, and must return quickly: it waits for nothing
-// and calls the hub only where that is said.
+// StreamReader: interface of anything that receives the stream: the network for its sessions, a recorder, a
+// relay. Its functions deliver what its demands ask for, on the thread that produced it. They must return
+// quickly without waiting, and may call the hub only where that is stated.
 #pragma once
 
 #include <cstdint>
@@ -22,29 +22,28 @@ class StreamReader {
  public:
   virtual ~StreamReader() = default;
 
-  /// A frame of a stream that it wants, in the order of the chain. A chain is entered with a keyframe
-  /// (StreamHub::request_keyframe). Once for all demands of this reader that ask for it.
+  /// Delivers a strand frame in the order of its chain, once for all demands of this reader. A chain must be
+  /// entered with a keyframe (StreamHub::request_keyframe()).
   virtual void on_strands(const EncodedFramePtr& /*frame*/) {}
   virtual void on_picture(PictureClass, const PicturePtr&) {}
-  /// This view cannot be drawn.
+  /// Reports that the view of this class cannot be drawn.
   virtual void on_picture_refused(PictureClass, const Error&) {}
-  /// No pictures can be had any more. Told to all.
+  /// Reports to all readers that pictures can no longer be drawn.
   virtual void on_pictures_failed(const Error&) {}
   virtual void on_state(const std::shared_ptr<const Snapshot>&) {}
   virtual void on_motion(uint64_t /*source*/, const MotionSamples&, int64_t /*arrival_ns*/) {}
   virtual void on_wind(uint64_t /*source*/, const WindSamples&, int64_t /*arrival_ns*/) {}
-  /// What a viewer of pictures looks through from now on; comes with the inputs.
+  /// Delivers the new camera of a viewer of pictures, for readers of inputs.
   virtual void on_camera(uint64_t /*viewer*/, const CameraDesc&) {}
-  /// Pictures of this class go on with the look of before: the new one cannot be drawn.
+  /// Reports that pictures of this class keep the previous look, because the new one cannot be drawn.
   virtual void on_look_refused(PictureClass, const Error&) {}
-  /// The scene looks so from now on. Told to all.
+  /// Reports a new look to all readers.
   virtual void on_look_change(const LookChange&) {}
-  /// Strands are coded in these classes from now on. Told to all; nothing is encoded so while anybody holds
-  /// `until_told`.
+  /// Reports new strand classes to all readers. They are not used while any reader holds `until_told`.
   virtual void on_stream_change(const std::vector<StrandClass>& /*classes*/,
                                 std::shared_ptr<void> /*until_told*/) {}
-  /// Strands have this shape at rest from now on. Told to all; nothing is encoded of it while anybody holds
-  /// `until_told`, and nothing that comes later is of the shape before.
+  /// Reports a new rest shape to all readers. No frame of it is encoded while any reader holds `until_told`;
+  /// all later frames are of this shape.
   virtual void on_shape_change(const std::shared_ptr<const SceneAsset>& /*asset*/,
                                std::shared_ptr<void> /*until_told*/) {}
 };

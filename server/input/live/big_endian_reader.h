@@ -1,4 +1,4 @@
-// Numbers as networks send them, the highest byte first, out of untrusted bytes. Header only, any thread.
+// Reads big-endian numbers from untrusted bytes. Header only, any thread.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace strandcast {
 
-/// Reads like ByteReader: past the end gives zero and is remembered, ask ok() afterwards.
+/// Works like ByteReader: reading past the end gives zero and clears ok().
 class BigEndianReader {
  public:
   explicit BigEndianReader(std::span<const std::byte> bytes) : reader_(bytes) {}
@@ -24,7 +24,7 @@ class BigEndianReader {
     std::reverse(bytes.begin(), bytes.end());
     return std::bit_cast<T>(bytes);
   }
-  /// The next `count` bytes, or none at all when fewer are left.
+  /// Takes the next `count` bytes; empty if fewer are left.
   std::span<const std::byte> take_bytes(size_t count) { return reader_.take_bytes(count); }
   bool ok() const { return reader_.ok(); }
   std::span<const std::byte> rest() const { return reader_.rest(); }

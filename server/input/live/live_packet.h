@@ -1,5 +1,5 @@
-// What one packet of a live source says, whatever protocol it came by: poses and wind in Strandcast's world.
-// Plain data.
+// LivePacket: content of one packet of a live source, independent of its protocol: poses and wind in
+// Strandcast's world. Plain data.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace strandcast {
 
-/// Where one subject (a rigid body, a performer's head, a tracker) is.
+/// Pose of one subject: a rigid body, a performer's head or a tracker.
 struct LivePose {
   std::string subject;                    // as its sender names it; empty where a protocol has only one
   Pose world_from_subject;                // right-handed, +Y up, m

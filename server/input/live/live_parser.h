@@ -1,6 +1,7 @@
-// LiveParser: the bytes of one live source into poses and wind of Strandcast's world. One parser per peer: it
-// keeps what a peer said before (bones, names). No socket, no clock, no policy: numbers are as sent, so that
-// a pose may hold NaN or a quaternion of any length, and whoever takes it has to look. One thread at a time.
+// LiveParser: parses the bytes of one live source into poses and wind in Strandcast's world. One parser per
+// peer, since it keeps what the peer sent before (bones, names). No socket, clock or policy. Numbers are as
+// sent: a pose may hold NaN or a quaternion of any length, so the receiver must check it. One thread at a
+// time.
 #pragma once
 
 #include <cstddef>
@@ -15,10 +16,10 @@
 
 namespace strandcast {
 
-/// Lines of LiveParser::describe; what is beyond is counted in the last of them.
+/// Largest number of lines of LiveParser::describe(); further lines are counted in the last one.
 constexpr size_t kMaxMonitorLines = 64;
 
-/// How a protocol's packets are read; what senders and documents disagree about is a setting.
+/// How packets of a protocol are read; points on which senders and documents disagree are settings.
 struct LiveParserConfig {
   std::string protocol;          // a name of live_protocols()
   std::string axis_order;        // one of LiveProtocol::axis_orders; empty = the first
@@ -40,29 +41,29 @@ struct LiveProtocol {
   const char* multicast_group;           // "" = none
 };
 
-/// Every protocol there is a parser for.
+/// Returns the protocols that have a parser.
 std::span<const LiveProtocol> live_protocols();
 
 class LiveParser {
  public:
   virtual ~LiveParser() = default;
 
-  /// What one datagram says or, over TCP, one chunk as read. An error is one sentence and leaves the parser
-  /// as it was; over TCP the connection is of no use afterwards. What is not known is left out and counted.
+  /// Parses a datagram or, over TCP, a chunk as read. An error is one sentence and leaves the parser
+  /// unchanged; a TCP connection cannot be used after it. Unknown content is skipped and counted.
   virtual Result<LivePacket> parse(std::span<const std::byte> bytes, int64_t arrival_ns) = 0;
-  /// To be sent to the peer when a connection begins: VRPN's cookie, NatNet's wish to be served; empty =
+  /// Returns bytes to send when a connection begins: VRPN's cookie, NatNet's request to be served; empty =
   /// nothing.
   virtual std::vector<std::byte> greeting() const { return {}; }
-  /// To be sent to the peer about once a second, so that it goes on, or says what is not known yet (NatNet);
-  /// empty = nothing.
+  /// Returns bytes to send about once a second, so that the peer continues or describes what is unknown yet
+  /// (NatNet); empty = nothing.
   virtual std::vector<std::byte> request() const { return {}; }
-  /// Messages, bundles and descriptions of kinds that are not known, since the parser was made.
+  /// Returns the number of messages, bundles and descriptions of unknown kinds since the parser was made.
   virtual uint64_t ignored() const = 0;
-  /// What the last packet held, for a person: fields and values as they were sent, at most kMaxMonitorLines.
+  /// Describes the last packet for a person: fields and values as sent, at most kMaxMonitorLines.
   virtual std::vector<std::string> describe() const = 0;
 };
 
-/// A parser that has seen nothing yet. NotFound names the protocols, orders or versions that there are.
+/// Makes a parser. NotFound lists the known protocols, axis orders or versions.
 Result<std::unique_ptr<LiveParser>> make_live_parser(const LiveParserConfig& config);
 
 }  // namespace strandcast

@@ -1,22 +1,21 @@
-// LivePolicy: what becomes of the poses of the one subject that drives the head before the hair sees them;
-// the same for every protocol. Pure logic without a clock; one thread at a time.
+// LivePolicy: filters the poses of the subject that drives the head before they reach the hair; the same for
+// every protocol. Pure logic without a clock; one thread at a time.
 //
-// * Refused and counted: poses that are no numbers, no rotation or out of the world.
-// * Order: a pose whose number says that one before it is missing waits for that one, kResequenceNs at most,
-//   while no more than kResequenceFrames wait. So do poses of a steady source that only has times. What comes
-//   twice or later than that is left out. Poses without either are taken as they come.
-// * A body that is kGateJumpM away at once is believed when it stays there for kGatePoses and kGateNs; else
-// it
-//   was another one, or its markers were mixed up. Until then nothing came. What is believed is a jump, which
-//   hair is carried through.
-// * Nothing is faster than kMaxLiveSpeedMps and kMaxLiveTurnRadPerS, bursts of kClampWindowNs aside: the head
-//   comes after.
-// * Loss: the newest pose is held for kHoldNs; then the head goes on by what it would have moved in
-//   kExtrapolateNs, eased in and out over kEaseNs, and rests where it is. After kMotionStaleNs (input_hub.h)
-//   it is stale. What comes then is believed wherever it is.
-// * Both signs of a quaternion are one rotation: the nearer one is taken.
-// * A calibrated head is at rest, at the origin, where it was then: what the tracker is tilted by on the head
-//   and where the performer faced are taken out.
+// * Refused and counted: poses that are not finite, not a rotation, or outside the world.
+// * Order: a pose whose number shows that an earlier one is missing waits for it, at most kResequenceNs and
+//   while at most kResequenceFrames wait. So do poses of a steady source that has times only. Repeated and
+//   later poses are dropped. Poses without number or time are used in order of arrival.
+// * A pose that is kGateJumpM away at once is accepted only if it stays there for kGatePoses and kGateNs.
+//   Otherwise it was another body, or markers were confused. Until then it counts as missing. An accepted one
+//   is a jump, through which hair is carried.
+// * Speed is limited to kMaxLiveSpeedMps and kMaxLiveTurnRadPerS, except for bursts of kClampWindowNs; the
+//   head then follows later.
+// * Loss: the newest pose is held for kHoldNs. Then the head continues by its motion of kExtrapolateNs, eased
+//   in and out over kEaseNs, and rests there. After kMotionStaleNs (input_hub.h) it is stale, and the next
+//   pose is accepted wherever it is.
+// * Both signs of a quaternion are the same rotation; the nearer one is used.
+// * Calibration makes the present pose the rest pose at the origin. It removes the tracker's tilt on the head
+//   and the direction that the performer faced.
 #pragma once
 
 #include <cstdint>
@@ -43,10 +42,10 @@ inline constexpr int64_t kResequenceNs = 20'000'000;
 inline constexpr int64_t kHoldNs = 100'000'000;
 inline constexpr int64_t kExtrapolateNs = 50'000'000;
 inline constexpr int64_t kEaseNs = 250'000'000;
-/// From kHoldNs on the head is told so often, so that what comes then cannot move it by the whole gap at
-/// once.
+/// Interval at which the head's resting pose is repeated after kHoldNs, so that a late pose does not move it
+/// by the whole gap at once.
 inline constexpr int64_t kRestingPoseNs = 10'000'000;
-/// Numbers of frames that are further away than this are another count.
+/// Frame numbers that differ by more than this belong to a new count.
 inline constexpr int64_t kRestartFrames = 1000;
 inline constexpr uint32_t kRestartPoses = 5;  // or as many in a row that are late
 
@@ -59,7 +58,7 @@ struct LivePolicyCounters {
   uint64_t lost = 0;         // numbers that never came
 };
 
-/// The head at a time of the server's clock.
+/// The head's pose at a time of the server's clock.
 struct LiveHead {
   int64_t time_ns = 0;
   Pose world_from_head;
@@ -69,23 +68,24 @@ struct LiveHead {
 
 class LivePolicy {
  public:
-  /// `turns_only`: poses have no place.
+  /// Makes a policy; `turns_only`: poses have rotations without positions.
   explicit LivePolicy(bool turns_only = false) : turns_only_(turns_only) {}
 
-  /// A pose of the subject; `arrival_ns` is the server's clock and never decreases.
+  /// Takes a pose of the subject; `arrival_ns` is the server's clock and must not decrease.
   void take(const LivePose& pose, int64_t arrival_ns);
-  /// What the head does, in order of time, up to `now_ns`: after each take(), and every few milliseconds.
+  /// Returns the head's poses up to `now_ns` in order of time; call it after each take(), and every few
+  /// milliseconds.
   std::vector<LiveHead> advance(int64_t now_ns);
 
-  /// Another subject, or another sender: its first pose is believed wherever it is.
+  /// Accepts the next pose wherever it is, because the subject or the sender has changed.
   void begin_another();
-  /// What is seen is the head at rest from now on; false when nothing is seen.
+  /// Makes the present pose the head at rest; returns false if there is none.
   bool calibrate(int64_t now_ns);
-  /// Undoes it.
+  /// Removes the calibration.
   void reset_calibration();
 
   bool is_calibrated() const { return calibration_.has_value(); }
-  /// No pose for kMotionStaleNs, or never one.
+  /// Returns whether no pose came for kMotionStaleNs, or never.
   bool is_stale(int64_t now_ns) const;
   const LivePolicyCounters& counters() const { return counters_; }
 
@@ -94,7 +94,7 @@ class LivePolicy {
     LivePose pose;
     int64_t arrival_ns = 0;
   };
-  /// How a calibrated pose differs from the one that was seen: rotation = from_stage * seen * from_mount.
+  /// Difference between a calibrated pose and the seen one: rotation = from_stage * seen * from_mount.
   struct Calibration {
     glm::dquat from_stage, from_mount;
     glm::dvec3 origin_m;

@@ -1,12 +1,11 @@
-// LiveSource: one live input without its socket: whom it hears, what its parser makes of the bytes, which
-// subject drives the head, what the policy makes of it, and counts of all that. No clock, no I/O; one thread
-// at a time.
+// LiveSource: one live input without its socket. It chooses the sender, parses its bytes, selects the subject
+// that drives the head, applies the policy and counts all of this. No clock, no I/O; one thread at a time.
 //
-// * The first address and port whose packet has a pose or wind is heard until nothing that can be read came
-//   from it for kMotionStaleNs; packets of others are refused meanwhile, unread.
+// * The first address and port that sends a pose or wind is the sender, until nothing readable came from it
+//   for kMotionStaleNs. Meanwhile packets of others are refused unread.
 // * At most kMaxSampleRateHz packets (input_hub.h) and kMaxLiveBytesPerS are read.
-// * The subject that drives the head: the one that was named; else one without a name or called head, in
-//   whatever case; else the first that was seen, as long as it is.
+// * The head is driven by the chosen subject. Without a choice it is a subject without a name or called head
+//   (in any case), else the first one seen, while it stays visible.
 #pragma once
 
 #include <memory>
@@ -35,7 +34,7 @@ struct LiveSourceCounters {
   uint64_t over_rate = 0;
 };
 
-/// What a person should read of, once.
+/// A note for the log, written once.
 struct LiveNote {
   bool is_warning = false;
   std::string text;
@@ -43,37 +42,37 @@ struct LiveNote {
 
 class LiveSource {
  public:
-  /// NotFound or BadInput name the field of `live.N`.
+  /// Makes a source; NotFound and BadInput name the field of `live.N`.
   static Result<std::unique_ptr<LiveSource>> make(const LiveDesc& live, size_t index);
 
   const LiveProtocol& protocol() const { return protocol_; }
   const LiveDesc& live() const { return live_; }
   uint16_t port() const { return port_; }
-  /// "vmc, port 39539" or "vrpn, HOST:3883".
+  /// Describes the source: "vmc, port 39539" or "vrpn, HOST:3883".
   std::string describe() const;
 
-  /// Bytes of one datagram, or as read from a connection. An error ends the connection that they came by.
+  /// Takes the bytes of one datagram, or as read from a connection. An error ends that connection.
   Status take(const std::string& sender, std::span<const std::byte> bytes, int64_t arrival_ns);
-  /// Somebody sent who may not.
+  /// Counts a packet from an address that may not send.
   void refuse() { ++counters_.refused; }
-  /// A connection begins, or ended: the other end knows nothing of what was said before.
+  /// Resets the parser, because a connection begins or has ended.
   void begin_connection();
   std::vector<std::byte> greeting() const { return parser_->greeting(); }
   std::vector<std::byte> request() const { return parser_->request(); }
 
-  /// After take() and every few milliseconds.
+  /// Output of advance(); call that after take() and every few milliseconds.
   struct Due {
     std::vector<MotionSamples> motion;  // at most one sample each; times are the server's
     std::vector<WindSamples> wind;
     bool has_ended = false;  // the head has become stale: who drives it may be another one
   };
   Due advance(int64_t now_ns);
-  /// Whether advance() does anything while nothing comes.
+  /// Returns whether advance() has work although nothing was received.
   bool is_active() const { return was_heard_ || !was_stale_; }
 
   void choose_subject(const std::string& subject);
   bool has_seen(const std::string& subject) const;
-  /// False when the subject is not seen.
+  /// Makes the present pose the head at rest; returns false if the subject is not seen.
   bool calibrate(int64_t now_ns) { return policy_.calibrate(now_ns); }
   void reset_calibration() { policy_.reset_calibration(); }
   bool is_stale(int64_t now_ns) const { return policy_.is_stale(now_ns); }

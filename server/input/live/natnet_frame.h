@@ -1,6 +1,6 @@
-// The payloads of OptiTrack's NatNet, versions 3.0 to 4.1: a frame of motion, the names of bodies, what a
-// server says of itself. By the layout that is documented for direct depacketisation; NaturalPoint's SDK is
-// not used. Any thread.
+// Reads the payloads of OptiTrack's NatNet, versions 3.0 to 4.1: motion frames, names of bodies, and the
+// server's description. Follows the layout documented for direct depacketisation; NaturalPoint's SDK is not
+// used. Any thread.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@
 
 namespace strandcast {
 
-/// What versions of NatNet differ in: each has what those before it have.
+/// Layouts of NatNet versions; each includes the features of the preceding ones.
 enum class NatnetLayout {
   Plain,        // 3.0, 3.1
   MarkerNames,  // 4.0: descriptions name markers
@@ -33,7 +33,8 @@ struct NatnetFrame {
   double time_s = 0.0;  // since the server's software began
   bool has_new_models = false;
 };
-/// Nothing where the payload is no frame of this layout, down to its last byte. MarkerNames is as Plain.
+/// Reads a frame; empty unless the payload is exactly one frame of this layout. MarkerNames is read like
+/// Plain.
 std::optional<NatnetFrame> read_natnet_frame(std::span<const std::byte> payload, NatnetLayout layout);
 
 struct NatnetName {

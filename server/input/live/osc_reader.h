@@ -1,6 +1,6 @@
-// OSC 1.0 out of one datagram: bundles are unfolded, every message is checked to its last byte before any of
-// them is handed out. Own and strict, as the OSC libraries that there are trust sizes that come from outside.
-// Any thread.
+// Reads OSC 1.0 from one datagram. Bundles are flattened, and every message is checked to its last byte
+// before any is returned. An own strict reader, because existing OSC libraries trust sizes from outside. Any
+// thread.
 #pragma once
 
 #include <cstddef>
@@ -17,10 +17,10 @@ namespace strandcast {
 
 constexpr size_t kMaxOscBundleDepth = 4;       // bundles within bundles
 constexpr size_t kMaxOscBundleElements = 256;  // of one bundle
-/// UDP carries no more.
+/// Largest payload of a UDP datagram.
 constexpr uint32_t kMaxDatagramBytes = 65'507;
 
-/// Parts of the datagram that it was read from.
+/// A message as views into its datagram.
 struct OscMessage {
   std::string_view address;              // from its '/'
   std::string_view tags;                 // of the arguments, without the comma
@@ -33,11 +33,11 @@ struct OscPacket {
   uint64_t unknown_tags = 0;         // messages left out, as nobody knows how long their arguments are
 };
 
-/// Reads a datagram of at most `limit_bytes`. An error names the byte.
+/// Reads a datagram of at most `limit_bytes`; an error names the byte.
 Result<OscPacket> read_osc(std::span<const std::byte> datagram, uint32_t limit_bytes);
 
-/// Takes a message's arguments from the front. Another kind than asked for, or none left: nothing, and
-/// nothing more after that. Arguments beyond those taken do not matter.
+/// Reads a message's arguments in order. After a wrong type or the end, it returns nothing more. Remaining
+/// arguments are ignored.
 class OscArguments {
  public:
   explicit OscArguments(const OscMessage& message) : tags_(message.tags), bytes_(message.arguments) {}
@@ -45,7 +45,7 @@ class OscArguments {
   std::optional<int32_t> take_int();
   std::optional<float> take_float();
   std::optional<std::string_view> take_string();
-  /// True while everything asked for was there.
+  /// Returns true while all requested arguments were present.
   bool ok() const { return ok_; }
 
  private:
@@ -58,7 +58,7 @@ class OscArguments {
   bool ok_ = true;
 };
 
-/// "/address  1 2.5 "text"", for a person.
+/// Formats a message for a person: "/address  1 2.5 "text"".
 std::string to_line(const OscMessage& message);
 
 }  // namespace strandcast

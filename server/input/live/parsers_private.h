@@ -1,4 +1,4 @@
-// The parsers by name, for live_parser.cpp, and what they share.
+// Makers of the parsers, for live_parser.cpp, and functions that parsers share.
 #pragma once
 
 #include <glm/gtc/quaternion.hpp>
@@ -19,25 +19,25 @@ Result<std::unique_ptr<LiveParser>> make_natnet_parser(size_t axis_order, const 
 std::unique_ptr<LiveParser> make_vrpn_parser(size_t axis_order);
 std::unique_ptr<LiveParser> make_live_link_face_parser(size_t axis_order);
 
-/// The place of a name among those known, or NotFound with a sentence that lists them.
+/// Returns the index of a name among `known`; NotFound lists them.
 Result<size_t> find_name(const char* kind, const std::string& name, const std::vector<const char*>& known);
 
-/// Subjects are named by at most so many bytes; longer names are cut.
+/// Longest name of a subject in bytes; longer names are cut.
 constexpr size_t kMaxSubjectBytes = 64;
 
-/// x, y, z, w, as all of these protocols send them.
+/// Converts x, y, z, w, the order of all these protocols, to a quaternion.
 inline glm::dquat quaternion_of(const glm::dvec4& xyzw) {
   return {xyzw.w, xyzw.x, xyzw.y, xyzw.z};
 }
 
-/// Seconds as whole nanoseconds; none where they are no time that fits.
+/// Converts seconds to whole nanoseconds; empty if they are not finite or do not fit.
 std::optional<int64_t> nanoseconds_of(double seconds);
 
-/// Lines for describe(): those beyond kMaxMonitorLines are counted in the last.
+/// Collects lines for describe(); lines beyond kMaxMonitorLines are counted in the last.
 class MonitorLines {
  public:
   void add(std::string line);
-  /// True while a line added would be shown: what is costly to write need not be written.
+  /// Returns whether a further line would be shown, so that costly lines can be skipped.
   bool has_room() const { return lines_.size() + 1 < kMaxMonitorLines; }
   std::vector<std::string> take() &&;
 

@@ -1,5 +1,5 @@
-// FrameOrder: strands sorted along a Morton curve through their roots, so that a codec which looks at
-// neighbours in an array finds neighbours in space. Both sides know it: it costs no bits. Immutable.
+// FrameOrder: strands sorted along a Morton curve through their roots, so that a codec that uses array
+// neighbours finds neighbours in space. Both sides compute it, so it costs no bits. Immutable.
 #pragma once
 
 #include "server/report/stream_codec.h"
@@ -10,7 +10,7 @@ class FrameOrder {
  public:
   explicit FrameOrder(const StreamShape& shape);
 
-  /// (vertex_count x strand_count), strands in the order of the curve.
+  /// Returns (vertex_count x strand_count) points with the strands in the order of the curve.
   std::vector<glm::vec3> sorted(const std::vector<glm::vec3>& frame) const;
   /// The inverse of sorted().
   std::vector<glm::vec3> restored(const std::vector<glm::vec3>& sorted) const;

@@ -1,5 +1,5 @@
-// Lossless coders of integers as stream codecs: positions are rounded to a cubic lattice of the coarsest step
-// that keeps the bound, and coded as they are or as residuals of a prediction in time. One thread.
+// Stream codecs from lossless coders of integers: positions are rounded to the coarsest cubic lattice that
+// keeps the bound, and coded directly or as residuals of a prediction in time. One thread.
 #pragma once
 
 #include <memory>

@@ -1,7 +1,6 @@
-// TemporalPredictor: our prediction of integers in time, put around coders that have none. The movement of a
-// vertex is foretold from its last movement, the change of that, and what its parent, the vertex nearer to
-// the root, just did; four weights are fitted to each frame and sent. Encoder and decoder have one each. One
-// thread.
+// TemporalPredictor: our prediction of integers in time, for coders without one. It predicts the motion of a
+// vertex from its last motion and from that of its parent, the vertex nearer to the root. Four weights are
+// fitted to each frame and sent. Encoder and decoder have one each. One thread.
 #pragma once
 
 #include <array>
@@ -10,22 +9,22 @@
 
 namespace strandcast {
 
-/// In 1/1024, of: the last movement, its change; the change of the parent's movement now, and that before.
+/// Weights in 1/1024 of: the last motion, its change, the change of the parent's motion now, and that before.
 using TemporalWeights = std::array<int16_t, 4>;
 
 class TemporalPredictor {
  public:
-  /// Least squares over a sample of strands; all zero before the third frame.
+  /// Fits the weights by least squares over a sample of strands; all zero before the third frame.
   TemporalWeights fit(const IntegerPlanes& now) const;
-  /// now - prediction; the frame itself before anything is known.
+  /// Returns now - prediction; the frame itself before anything is known.
   IntegerPlanes residual(const IntegerPlanes& now, const TemporalWeights& weights) const;
-  /// The inverse of residual().
+  /// Inverse of residual().
   IntegerPlanes restored(const IntegerPlanes& residual, const TemporalWeights& weights) const;
-  /// What residual() gives for the next frame: positions before anything is known.
+  /// Returns what residual() will give for the next frame; Positions before anything is known.
   IntegerKind next_kind() const {
     return last_.value.empty() ? IntegerKind::Positions : IntegerKind::Residuals;
   }
-  /// `now` becomes the last frame.
+  /// Makes `now` the last frame.
   void advance(const IntegerPlanes& now);
 
  private:

@@ -1,7 +1,7 @@
-// Executor: what runs the strand kernels of shaders/sim and keeps the strands' state for them: OpenGL
-// (gl_executor.h), or the processors, a strand per lane of a vector register (lanes_executor.h). Solvers are
-// written against this and know neither. Planes, tables and programs live no longer than their executor. From
-// one thread.
+// Executor: runs the strand kernels of shaders/sim and stores the state of the strands for them.
+// Implementations: OpenGL (gl_executor.h), and the processors with a strand per lane of a vector register
+// (lanes_executor.h). Solvers depend only on this interface. Planes, tables and programs must not outlive
+// their executor. One thread.
 #pragma once
 
 #include <array>
@@ -31,61 +31,62 @@ class GpuTimer;
 
 namespace strandcast {
 
-/// A vec4 for every strand in each of its rows: for most planes a row is a vertex. Outside of the executor
-/// the order is row-major with the strand fastest, (rows x strand_count).
+/// A vec4 per strand in each of its rows; in most planes a row is a vertex. Values passed in and out are
+/// row-major with the strand fastest, (rows x strand_count).
 class StrandPlane {
  public:
   virtual ~StrandPlane() = default;
-  /// As many values as the plane was made of.
+  /// Writes all values; their number must be that of the plane.
   virtual void write(std::span<const glm::vec4> values) = 0;
-  /// Waits until kernels have written it; resizes `values` on first use only.
+  /// Reads all values; waits until kernels have written them. Resizes `values` only on first use.
   virtual void read(std::vector<glm::vec4>& values) const = 0;
   virtual uint64_t size_bytes() const = 0;
-  /// Its own memory where that is such blocks, until the next kernel runs or write(); else nothing.
+  /// Returns the plane's own memory if it consists of blocks of strands; valid until the next kernel run or
+  /// write(). Otherwise empty.
   virtual std::optional<StrandBlocksView> view() const { return {}; }
 };
 
-/// An array of vec4 that kernels look things up in, at an index that differs between strands.
+/// An array of vec4 that kernels read at indices that differ between strands.
 class LookupTable {
  public:
   virtual ~LookupTable() = default;
-  /// As many values as it has elements.
+  /// Writes all elements; their number must be that of the table.
   virtual void write(std::span<const glm::vec4> values) = 0;
-  /// Its own memory where host code may fill it without a copy, while no kernel runs; else nothing.
+  /// Returns the table's own memory if the host may fill it directly while no kernel runs; otherwise empty.
   virtual std::span<glm::vec4> memory() { return {}; }
   virtual uint64_t size_bytes() const = 0;
 };
 
-/// Turns xyz of every element, in double; w stays.
+/// Rotates xyz of every element in double precision; w is unchanged.
 void turn_plane(StrandPlane& plane, const glm::dquat& turn);
 
-/// By role; nullptr = the kernel does not touch it.
+/// Planes by role; nullptr = the kernel does not use it.
 using BoundPlanes = std::array<StrandPlane*, kPlaneRoleCount>;
 inline StrandPlane*& plane_of(BoundPlanes& planes, PlaneRole role) {
   return planes[static_cast<size_t>(role)];
 }
 
-/// By role; nullptr = the kernel looks nothing up in it.
+/// Tables by role; nullptr = the kernel does not use it.
 using BoundTables = std::array<LookupTable*, kTableRoleCount>;
 inline LookupTable*& table_of(BoundTables& tables, TableRole role) {
   return tables[static_cast<size_t>(role)];
 }
 
-/// A kernel with its constants, ready to run.
+/// A compiled kernel with its constants.
 class KernelProgram {
  public:
   virtual ~KernelProgram() = default;
-  /// Once for all strands. What it stores is there for the next run and for read().
+  /// Runs the kernel once for all strands. Its output is available to the next run and to read().
   virtual void run(const StepBlock& step, size_t collider_count, const BoundPlanes& planes,
                    const BoundTables& tables) = 0;
   void run(const StepBlock& step, size_t collider_count, const BoundPlanes& planes) {
     run(step, collider_count, planes, {});
   }
-  /// Of its own, scratch above all.
+  /// Returns the bytes of the program's own memory, mainly scratch.
   virtual uint64_t size_bytes() const = 0;
 };
 
-/// What is wanted of a volume that the executor's device makes of planes (common/kernels/volume).
+/// Description of a volume that the executor's device computes from planes (common/kernels/volume).
 struct DeviceVolumeDesc {
   std::string scatter;       // how strands are added up: one of kVolumeScatters but "auto" and "host"
   const HairVolume* volume;  // of the same strands on the host; read by make_volume() only
@@ -96,21 +97,22 @@ struct DeviceVolumeDesc {
   bool is_ahead = true;  // of the strands as they will be after the substep
 };
 
-/// What a device found of strands.
+/// Results of a device about its volume.
 struct DeviceVolumeFacts {
   VolumeGrid grid;
   uint64_t outside_count = 0;  // samples beyond the grid's limits, or no number
 };
 
-/// A hair volume made where the strands are, without waiting for anything: grid and sums as HairVolume's but
-/// for roundings, the same bits every time.
+/// A hair volume computed where the strands are stored, without waiting. Grid and sums equal those of
+/// HairVolume except for rounding, with the same bits every time.
 class DeviceVolume {
  public:
   virtual ~DeviceVolume() = default;
-  /// Fills `table` as shaders/sim/volume.glsl reads it. `motion`: velocities, or ways.
+  /// Fills `table` in the layout that shaders/sim/volume.glsl reads. `motion` holds velocities or
+  /// displacements.
   virtual void update(const StepBlock& step, const StrandPlane& position, const StrandPlane& motion,
                       LookupTable& table) = 0;
-  /// Of the last update, and the nodes that it left in its table; waits for it.
+  /// Read the facts of the last update and the nodes in its table; both wait for the device.
   virtual DeviceVolumeFacts read_facts() const = 0;
   virtual void read_nodes(const LookupTable& table, std::vector<glm::vec4>& nodes) const = 0;
   virtual uint64_t size_bytes() const = 0;
@@ -129,31 +131,30 @@ class Executor {
  public:
   virtual ~Executor() = default;
   virtual const ExecutorInfo& info() const = 0;
-  /// Binds what it needs to the calling thread.
+  /// Binds the executor's resources to the calling thread.
   virtual Status make_current() { return {}; }
-  /// LimitExceeded when planes of such strands are too large for it.
+  /// Returns LimitExceeded if planes of such strands are too large.
   virtual Status check_size(const StrandLayout& layout) const = 0;
-  /// (rows x strand_count) values.
+  /// Makes a plane with (rows x strand_count) values.
   virtual std::unique_ptr<StrandPlane> make_plane(const std::string& label, uint32_t strand_count,
                                                   std::span<const glm::vec4> values) = 0;
-  /// Zero at first. LimitExceeded when the device looks up fewer elements.
+  /// Makes a table filled with zeros. LimitExceeded if the device supports fewer elements.
   virtual Result<std::unique_ptr<LookupTable>> make_table(const std::string& label,
                                                           uint32_t element_count) = 0;
-  /// Compiles where it has to: not while a program of the same kernel, constants and features is there. Of
-  /// `layout` only the counts matter. BadInput for a constant that the kernel does not declare, or when it
-  /// does not compile; Unsupported for a kernel that this executor does not run, LimitExceeded for too many
-  /// strands.
+  /// Makes a program; compiles only if none with the same kernel, constants and features exists. Only the
+  /// counts of `layout` matter. BadInput for a constant that the kernel does not declare, and if it does not
+  /// compile. Unsupported for a kernel that this executor does not run, LimitExceeded for too many strands.
   virtual Result<std::unique_ptr<KernelProgram>> make_program(const KernelDesc& desc,
                                                               const SceneFeatures& features,
                                                               const StrandLayout& layout) = 0;
-  /// Unsupported where the device makes none, or not so; LimitExceeded when it would be too large for it.
-  /// Tables that it fills have room for the host's volume.
+  /// Makes a volume on the device. Unsupported if the device has none, or not this kind; LimitExceeded if it
+  /// is too large. Tables that it fills must have room for the host's volume.
   virtual Result<std::unique_ptr<DeviceVolume>> make_volume(const DeviceVolumeDesc& desc);
-  /// For timing what runs on a device of its own; nullptr: a clock of the calling thread does.
+  /// Returns the timer of the executor's device; nullptr: the clock of the calling thread suffices.
   virtual gl::GpuTimer* timer() { return nullptr; }
 };
 
-/// Milliseconds that `work` takes on the executor, which is waited for.
+/// Runs `work` on the executor, waits for it and returns the milliseconds that it took.
 double timed_ms(Executor& executor, const std::function<void()>& work);
 
 struct ExecutorConfig {
@@ -162,9 +163,9 @@ struct ExecutorConfig {
   std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary. Of OpenGL only
 };
 
-/// Names that ExecutorConfig::sim_device takes: "auto", "gl", "lanes".
+/// Returns whether ExecutorConfig::sim_device accepts this name: "auto", "gl" or "lanes".
 bool is_sim_device_name(const std::string& name);
-/// Makes it current. "gl", and an OpenGL device that is named, fail where it is not there: Unavailable, or
+/// Opens an executor and makes it current. If "gl" or a named OpenGL device is missing, returns Unavailable;
 /// BadInput for an unknown name.
 Result<std::unique_ptr<Executor>> open_executor(const ExecutorConfig& config);
 

@@ -1,5 +1,5 @@
-// The executor that runs strand kernels as OpenGL compute shaders, with a context of its own: on hardware, or
-// on Mesa's llvmpipe. Everything that it made is used and deleted while its context is current. One thread.
+// An executor that runs strand kernels as OpenGL compute shaders with its own context, on hardware or Mesa's
+// llvmpipe. Its objects must be used and destroyed while its context is current. One thread.
 #pragma once
 
 #include <filesystem>
@@ -12,8 +12,9 @@
 
 namespace strandcast {
 
-/// `gl_device` as EglContext::make; makes the context current. `shader_folder`: none = the shaders in the
-/// binary. Unavailable where there is no such device, NotFound for an unknown name.
+/// Makes the executor and makes its context current. `gl_device` as EglContext::make(); without
+/// `shader_folder`, the embedded shaders are used. Unavailable if there is no such device, NotFound for an
+/// unknown name.
 Result<std::unique_ptr<Executor>> make_gl_executor(
     const std::string& gl_device, const std::optional<std::filesystem::path>& shader_folder = {});
 

@@ -1,4 +1,4 @@
-// Planes and tables of the executor that runs on OpenGL, and where its kernels find them. Needs its context.
+// Planes and tables of the OpenGL executor, and their bindings for kernels. Needs the executor's context.
 #pragma once
 
 #include <epoxy/gl.h>
@@ -14,7 +14,7 @@
 
 namespace strandcast {
 
-/// Where kernels find a plane, by role. Not all are stored to.
+/// Binding of a plane by its role. Kernels do not store to all of them.
 struct PlaneBinding {
   uint32_t unit;
   std::optional<uint32_t> storage;
@@ -34,8 +34,8 @@ inline constexpr std::array<PlaneBinding, kPlaneRoleCount> kPlaneBindings = {{
 inline constexpr std::array<uint32_t, kTableRoleCount> kTableUnits = {shader::kUnitField, shader::kUnitVolume,
                                                                       shader::kUnitBody};
 
-/// A buffer of vec4 with a buffer texture over all of it: kernels write the one and fetch from the other,
-/// which on llvmpipe costs half of a storage-block load or less.
+/// A buffer of vec4 with a buffer texture over all of it. Kernels write to the buffer and fetch from the
+/// texture, which costs at most half of a storage-block load on llvmpipe.
 class GlPlane final : public StrandPlane {
  public:
   GlPlane(const std::string& label, std::span<const glm::vec4> values)

@@ -1,6 +1,7 @@
-// The ways to get strands into a volume that document 003 tried (4.2.4), for strandcast-report volume, which
-// holds them against those in use: points drawn into the layers of a texture, and nodes that look for their
-// neighbours in bins. On a given grid, from samples that are on the device already. Needs a GL context.
+// Alternative methods to sum strands into a volume, for the comparison of strandcast-report volume. They are
+// those of document 003 (4.2.4): points drawn into the layers of a texture, and nodes that search their
+// neighbours in bins. They work on a given grid with samples that are already on the device. Needs a GL
+// context.
 #pragma once
 
 #include <cstdint>
@@ -18,20 +19,20 @@
 
 namespace strandcast {
 
-/// "raster": additive blending, 003's choice. "counting": bins are cells, samples sorted by counting.
-/// "hashing": bins are what lies on the same sides of random planes, of a fixed size.
+/// Names of the methods. "raster": additive blending, the choice of 003. "counting": bins are cells, samples
+/// are sorted by counting. "hashing": fixed-size bins of samples on the same sides of random planes.
 inline constexpr std::string_view kStudiedScatters[] = {"raster", "counting", "hashing"};
 
 class GlScatterStudy {
  public:
   virtual ~GlScatterStudy() = default;
-  /// From samples to nodes.
+  /// Computes the nodes from the samples.
   virtual void run() = 0;
-  /// Until that is done.
+  /// Waits until the device has finished.
   static void wait();
-  /// (grid.size()) mean velocity, m/s, and density, m/m^3.
+  /// Returns mean velocity (m/s) and density (m/m^3) of the nodes, (grid.size()) values.
   std::vector<glm::vec4> read_nodes() const { return nodes_.read_all<glm::vec4>(); }
-  /// Samples that were left out.
+  /// Returns the number of samples that were left out.
   virtual uint64_t lost_count() const { return 0; }
 
  protected:
@@ -42,8 +43,8 @@ class GlScatterStudy {
   gl::Buffer nodes_;
 };
 
-/// One of kStudiedScatters. Samples lie in the grid: their base nodes have neighbours. LimitExceeded where
-/// the device has no room for them.
+/// Makes one of kStudiedScatters. All samples must lie inside the grid, so that their base nodes have
+/// neighbours. LimitExceeded if the device has too little memory.
 Result<std::unique_ptr<GlScatterStudy>> make_gl_scatter_study(const gl::ShaderLibrary& shaders,
                                                               const gl::DeviceLimits& limits,
                                                               std::string_view name, const VolumeGrid& grid,

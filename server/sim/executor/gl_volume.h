@@ -1,5 +1,5 @@
-// The hair volume of the executor that runs on OpenGL: compute kernels volume/*.comp, all on the device.
-// Needs the executor's context.
+// Hair volume of the OpenGL executor: compute kernels volume/*.comp, entirely on the device. Needs the
+// executor's context.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@
 
 namespace strandcast {
 
-/// As Executor::make_volume().
+/// Makes the volume; as Executor::make_volume().
 Result<std::unique_ptr<DeviceVolume>> make_gl_volume(const gl::ShaderLibrary& shaders,
                                                      const gl::DeviceLimits& limits,
                                                      const DeviceVolumeDesc& desc);

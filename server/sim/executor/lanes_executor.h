@@ -1,7 +1,7 @@
-// LanesExecutor: runs the strand kernels of shaders/sim on the processors, a strand per lane of a vector
-// register and blocks of 16 strands side by side on all threads, without OpenGL. The kernels are the same
-// GLSL, compiled as C++ (lane_kernel.h). Results are the same bits for every instruction set and number of
-// threads; those of OpenGL differ from them by roundings.
+// LanesExecutor: runs the strand kernels of shaders/sim on the processors without OpenGL. A strand is a lane
+// of a vector register, and all threads work on blocks of 16 strands. The kernels are the same GLSL, compiled
+// as C++ (lane_kernel.h). All instruction sets and numbers of threads give the same bits; OpenGL's differ by
+// rounding.
 #pragma once
 
 #include <memory>
@@ -17,9 +17,10 @@ struct LaneOptions {
   WorkerPool* workers = nullptr;  // outlives the executor; nullptr: the process's
 };
 
-/// Unavailable when no kernel was compiled for what this processor has.
+/// Makes the executor with the best instruction set. Unavailable if no kernel was compiled for this
+/// processor.
 Result<std::unique_ptr<Executor>> make_lanes_executor();
-/// `options.set` is one of lane_sets().
+/// Makes the executor; `options.set` must be one of lane_sets().
 std::unique_ptr<Executor> make_lanes_executor(const LaneOptions& options);
 
 }  // namespace strandcast
