@@ -1,4 +1,4 @@
-// strandcast-ctl camera: where viewers look from, as a person says it.
+// strandcast-ctl camera: sets the camera of viewers.
 #pragma once
 
 #include <optional>
@@ -20,11 +20,12 @@ struct CameraOptions {
   std::vector<double> target_m;  // head space; empty: the scene's
 };
 
-/// Adds the options of the sub-command to `app`, which outlives neither.
+/// Adds the options of the sub-command to `app`; `app` and `options` must exist until the command line is
+/// parsed.
 void declare_camera(CLI::App& app, CameraOptions& options);
 
-/// The camera that is meant: where the options say nothing it is as the scene's. BadInput when they say
-/// nothing at all.
+/// Returns the camera that the options state; parts that are not given come from the scene's camera. BadInput
+/// if no option is given.
 Result<CameraDesc> camera_of(const CameraOptions& options, const CameraDesc& scene_camera);
 
 int run_camera(const CtlTarget& target, const CameraOptions& options);

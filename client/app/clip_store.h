@@ -1,5 +1,5 @@
-// ClipStore: what a headless run keeps for its clip until it ends: decoded states or the server's pictures,
-// at an even rate and within a bound, whatever the server sends. One thread; draws and writes nothing.
+// ClipStore: stores decoded states or the server's pictures for the clip of a headless run, at an even rate
+// and with bounded memory. One thread; draws and writes nothing.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +11,14 @@
 
 namespace strandcast {
 
-/// Of all that is kept. The longest clip (60 s at 60 Hz) of 50,000 vertices fits.
+/// Memory limit of the store. The longest clip (60 s at 60 Hz) of 50,000 vertices fits.
 inline constexpr uint64_t kMaxClipBytes = 2ull << 30;
 
-/// Picks states (or pictures) at an even rate of their times.
+/// Selects states (or pictures) at an even rate of their times.
 class ClipSampler {
  public:
   ClipSampler(double pictures_per_s, double duration_s);
-  /// True when what has this time belongs into the clip.
+  /// Returns whether a state or picture of this time belongs in the clip.
   bool wants(int64_t time_ns);
   bool is_full() const { return taken_ >= wanted_; }
   size_t wanted() const { return wanted_; }
@@ -36,15 +36,15 @@ class ClipStore {
   ClipStore(double pictures_per_s, double duration_s, uint64_t limit_bytes = kMaxClipBytes)
       : sampler_(pictures_per_s, duration_s), limit_bytes_(limit_bytes) {}
 
-  /// Keeps the state when its simulation time belongs into the clip.
+  /// Stores the state if its simulation time belongs in the clip.
   void add(const std::shared_ptr<const Snapshot>& snapshot);
-  /// Keeps the picture when `time_ns` belongs into the clip and it has the size of the first one: a clip has
-  /// one size, and a server may halve its pictures for a slow link.
+  /// Stores the picture if `time_ns` belongs in the clip and its size is that of the first picture. A clip
+  /// has one size, but a server may halve its pictures for a slow link.
   void add(const Image& image, int64_t time_ns);
 
-  /// Nothing more is kept: the clip has its length, or the bound is reached.
+  /// Returns whether nothing more is stored: the clip is complete, or the memory limit is reached.
   bool is_full() const { return is_cut_ || sampler_.is_full(); }
-  /// The bound cut it short.
+  /// Returns whether the memory limit has shortened the clip.
   bool is_cut() const { return is_cut_; }
   const std::vector<std::shared_ptr<const Snapshot>>& snapshots() const { return snapshots_; }
   const std::vector<Image>& images() const { return images_; }

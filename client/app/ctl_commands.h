@@ -1,5 +1,5 @@
-// The sub-commands of strandcast-ctl behind their parsed options. Each prints what it did and returns the
-// exit code: 0 done, 1 the server said no or a check failed, 2 bad input or no server.
+// Sub-commands of strandcast-ctl, called with parsed options. Each prints its result and returns the exit
+// code: 0 done, 1 the server refused or a check failed, 2 bad input or no server.
 #pragma once
 
 #include <atomic>
@@ -20,10 +20,10 @@ inline constexpr int kDoneExit = 0;
 inline constexpr int kRefusedExit = 1;
 inline constexpr int kBadInputExit = 2;
 
-/// Says on standard error what failed, behind the program\'s name; returns the exit code.
+/// Prints the program\'s name and the error to standard error; returns the exit code.
 int ctl_failure(const Error& error, int exit_code = kBadInputExit);
 
-/// Where the server is and how to be let in.
+/// Address of the server and credentials for joining it.
 struct CtlTarget {
   std::string connect;
   std::string token;
@@ -51,9 +51,9 @@ struct FeedOptions {
   std::string to = "127.0.0.1";  // HOST or HOST:PORT that gets it
 };
 
-/// Loads its files, and says on standard error what was found in them.
+/// Loads the files of a feed and prints notes about them to standard error.
 Result<FeedPlan> make_feed_plan(const FeedOptions& options);
-/// How to join the server in this role, as a viewer of strands.
+/// Returns the settings for joining the server in this role, as a viewer of strands.
 Result<ClientConfig> client_config_for(const CtlTarget& target, Role role);
 
 int run_feed(const CtlTarget& target, const FeedOptions& options, const std::atomic<bool>& stop);
@@ -61,12 +61,12 @@ int run_feed(const CtlTarget& target, const FeedOptions& options, const std::ato
 int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>& stop);
 /// Sends one command or assignment and prints the server's answer.
 int run_command(const CtlTarget& target, const ClientMessage& message);
-/// Likewise, with a message that depends on what the server is.
+/// Sends a command that is made from the server's Welcome, and prints the answer.
 using MessageMaker = std::function<Result<ClientMessage>(const Welcome&)>;
 int run_command(const CtlTarget& target, const MessageMaker& make);
-/// Needs an admin's token.
+/// Sends an admin's command; needs an admin's token.
 int run_admin(const CtlTarget& target, const AdminCommand& command);
-/// Writes the scene as it runs to a scene file.
+/// Writes the server's present scene to a scene file.
 int run_save(const CtlTarget& target, const std::filesystem::path& path);
 int run_check(const CtlTarget& target, uint64_t frames, double timeout_s);
 int run_health(const CtlTarget& target);

@@ -1,5 +1,5 @@
-// The commands of strandcast-ctl as a table: of each its name, a line of help, its arguments and its
-// function. The command line and --help are made from it; another command is another row.
+// The table of strandcast-ctl's commands: name, line of help, arguments and function of each. The command
+// line and --help are made from it; a new command is a new row.
 #pragma once
 
 #include <span>
@@ -14,7 +14,7 @@
 
 namespace strandcast {
 
-/// What was given with any of them.
+/// Parsed arguments of all commands.
 struct CtlCommandLine {
   CtlTarget target{"127.0.0.1:" + std::to_string(kDefaultPort), {}, {}, false, {}, nullptr, {}};
   bool names_server = false;  // --connect was given
@@ -43,13 +43,13 @@ struct CtlCommandLine {
 struct CtlCommand {
   const char* name;  // "mocap subject" stands below "mocap"
   const char* summary;
-  /// Adds its arguments to `app`, which keeps pointers into `line`; null: it has none.
+  /// Adds the command's arguments to `app`, which stores pointers into `line`; null: it has none.
   void (*declare)(CLI::App& app, CtlCommandLine& line);
-  /// Gives the exit code; null: only what stands below it can be called.
+  /// Runs the command and returns the exit code; null: only its sub-commands can be called.
   int (*run)(const CtlCommandLine& line, const std::atomic<bool>& stop);
 };
 
-/// In the order of --help; what stands below another comes behind it.
+/// Returns the commands in the order of --help; sub-commands follow their parent.
 std::span<const CtlCommand> ctl_commands();
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// strandcast-view --diagnose: what a session with a server needs, what of it is here, and the way out for
-// what is missing. Looks at this machine, then connects as the viewer would and watches for a moment.
+// strandcast-view --diagnose: checks what a session with a server needs and states remedies for what is
+// missing. It examines this machine, connects like the viewer and watches for a moment.
 #pragma once
 
 #include <atomic>
@@ -21,15 +21,15 @@ struct DiagnosisLine {
 };
 using Diagnosis = std::vector<DiagnosisLine>;
 
-/// For a server's answer, at each step of connecting; and how long what it sends is watched.
+/// Time limits: for the server's answer at each step of connecting, and for watching what it sends.
 inline constexpr std::chrono::milliseconds kDiagnosisTimeout{3000};
 inline constexpr std::chrono::milliseconds kDiagnosisWatch{1500};
 
-/// Takes some seconds at most; `stop` ends it early.
+/// Runs all checks, which takes some seconds; `stop` ends them early.
 Diagnosis diagnose(const ViewOptions& options, const std::atomic<bool>& stop);
-/// Whether nothing is missing.
+/// Returns whether nothing is missing.
 bool would_work(const Diagnosis& diagnosis);
-/// A line for each, and one that sums up.
+/// Formats a line per finding and a summary.
 std::string to_text(const Diagnosis& diagnosis);
 
 }  // namespace strandcast

@@ -1,6 +1,6 @@
-// DrawPlan: how finely a viewer draws strands, from what pictures took and from what moves. While something
-// moves a picture has to be there soon; once all stands still it may take its time. Pure logic on given times
-// and measurements, one thread.
+// DrawPlan: chooses how finely a viewer draws strands, from the duration of its pictures and from what moves.
+// While something moves, pictures must come soon; once everything is still, a picture may take its time. Pure
+// logic on given times and measurements, one thread.
 #pragma once
 
 #include <array>
@@ -14,15 +14,14 @@
 
 namespace strandcast {
 
-/// One way to draw: how large the picture is before it is stretched over the window, and with how many of its
-/// strands.
+/// One level of quality: size of the picture before it is stretched to the window, and share of its strands.
 struct DrawStep {
   double size_share;    // of the window's sides
   double strand_share;  // of the strands that a picture of this size shows
   double cost;          // about, of the first step's time: measured with the built-in scene on llvmpipe
 };
 
-/// Finest first.
+/// Levels, finest first.
 inline constexpr std::array<DrawStep, 6> kDrawSteps{{
     {1.0, 1.0, 1.0},
     {0.75, 1.0, 0.65},
@@ -31,57 +30,58 @@ inline constexpr std::array<DrawStep, 6> kDrawSteps{{
     {0.35, 0.5, 0.1},
     {0.25, 0.35, 0.05},
 }};
-/// The coarsest step that still counts as a picture when drawing here is weighed against the server's
-/// pictures: those are never smaller than this either (server/encode/picture_ladder.h halves the sides at
-/// most).
+/// Coarsest level used when local drawing is compared with the server's pictures, which are never smaller
+/// either (server/encode/picture_ladder.h halves the sides at most).
 inline constexpr size_t kCoarsestFairStep = 2;
-/// A picture may take so long while something moves: ten a second.
+/// Longest time of a picture while something moves: ten pictures a second.
 inline constexpr double kMovingBudgetMs = 100.0;
-/// So far beyond, or below, before another step is taken.
+/// Factors on that time beyond which a coarser, or below which a finer level is chosen.
 inline constexpr double kTooLong = 1.25;
 inline constexpr double kLeavesRoom = 0.8;
-/// Nothing has moved for so long: it stands.
+/// Time without motion after which everything counts as still.
 inline constexpr int64_t kStandNs = 200'000'000;
-/// What a step took is believed for so long; then it is as good as never tried.
+/// Time for which the measured duration of a level is trusted.
 inline constexpr int64_t kForgetStepNs = 20'000'000'000;
-/// A movement of less than this many pixels of the window nobody sees.
+/// Motion below this many pixels of the window counts as invisible.
 inline constexpr double kSeenPx = 0.5;
 
-/// The farthest that a vertex has gone between two states of equal sizes, in pixels of a window of this size,
-/// as if all were where the camera looks; of some thousands of vertices. Infinite when nobody can tell.
+/// Returns the farthest distance that a vertex has moved between two states of equal size, from a sample of
+/// some thousands. In pixels of a window of this size, with all vertices taken at the camera's target.
+/// Infinite if it cannot be computed.
 double seen_motion_px(const PosedStrands& from, const PosedStrands& to, const CameraDesc& camera,
                       RenderSize size);
 
-/// The picture for a window of this size that this step draws.
+/// Returns the picture size of a level for a window of this size.
 RenderSize size_of_step(size_t step, RenderSize window);
 
 class DrawPlan {
  public:
-  /// Begins with `first_step` while nothing has been measured.
+  /// Starts with `first_step` until something has been measured.
   explicit DrawPlan(size_t first_step) : moving_step_(first_step) {}
 
-  /// The size of the window; what was measured at another one is converted.
+  /// Sets the pixels of the window; durations measured at another size are scaled.
   void set_pixels(uint64_t pixels);
-  /// The camera moved, or strands did so that it can be seen.
+  /// Notes that the camera, or strands visibly, have moved.
   void note_motion(int64_t time_ns) { moved_ns_ = time_ns; }
-  /// A picture was drawn with this step.
+  /// Notes that a picture of this level was drawn in `ms`.
   void note_drawn(size_t step, double ms, int64_t time_ns);
 
   bool is_standing(int64_t time_ns) const { return time_ns - moved_ns_ >= kStandNs; }
-  /// When it will stand if nothing moves until then.
+  /// Returns when everything will count as still if nothing moves until then.
   int64_t standing_from_ns() const { return moved_ns_ + kStandNs; }
-  /// How to draw now, after a picture with step `drawn`: the finest while all stands, and from a coarse
-  /// picture one in between first.
+  /// Returns the level to draw now, after a picture of level `drawn`. It is the finest while everything is
+  /// still; after a coarse picture, an intermediate level comes first.
   size_t step_at(int64_t time_ns, size_t drawn) const {
     if (!is_standing(time_ns)) return moving_step_;
     return drawn > kCoarsestFairStep ? kCoarsestFairStep : 0;
   }
   size_t moving_step() const { return moving_step_; }
-  /// What a picture with this step takes, measured or told from others; 0 before the first measurement.
+  /// Returns the expected duration of a picture of this level, measured or derived from other levels; 0
+  /// before the first measurement.
   double expected_ms(size_t step, int64_t time_ns) const;
-  /// What one picture takes in motion, for whoever compares it with the server's pictures: of the step in
-  /// use, but none coarser than kCoarsestFairStep. Sharpening does not count: nothing moves then. 0 =
-  /// unknown.
+  /// Returns the duration of a picture during motion, for comparison with the server's pictures. It is that
+  /// of the level in use, but none coarser than kCoarsestFairStep. Pictures drawn while everything is still
+  /// do not count. 0 = unknown.
   double fair_ms(int64_t time_ns) const;
 
  private:

@@ -1,4 +1,4 @@
-// strandcast-ctl export: strands of a running server or a recording as a file for other programs.
+// strandcast-ctl export: writes strands of a running server or a recording to a file for other programs.
 #pragma once
 
 #include <atomic>
@@ -25,10 +25,11 @@ struct ExportCommand {
   std::optional<double> from_s, to_s, seconds, at_s;
 };
 
-/// Adds the options of the sub-command to `app`, which outlives neither.
+/// Adds the options of the sub-command to `app`; `app` and `command` must exist until the command line is
+/// parsed.
 void declare_export(CLI::App& app, ExportCommand& command);
 
-/// What the command line says, checked. BadInput says what fits together.
+/// Converts and checks the command line's options. BadInput says which combinations are possible.
 Result<ExportOptions> export_options(const ExportCommand& command);
 
 int run_export(const CtlTarget& target, const ExportCommand& command, const std::atomic<bool>& stop);

@@ -1,7 +1,7 @@
-// FrameTrace: when each frame was where on its way, as this viewer sees it: of the server's times what frames
-// carry and, where they were asked for, what it tells of its states; of its own when they were received,
-// decoded and presented; all on the server's clock. A file gets a line for each, by the same ticks as the
-// server's own trace. Bounded. Any thread.
+// FrameTrace: records when each frame passed each stage up to this viewer. Server times come with frames and,
+// on request, with state times; the viewer adds reception, decoding and presentation. All on the server's
+// clock. An optional file gets a line per frame, keyed by tick like the server's own trace. Bounded. Any
+// thread.
 #pragma once
 
 #include <atomic>
@@ -19,7 +19,7 @@
 
 namespace strandcast {
 
-/// Of one frame; server clock, ns; 0 = not known, or it never was there.
+/// Times of one frame; server clock, ns; 0 = not known or not reached.
 struct FrameTimes {
   StreamMode mode = StreamMode::Strands;
   uint64_t tick = 0;
@@ -36,40 +36,42 @@ struct FrameTimes {
 };
 
 inline constexpr size_t kMaxTracedFrames = 1'000'000;
-/// For who only looks at what was just now: seconds of any stream.
+/// Number of frames that a user of recent values keeps: some seconds of any stream.
 inline constexpr size_t kRecentFrames = 2'048;
 inline constexpr uint64_t kMaxFrameLines = 10'000'000;
-/// A picture is of the newest state that is no later than the moment it shows, and no older than this.
+/// Greatest age of a state relative to the moment that a picture shows; the picture is attributed to the
+/// newest state up to that moment.
 inline constexpr int64_t kShownStateNs = 250'000'000;
 
 class FrameTrace {
  public:
-  /// So many frames stay; the oldest go, into the file where there is one.
+  /// Keeps the newest `kept_frames` frames; older ones are dropped, or written to the file if there is one.
   explicit FrameTrace(size_t kept_frames = kMaxTracedFrames) : kept_frames_(kept_frames) {}
-  /// As close(), whose error nobody hears.
+  /// Closes the file like close(), but ignores errors.
   ~FrameTrace();
   FrameTrace(const FrameTrace&) = delete;
   FrameTrace& operator=(const FrameTrace&) = delete;
 
-  /// From now on each frame is a line of this file, once nothing more is to be known of it.
+  /// Writes each frame as a line of this file, once its times are complete.
   Status open(const std::filesystem::path& path);
-  /// Writes those that are left.
+  /// Writes the remaining frames and closes the file.
   Status close();
 
-  /// Whether the server is to tell when its states were simulated and encoded.
+  /// Sets whether the server is asked for the times of its states.
   void want_states(bool is_wanted) { wants_states_ = is_wanted; }
   bool wants_states() const { return wants_states_; }
 
-  /// A new connection: ticks may begin again, and what comes is of no frame before.
+  /// Begins a new connection: ticks may restart, and later times belong to none of the earlier frames.
   void begin_session();
   void add(const FrameTimes& times);
   void note_states(std::span<const StateTime> states);
-  /// A picture of this moment, drawn of strands or of the server, was there at `time_ns`.
+  /// Notes that a picture of this simulated moment was shown at `time_ns`, drawn from strands or received
+  /// from the server.
   void note_presented(StreamMode mode, int64_t sim_time_ns, int64_t time_ns);
 
-  /// Those that are kept, oldest first.
+  /// Returns the kept frames, oldest first.
   std::vector<FrameTimes> frames() const;
-  /// Of these, those that were decoded since then.
+  /// Returns the kept frames that were decoded since `time_ns`.
   std::vector<FrameTimes> decoded_since(int64_t time_ns) const;
 
  private:
@@ -84,26 +86,26 @@ class FrameTrace {
   uint64_t line_count_ = 0;
 };
 
-/// How long one part of the way takes, ms.
+/// Duration of one stage over many frames, ms.
 struct StageTimes {
   std::string stage;
   size_t count = 0;
   double median_ms = 0.0, p90_ms = 0.0, p99_ms = 0.0, most_ms = 0.0;
 };
 
-/// Of the parts of the way, and of all of it.
+/// Returns the durations of all stages, and of the whole way.
 std::vector<StageTimes> stage_times(const std::vector<FrameTimes>& frames);
 
-/// A table for people, and lines of comma-separated values.
+/// Formats a table for people, and comma-separated values.
 std::string to_table(const std::vector<StageTimes>& stages);
 std::string to_csv(const std::vector<StageTimes>& stages);
 
-/// One part of the way from a motion sample to the picture that shows it, for a person.
+/// One stage on the way from a motion sample to the picture that shows it, for a person.
 struct WayPart {
   const char* name;
   double median_ms = 0.0;
 };
-/// Those that were measured, in their order.
+/// Returns the measured stages in order.
 std::vector<WayPart> way_parts(const std::vector<FrameTimes>& frames);
 
 }  // namespace strandcast

@@ -1,6 +1,6 @@
-// HairSliders: what a newcomer changes first, on top of the panel: quality and the factors on hair
-// (common/scene/hair_controls.h) as the server lists them, moved by whoever may steer. Pure logic on given
-// times, one thread.
+// HairSliders: the sliders at the top of the panel that a newcomer changes first: quality and the factors on
+// hair (common/scene/hair_controls.h), as the server lists them. Sessions that may steer can move them. Pure
+// logic on given times, one thread.
 #pragma once
 
 #include <map>
@@ -13,23 +13,24 @@
 
 namespace strandcast {
 
-/// Of a ParameterRequest: what the sliders are made of.
+/// Prefixes for the ParameterRequest that supplies the sliders.
 inline constexpr const char* kHairSliderPrefixes = "quality,hair.";
-/// Whether a parameter has a slider here, of a server that can change it.
+/// Returns whether a parameter of a server that can change it has a slider here.
 bool has_hair_slider(const ParameterInfo& parameter);
 
 class HairSliders {
  public:
-  /// The newest values of the server, and whether this session may change them.
+  /// Takes the server's newest values and whether this session may change them.
   void follow(const std::vector<ParameterInfo>& parameters, bool is_steering);
-  /// Takes those of the edits that are of these sliders; the others stay.
+  /// Removes the edits of these sliders from `edits` and applies them.
   void take_edits(std::vector<FormEdit>& edits, int64_t time_ns);
-  /// What SetParameter is to say now, one slider at a time.
+  /// Returns the next assignment to send by SetParameter, one slider at a time.
   std::optional<std::string> take_assignment(int64_t time_ns);
 
-  /// With what was done and the server has not said yet; greyed where this session may not steer.
+  /// Returns the fields, including edits that the server has not confirmed yet; disabled if this session may
+  /// not steer.
   std::vector<FormField> fields(int64_t time_ns) const;
-  /// Why they are greyed; empty where they are not.
+  /// Returns why the sliders are disabled; empty if they are not.
   std::string reason() const;
 
  private:

@@ -1,4 +1,5 @@
-// strandcast-ctl latency: watches for a while as a viewer, and says how long each part of the way takes.
+// strandcast-ctl latency: watches as a viewer for a while and prints the duration of each stage from motion
+// sample to picture.
 #pragma once
 
 #include "client/app/ctl_commands.h"

@@ -1,4 +1,4 @@
-// LineBudget: how many lines a server may make a program write. Pure logic on given times, one thread.
+// LineBudget: limits how many lines a server can make a program print. Pure logic on given times, one thread.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ inline constexpr uint32_t kMaxForeignLinesPerS = 20;
 
 class LineBudget {
  public:
-  /// Whether a line may be written at `time_ns`, which does not run backwards: no second, wherever it begins,
+  /// Returns whether a line may be written at `time_ns`, which must not decrease. No interval of one second
   /// has more lines than the limit.
   bool take(int64_t time_ns) {
     int64_t& oldest_ns = written_ns_[count_ % kMaxForeignLinesPerS];
@@ -25,7 +25,7 @@ class LineBudget {
     ++count_;
     return true;
   }
-  /// Lines that were not written since the last call.
+  /// Returns the number of suppressed lines since the last call.
   uint64_t take_left_out() { return std::exchange(left_out_, 0); }
 
  private:

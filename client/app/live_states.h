@@ -1,5 +1,5 @@
-// LiveStates: the states of a running server for an export, from a viewer of strands that shows nothing.
-// One thread.
+// LiveStates: states of a running server for an export, received as a viewer of strands without display. One
+// thread.
 #pragma once
 
 #include <atomic>
@@ -15,11 +15,11 @@ namespace strandcast {
 
 class LiveStates : public ExportSource {
  public:
-  /// Joins the server and waits for its first state. `stop` ends every wait.
+  /// Joins the server and waits for its first state; `stop` ends every wait.
   static Result<std::unique_ptr<LiveStates>> open(const ClientConfig& config, const std::atomic<bool>& stop);
 
   const ExportScene& scene() const override { return scene_; }
-  /// Waits for a state; null once stopped, Timeout when none comes.
+  /// Waits for a state. Returns null once stopped, Timeout if none comes.
   Result<std::shared_ptr<const Snapshot>> next() override;
   std::vector<std::string> remarks() const override;
 

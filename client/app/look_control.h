@@ -1,5 +1,6 @@
-// LookControl: what a person does to the look of the hair. Whoever may steer changes the scene's look, which
-// all viewers see; anybody else gives this window a look of its own. Pure logic on given times, one thread.
+// LookControl: handles a person's changes to the look of the hair. A session that may steer changes the
+// scene's look, which all viewers see; any other changes only the look in this window. Pure logic on given
+// times, one thread.
 #pragma once
 
 #include <map>
@@ -14,34 +15,35 @@
 
 namespace strandcast {
 
-/// A slider that is dragged is sent this often, as it stands then.
+/// Interval at which the value of a dragged slider is sent.
 inline constexpr int64_t kLookSendNs = 100'000'000;
-/// So long what a person did is shown although the server has not said it yet; then what it says counts.
+/// Time for which an edit is shown without the server's confirmation; after it the server's value is shown.
 inline constexpr int64_t kLookHoldNs = 1'000'000'000;
 inline constexpr const char* kSceneFile = "out/scene.textproto";
 
 class LookControl {
  public:
-  /// The newest of the server, and whether this session may steer it.
+  /// Takes the server's newest look and whether this session may steer it.
   void follow(const LookChange& scene, bool is_steering);
-  /// The error names what is wrong with an edit; the others count.
+  /// Applies edits. The error names an invalid edit; the others are applied.
   Status edit(const std::vector<FormEdit>& edits, int64_t time_ns);
-  /// Takes a look of one's own back.
+  /// Discards this window's own look.
   void undo() { own_.reset(); }
   void set_file(std::string file) { file_ = std::move(file); }
 
-  /// What SetParameter is to say now.
+  /// Returns the next assignment to send by SetParameter.
   std::optional<std::string> take_assignment(int64_t time_ns);
-  /// It did not go out: again with the next.
+  /// Returns the last assignment to the queue because it could not be sent; it goes out with the next one.
   void put_back();
 
-  /// Drawn here instead of the scene's; nothing: the scene's.
+  /// Returns the look drawn here instead of the scene's; empty: the scene's look is drawn.
   const std::optional<LookDesc>& own_look() const { return own_; }
   bool is_steering() const { return is_steering_; }
   const std::string& file() const { return file_; }
-  /// As it stands in the panel: with what was done and the server has not said yet.
+  /// Returns the look shown in the panel, including edits that the server has not confirmed yet.
   LookDesc shown(int64_t time_ns) const;
-  /// `are_frames`: the server's pictures are seen, not strands drawn here.
+  /// Returns the form of the panel; `are_frames`: the window shows the server's pictures instead of strands
+  /// drawn here.
   FormState form(bool are_frames, int64_t time_ns) const;
 
  private:

@@ -1,5 +1,5 @@
-// A look as a form: the fields that common/scene/scene_fields.h has, with its ranges and units, so that a new
-// one shows up by itself. Pure functions, any thread.
+// Builds a form from a look's fields with ranges and units, as common/scene/scene_fields.h lists them, so
+// that new fields appear automatically. Pure functions, any thread.
 #pragma once
 
 #include <string>
@@ -11,16 +11,18 @@
 
 namespace strandcast {
 
-/// Every field of the look, those of one section together.
+/// Returns every field of the look, grouped by section.
 std::vector<FormField> look_fields(const LookDesc& look);
 
-/// The same edits, with what a person expects of them: colours of one's own begin with those that are seen.
+/// Adds the edits that a person expects to come with the given ones: custom colours start from the colours
+/// now seen.
 std::vector<FormEdit> completed(const LookDesc& seen, std::vector<FormEdit> edits);
 
-/// "look={ ... }": what SetParameter takes to set these fields and no others. There must be one.
+/// Returns the assignment "look={ ... }" that sets exactly these fields by SetParameter. There must be at
+/// least one edit.
 std::string look_assignment(const std::vector<FormEdit>& edits);
 
-/// The look after these edits, checked like a scene file.
+/// Returns the look after these edits, checked like a scene file.
 Result<LookDesc> with_edits(const LookDesc& look, const std::vector<FormEdit>& edits);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// A head as packets of motion capture: what a stage's program would send, for trying a server without one.
-// Pure functions; axes and units of each protocol as its senders have them.
+// Encodes a head as packets of motion capture protocols, to try a server without a capture system. Pure
+// functions; axes and units are those that each protocol's senders use.
 #pragma once
 
 #include <cstddef>
@@ -14,21 +14,21 @@
 
 namespace strandcast {
 
-/// What a packet is made of.
+/// Values from which a packet is made.
 struct MocapMoment {
   double time_s = 0.0;
   Pose world_from_head;
   std::optional<glm::vec3> wind_mps = {};  // world; of vmc only
 };
 
-/// A protocol that packets can be made of.
+/// A protocol that packets can be made for.
 struct MocapEncoding {
   const char* name;
   uint16_t port;  // that servers listen on
   std::vector<std::byte> (*encode)(const MocapMoment&);
 };
 
-/// BadInput names those there are.
+/// Finds a protocol; BadInput lists the known ones.
 Result<MocapEncoding> find_mocap_encoding(const std::string& name);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// ModeControl: which mode a viewer wants, was given and shows. The one place in the client that knows; it
-// outlives sessions. Any thread.
+// ModeControl: the mode that a viewer wants, was given and shows (strands or pictures). It is the only owner
+// of this state in the client and outlives sessions. Any thread.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace strandcast {
 
-/// All of it, as of one moment.
+/// Snapshot of the mode's whole state.
 struct ModeView {
   StreamMode wanted = StreamMode::Auto;    // by the person; Auto = the server chooses
   StreamMode given = StreamMode::Strands;  // as the server said last; never Auto
@@ -21,7 +21,7 @@ struct ModeView {
   bool is_answered = true;                 // the server has spoken since the wish
   uint64_t changes = 0;                    // of what is shown, in this session
 
-  /// What was asked for and what became of it: "frames, asking the server", "strands".
+  /// Describes the request and its outcome for a person: "frames, asking the server", "strands".
   std::string wish() const;
 };
 
@@ -29,17 +29,18 @@ class ModeControl {
  public:
   explicit ModeControl(StreamMode wanted) { now_.wanted = wanted; }
 
-  /// A person (or this machine) wants this mode from now on, in later sessions too.
+  /// Sets the wanted mode for this session and later ones.
   void want(StreamMode mode);
-  /// The wish when the server of this session has not been told, once: whoever takes it sends it now.
+  /// Returns the wanted mode once if this session's server has not been told; the caller must send it now.
   std::optional<StreamMode> take_request();
-  /// What was taken could not be sent.
+  /// Marks the last taken request as not sent.
   void give_back_request();
 
-  /// A session began with `asked` in its Hello: what it shows is yet to come, but nothing else will be.
+  /// Begins a session whose Hello asked for `asked`. Nothing has been shown yet; the next frame will be of
+  /// the announced mode.
   void begin_session(StreamMode asked, const Welcome& welcome);
   void note_answer(ModeChange change);
-  /// A frame of this mode was decoded; true when the one before was of the other.
+  /// Notes that a frame of this mode was decoded; returns true if the previous one was of the other mode.
   bool note_shown(StreamMode mode);
 
   ModeView look() const;
@@ -51,7 +52,7 @@ class ModeControl {
   bool is_due_ = false;  // the wish is to be sent
 };
 
-/// Sends the wish if the server has not been told. What cannot be sent is asked again with the next call.
+/// Sends the wanted mode if the server has not been told. If sending fails, the next call tries again.
 void send_mode_request(ModeControl& modes, ViewerClient& client);
 
 }  // namespace strandcast

@@ -1,5 +1,4 @@
-// NoticeList: what a server said, for a person who may not be looking. Bounded; the oldest give way. One
-// thread.
+// NoticeList: the server's notices until a person reads them. Bounded; the oldest are dropped. One thread.
 #pragma once
 
 #include <deque>
@@ -19,7 +18,7 @@ class NoticeList {
     notices_.push_back(std::move(notice));
     if (notices_.size() > kMaxWaitingNotices) notices_.pop_front();
   }
-  /// All since the last call, oldest first.
+  /// Returns and removes all notices, oldest first.
   std::vector<Notice> take() {
     std::vector<Notice> taken(std::make_move_iterator(notices_.begin()),
                               std::make_move_iterator(notices_.end()));

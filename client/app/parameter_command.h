@@ -1,5 +1,5 @@
-// strandcast-ctl params: the parameters of a running server with names, units, ranges, defaults and present
-// values; and what changes, as it does.
+// strandcast-ctl params: prints the parameters of a running server with units, ranges, defaults and present
+// values, and optionally their changes.
 #pragma once
 
 #include "client/app/ctl_commands.h"
@@ -12,7 +12,7 @@ struct ParameterOptions {
   bool is_live_only = false;  // those alone that can change while the server runs
 };
 
-/// "look.ambient  0.25  (0 .. 1, default 0.5)  live".
+/// Formats a parameter: "look.ambient  0.25  (0 .. 1, default 0.5)  live".
 std::string to_line(const ParameterInfo& parameter);
 
 int run_params(const CtlTarget& target, const ParameterOptions& options, const std::atomic<bool>& stop);

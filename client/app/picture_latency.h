@@ -1,6 +1,6 @@
-// PictureLatency: how long a motion sample takes from its arrival at the server to the decoded picture that
-// shows it. The server says which states it drew with which samples, before or after their pictures come.
-// Pure logic, one thread.
+// PictureLatency: time from a motion sample's arrival at the server to the decoded picture that shows it. The
+// server reports which states it drew with which samples, before or after their pictures arrive. Pure logic,
+// one thread.
 #pragma once
 
 #include <cstdint>
@@ -15,14 +15,14 @@ namespace strandcast {
 
 class PictureLatency {
  public:
-  /// A picture of the state of this simulation time was decoded at this client time.
+  /// Notes that a picture of the state with this simulation time was decoded at this client time.
   void add_picture(int64_t sim_time_ns, int64_t decoded_ns, const ClockOffset& clock);
-  /// What the server drew. Samples of before the first picture do not count.
+  /// Takes the server's report of drawn motion samples. Samples from before the first picture are ignored.
   void add_motions(std::span<const PictureMotion> motions, const ClockOffset& clock);
-  /// Other frames were shown meanwhile: the next picture is the first one.
+  /// Restarts with the next picture, because strands were shown in between.
   void restart();
 
-  /// ms, of every sample that was shown, in the first picture with it or with a newer one.
+  /// Returns the times in ms; a sample counts in the first picture that shows it or a newer one.
   const StageTimer& timer() const { return timer_; }
 
  private:

@@ -1,5 +1,5 @@
-// PlaybackClock: which moment of a recording is shown: plays, pauses, loops, runs slower or faster, and goes
-// where it is put. Pure logic on given times, one thread.
+// PlaybackClock: the shown moment of a recording: plays, pauses, loops, changes speed and seeks. Pure logic
+// on given times, one thread.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ class PlaybackClock {
  public:
   explicit PlaybackClock(double length_s) : length_s_(length_s) {}
 
-  /// Goes on to `now_ns`, which never decreases.
+  /// Advances to `now_ns`, which must not decrease.
   void advance(int64_t now_ns) {
     const double passed_s = now_ns_ == 0 ? 0.0 : static_cast<double>(now_ns - now_ns_) * 1e-9;
     now_ns_ = now_ns;
@@ -29,7 +29,7 @@ class PlaybackClock {
       is_playing_ = false;
     }
   }
-  /// At the end it begins anew.
+  /// Toggles between playing and pausing; at the end, playing restarts from the beginning.
   void toggle() {
     if (!is_playing_ && time_s_ >= length_s_) time_s_ = 0.0;
     is_playing_ = !is_playing_;

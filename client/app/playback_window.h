@@ -1,4 +1,4 @@
-// A recording in a window: played, paused, scrubbed, looped, slower or faster.
+// Plays a recording in a window, with pause, seeking, loop and speed.
 #pragma once
 
 #include <atomic>
@@ -8,7 +8,8 @@
 
 namespace strandcast {
 
-/// Runs until the window is closed. The errors of RecordingPlayer::open(), of the window and of drawing.
+/// Runs until the window is closed. Returns the errors of RecordingPlayer::open(), of the window and of
+/// drawing.
 Status run_playback(const ViewOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace strandcast

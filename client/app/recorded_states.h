@@ -1,4 +1,4 @@
-// RecordedStates: the states of a recording, decoded one after the other, from any moment on. One thread.
+// RecordedStates: decodes the states of a recording in order, from any moment on. One thread.
 #pragma once
 
 #include <filesystem>
@@ -17,20 +17,21 @@ namespace strandcast {
 
 class RecordedStates : public ExportSource {
  public:
-  /// The errors of RecordingReader::open(), and of a scene or codec that this program does not know.
+  /// Opens a recording. Returns the errors of RecordingReader::open(), and errors for an unknown scene or
+  /// codec.
   static Result<std::unique_ptr<RecordedStates>> open(const std::filesystem::path& path);
 
   const ExportScene& scene() const override { return scene_; }
   Result<std::optional<int64_t>> skip_to(double from_s) override;
-  /// The next state, null at the end. Damaged parts are left out and counted.
+  /// Returns the next state, null at the end. Damaged parts are skipped and counted.
   Result<std::shared_ptr<const Snapshot>> next() override;
   std::vector<std::string> remarks() const override;
 
-  /// The next state is then the last keyframe's at or before this time, or the first one.
+  /// Moves to the last keyframe at or before this time, or to the first one; next() continues there.
   Status seek(int64_t sim_time_ns);
   int64_t first_ns() const { return reader_->info().first_sim_time_ns; }
   int64_t last_ns() const { return reader_->info().last_sim_time_ns; }
-  /// Look and camera as they were with the newest state.
+  /// Returns look and camera at the newest state.
   const LookChange& look() const { return look_; }
 
  private:

@@ -1,4 +1,4 @@
-// A recording as pictures or a film, without a window: drawn frame by frame by the renderer of viewers.
+// Exports a recording as pictures or a film without a window, drawn frame by frame by the viewers' renderer.
 #pragma once
 
 #include <atomic>
@@ -10,18 +10,18 @@
 
 namespace strandcast {
 
-/// Frames of a film or pictures at most.
+/// Largest number of frames of a film, or of pictures.
 inline constexpr uint64_t kMostFilmFrames = 1'000'000;
 
-/// Whether this can be exported to: a .webm or .webp, or PNGs with a number in their name ("%04d"). BadInput
-/// says what can.
+/// Checks the export path: a .webm or .webp file, or PNGs with a number in their name ("%04d"). BadInput says
+/// what is possible.
 Status check_film_path(const std::filesystem::path& path);
 
-/// The path of picture `number` of a name with "%d" or "%04d" in it.
+/// Returns the path of picture `number` for a name with "%d" or "%04d".
 std::filesystem::path numbered_path(const std::filesystem::path& pattern, uint64_t number);
 
-/// Draws options.recording into options.film; a sentence of what was made. After a stop a film is as long as
-/// it was by then.
+/// Draws options.recording into options.film and returns a sentence about the result. If stopped, the film
+/// ends there.
 Result<std::string> run_film(const ViewOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace strandcast

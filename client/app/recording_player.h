@@ -1,5 +1,5 @@
-// RecordingPlayer: the strands of a recording at any moment, for whoever plays or scrubs. Decodes on from
-// where it is when that is not far, else from the keyframe before. One thread.
+// RecordingPlayer: strands of a recording at any moment, for playing and seeking. It decodes forward from its
+// position if that is near, otherwise from the preceding keyframe. One thread.
 #pragma once
 
 #include <cstdint>
@@ -14,21 +14,22 @@ namespace strandcast {
 
 class RecordingPlayer {
  public:
-  /// The errors of RecordedStates::open().
+  /// Opens a recording; returns the errors of RecordedStates::open().
   static Result<std::unique_ptr<RecordingPlayer>> open(const std::filesystem::path& path);
 
   double length_s() const;
-  /// Strands `time_s` after the first state, between 0 and length_s(): between states as viewers show them.
+  /// Returns the strands `time_s` after the first state (0 .. length_s()), interpolated between states as
+  /// viewers do.
   Result<PosedStrands> strands_at(double time_s);
   enum class Direction { Back, On };
-  /// When the next or the last state beside `time_s` is, or `time_s` where there is none.
+  /// Returns the time of the next or previous state beside `time_s`, or `time_s` if there is none.
   Result<double> time_beside(double time_s, Direction direction);
 
   const std::shared_ptr<const SceneAsset>& asset() const { return states_->scene().asset; }
-  /// As it was recorded for the newest decoded state.
+  /// Returns look and camera as recorded for the newest decoded state.
   const LookChange& look() const { return states_->look(); }
   std::vector<std::string> remarks() const { return states_->remarks(); }
-  /// Simulated time of a moment, ns.
+  /// Returns the simulated time of a moment, ns.
   int64_t sim_time_ns(double time_s) const;
 
  private:

@@ -1,4 +1,4 @@
-// Scenes of a running server, kept as scene files.
+// Saves scenes of a running server as scene files.
 #pragma once
 
 #include <filesystem>
@@ -10,12 +10,12 @@
 
 namespace strandcast {
 
-/// What the server sent, checked like a scene file. Pure.
+/// Parses and checks the server's text like a scene file. Pure.
 Result<SceneDesc> scene_of(const SceneText& text);
-/// The server's scene with what is seen now.
+/// Returns the server's scene with the look and camera that are seen now.
 Result<SceneDesc> scene_of(const SceneText& text, const LookDesc& look, const CameraDesc& camera);
 
-/// Writes the text of a scene, in a folder that is made where there is none; a file of this name is replaced.
+/// Writes a scene's text; creates the folder if needed and replaces a file of this name.
 Status save_scene(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// Sub-commands of strandcast-ctl that are scripts of their own, installed beside it or in ../lib/strandcast.
+// Sub-commands of strandcast-ctl that are separate scripts, installed beside it or in ../lib/strandcast.
 #pragma once
 
 #include <string>
@@ -6,8 +6,7 @@
 
 namespace strandcast {
 
-/// Goes on as this script, with these words behind its name; returns kBadInputExit where it cannot be
-/// started.
+/// Replaces this process by the script with these arguments; returns kBadInputExit if it cannot be started.
 int run_script(const std::string& name, const std::vector<std::string>& words);
 
 }  // namespace strandcast

@@ -1,11 +1,11 @@
-// What a step of a strand model takes on this machine, so that the server can tell whether a viewer can
-// afford a codec whose decoder runs the simulation's own steps. Any thread.
+// Measures the cost of a strand model's step on this machine. The server uses it to decide whether a viewer
+// can afford a codec whose decoder runs the simulation's own steps. Any thread.
 #pragma once
 
 namespace strandcast {
 
-/// Nanoseconds that one vertex of one solver step takes, by one thread: measured with the first call, which
-/// takes some milliseconds, and remembered. 0 = this build cannot predict.
+/// Returns the nanoseconds that one vertex of one solver step takes on one thread. The first call measures
+/// it, which takes some milliseconds; later calls return the same value. 0 = this build cannot predict.
 double measured_step_ns();
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// Ctrl-C and SIGTERM as a flag that loops look at. Process-wide.
+// Turns Ctrl-C and SIGTERM into a flag that loops check. Process-wide.
 #pragma once
 
 #include <atomic>
@@ -6,12 +6,11 @@
 
 namespace strandcast {
 
-/// How long whatever is under way may take after the first signal.
+/// Time that current work may take after the first signal.
 inline constexpr std::chrono::milliseconds kStopGrace{750};
 
-/// Catches SIGINT and SIGTERM from now on. The first one sets the flag, and a program that looks at it ends
-/// in its own way; one that is still there after kStopGrace, in the middle of something long, is ended by
-/// that signal, and so is one that gets a second.
+/// Catches SIGINT and SIGTERM from now on; the first signal sets the returned flag. A second signal ends the
+/// program, and so does the first if the program is still running after kStopGrace.
 const std::atomic<bool>& catch_stop_signals();
 
 }  // namespace strandcast

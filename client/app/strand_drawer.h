@@ -1,6 +1,6 @@
-// StrandDrawer: draws strands, of one or several heads, with a device and a thread of its own, so that a
-// window never waits for hair. What it draws when and how finely, DrawPlan says. It keeps the newest picture
-// in memory; what it is told and what it tells are the newest only. All functions from any thread.
+// StrandDrawer: draws strands of one or several heads on its own device and thread, so that a window never
+// waits for hair. DrawPlan decides when and how finely. Only the newest inputs and the newest picture are
+// kept. All functions from any thread.
 #pragma once
 
 #include <atomic>
@@ -21,14 +21,14 @@
 
 namespace strandcast {
 
-/// What strands are seen through.
+/// View of the strands: camera and size of the window.
 struct DrawView {
   CameraDesc camera;
   RenderSize size;  // of the window
   DebugView debug_view = DebugView::None;
 };
 
-/// Newest of all.
+/// Newest results of drawing.
 struct DrawnState {
   std::optional<Result<RenderDeviceInfo>> device;  // nothing while it is opened
   std::optional<Error> trouble;                    // why the newest scene cannot be drawn
@@ -55,20 +55,21 @@ class StrandDrawer {
     std::function<void()> on_news;  // called by the drawing thread; must not block
   };
   explicit StrandDrawer(Config config);
-  /// Ends the thread; a picture that is being drawn is left.
+  /// Ends the thread and abandons a picture in progress.
   ~StrandDrawer();
   StrandDrawer(const StrandDrawer&) = delete;
   StrandDrawer& operator=(const StrandDrawer&) = delete;
 
-  /// How many heads there are, at first one. What is told of others is left out.
+  /// Sets the number of heads, initially one. Input about other heads is ignored.
   void set_head_count(size_t count);
-  /// What the server sent about one head; the first gives what concerns all.
+  /// Sets the server's state of one head; that of the first head also supplies what concerns all.
   void set_state(std::shared_ptr<const ViewerState> state, size_t head = 0);
-  /// Nothing: no picture is wanted.
+  /// Sets the view; empty: no picture is wanted.
   void set_view(const std::optional<DrawView>& view);
-  /// Of the first head, drawn instead of the look of the server's scene; nothing: that one.
+  /// Sets a look for the first head instead of that of the server's scene; empty: the scene's look.
   void set_own_look(const std::optional<LookDesc>& look);
-  /// The next picture is to be the finest, whatever moves; DrawnState says when it is there.
+  /// Requests that the next picture has the finest level, whatever moves. Returns the request's number, which
+  /// DrawnState reports when the picture is ready.
   uint64_t ask_whole();
   DrawnState look() const;
 
@@ -85,19 +86,19 @@ class StrandDrawer {
       return head == 0 && own_look ? *own_look : states[head]->look.look;
     }
   };
-  /// What one head is drawn with.
+  /// Renderer and data of one head.
   struct Head {
     std::shared_ptr<const SceneAsset> asset;  // that renderer is made for, or could not be
     std::unique_ptr<Renderer> renderer;
     LookDesc look;  // that was wanted of it last
     TimelinePlayer player;
   };
-  /// Of one head, as it is drawn.
+  /// Pose and positions of one head's strands for a picture.
   struct HeadStrands {
     size_t head = 0;
     PosedStrands strands;
   };
-  /// What decides the pixels of the newest picture.
+  /// Inputs that determine the pixels of the newest picture.
   struct Drawn {
     std::vector<HeadStrands> heads;
     DrawView view;

@@ -1,5 +1,5 @@
-// Checks a running server as its viewers see it: decodes a number of frames with one viewer, joins a second
-// one half way, and compares the state hashes of every tick that both decoded. One thread.
+// Checks a running server through its viewers: decodes frames with one viewer, joins a second one half way,
+// and compares the state hashes of all ticks that both decoded. One thread.
 #pragma once
 
 #include <compare>
@@ -14,8 +14,8 @@
 
 namespace strandcast {
 
-/// The state hashes of the newest ticks that a viewer decoded, at most `limit` of them. A tick has a state
-/// for every stream it was sent in: within the same bound, but not the same numbers.
+/// State hashes of the newest ticks that a viewer decoded, at most `limit`. A tick has a state per stream;
+/// they are within the same bound, but differ in their numbers.
 class TickHashes {
  public:
   struct Key {
@@ -35,7 +35,8 @@ class TickHashes {
   std::deque<Key> order_;  // of arrival: ticks may begin again
 };
 
-/// Hashes kept of each viewer, per frame to decode: the first one goes on while the second one joins.
+/// Hashes kept of each viewer per frame to decode, because the first viewer continues while the second one
+/// joins.
 inline constexpr size_t kKeptTicksPerFrame = 4;
 
 struct StreamCheck {
@@ -50,8 +51,8 @@ struct StreamCheck {
   std::string to_string() const;
 };
 
-/// Decodes `frames` frames (at least 2). Errors are those of the connection, and Timeout when `timeout_s`
-/// passes first, or what `config.cancel` says.
+/// Decodes `frames` frames (at least 2). Returns errors of the connection, Timeout after `timeout_s`, or the
+/// error that `config.cancel` returns.
 Result<StreamCheck> check_stream(const ClientConfig& config, uint64_t frames, double timeout_s);
 
 }  // namespace strandcast

@@ -1,5 +1,4 @@
-// What the window says in words: of the connection, of what is seen, and what was measured. Pure text, one
-// thread.
+// Texts in the window about the connection, the view and the measurements. Pure text, one thread.
 #pragma once
 
 #include <string>
@@ -11,14 +10,14 @@
 
 namespace strandcast {
 
-/// Slower than this against real time for so long is said.
+/// Simulated time per real time below which, for this long, slow motion is reported.
 inline constexpr double kSlowMotion = 0.95;
 inline constexpr int64_t kSlowMotionNs = 2'000'000'000;
 
-/// Counts per second, over two seconds.
+/// Counts per second, averaged over two seconds.
 class Rate {
  public:
-  /// `total` may begin again.
+  /// Updates with a running total, which may restart from 0.
   void update(uint64_t total, int64_t time_ns);
   double per_s() const { return per_s_; }
 
@@ -28,7 +27,7 @@ class Rate {
   double per_s_ = 0.0;
 };
 
-/// What the window knows beside the state of the viewer.
+/// Facts that the window knows besides the viewer's state.
 struct ViewFacts {
   Address address;
   Playout playout = Playout::LowLatency;

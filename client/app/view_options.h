@@ -1,4 +1,4 @@
-// Command line of strandcast-view. Pure parsing, no I/O but the token file.
+// Command line of strandcast-view. Pure parsing; the only I/O is reading the token file.
 #pragma once
 
 #include <filesystem>
@@ -44,7 +44,8 @@ struct ViewOptions {
   std::string log_level = "warn";
 };
 
-/// Everybody on the machine sees command lines; a file or the environment is private.
+/// Environment variable with the token. Command lines are visible to all users of a machine; a file or the
+/// environment is private.
 inline constexpr const char* kTokenVariable = "STRANDCAST_TOKEN";
 inline constexpr const char* kTlsAuthoritiesHelp =
     "Certificates (PEM) that the server's must come from, instead of the system's; means --tls";
@@ -55,23 +56,22 @@ inline constexpr double kMaxClipS = 60.0;
 inline constexpr double kMaxClipFps = 60.0;
 inline constexpr uint32_t kMinViewSide = 16;
 
-/// Outcome of reading a command line: options, or an exit code after something was printed (help or an
-/// error).
+/// Result of reading a command line: options, or an exit code after help or an error was printed.
 struct ViewCommandLine {
   std::optional<ViewOptions> options;
   int exit_code = 0;
 };
 ViewCommandLine read_view_command_line(int argc, const char* const* argv);
 
-/// "640x360" with sides from kMinViewSide to kMaxImageSide.
+/// Parses a size such as "640x360" with sides from kMinViewSide to kMaxImageSide.
 Result<RenderSize> parse_size(const std::string& text);
-/// "strands", "frames" or "auto".
+/// Parses "strands", "frames" or "auto".
 Result<StreamMode> parse_mode(const std::string& text);
 
-/// A viewer when no steering can come from it.
+/// Returns the session's role: Viewer if the options rule out steering.
 Role role_of(const ViewOptions& options);
 
-/// Connection settings for these options.
+/// Returns the connection settings for these options.
 ClientConfig client_config(const ViewOptions& options);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// ViewReport: what a viewer measured, for people, for scripts and for tests. Pure text, any thread.
+// ViewReport: a viewer's measurements for people, scripts and tests. Pure text, any thread.
 #pragma once
 
 #include <cstdint>
@@ -18,25 +18,25 @@ struct ReportEntry {
 };
 using ViewReport = std::vector<ReportEntry>;
 
-/// Everything a session measured, without render times.
+/// Reports everything that a session measured, except render times.
 ViewReport make_report(ViewerSession& session);
-/// In place of the server's reason.
+/// Replaces the reason of the mode, which by default is the server's.
 void set_mode_reason(ViewReport& report, const std::string& reason);
-/// Fills in the render times of a report.
+/// Adds the render times to a report.
 void set_render_times(ViewReport& report, const StageTimer& render_timer);
-/// Fills in how many pictures were made in which way between states, and which way most were.
+/// Adds how many pictures were interpolated linearly and cubically, and the more frequent kind.
 void set_interpolation(ViewReport& report, uint64_t linear_count, uint64_t cubic_count);
-/// Adds how long a window took from waking up (a key, say) to the picture that answers.
+/// Adds the time from a window's waking up (for example by a key) to the picture that answers.
 void add_answer_times(ViewReport& report, const StageTimer& answer_timer);
 
-/// key=value lines.
+/// Formats key=value lines.
 std::string to_lines(const ViewReport& report);
-/// One flat JSON object.
+/// Formats one flat JSON object.
 std::string to_json(const ViewReport& report);
-/// Writes JSON when the file ends in .json, else key=value lines.
+/// Writes JSON if the file's name ends in .json, otherwise key=value lines.
 Status save_report(const std::filesystem::path& path, const ViewReport& report);
 
-/// A short paragraph for the end of a run.
+/// Formats a short paragraph for the end of a run.
 std::string to_summary(const ViewReport& report);
 
 }  // namespace strandcast

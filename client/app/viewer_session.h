@@ -1,6 +1,6 @@
-// ViewerSession: a connection plus what a viewer keeps of it: the asset, the strand replay, the newest
-// picture and the newest status. Without window or GL, so the window, the headless viewer and the checks
-// share it. One thread.
+// ViewerSession: a connection with the data that a viewer keeps of it: asset, strand replay, newest picture
+// and newest status. It has no window or GL, so the window, the headless viewer and the checks share it. One
+// thread.
 #pragma once
 
 #include <chrono>
@@ -25,11 +25,11 @@
 
 namespace strandcast {
 
-/// Called for every decoded snapshot, in order.
+/// Receives every decoded snapshot, in order.
 using SnapshotListener = std::function<void(const std::shared_ptr<const Snapshot>&)>;
 
-/// A call of pump() handles no further event after so long: between two calls others look at clocks and
-/// stops.
+/// Time after which a call of pump() handles no further event, so that the caller can check clocks and stop
+/// flags.
 inline constexpr std::chrono::milliseconds kPumpSlice{20};
 
 struct PictureStats {  // frames mode
@@ -42,85 +42,89 @@ struct PictureStats {  // frames mode
 
 class ViewerSession {
  public:
-  /// Connects and prepares to decode; the errors of ViewerClient::connect and of an unknown codec.
+  /// Connects and prepares to decode. Returns the errors of ViewerClient::connect, and an error for an
+  /// unknown codec.
   static Result<std::unique_ptr<ViewerSession>> open(const ClientConfig& config);
 
-  /// Handles what arrived, waiting up to `timeout` for something: all of it, or as much as kPumpSlice allows
-  /// and at least one frame. The error is why the connection ended; what was received stays readable.
+  /// Handles received events, waiting up to `timeout` for one. Handles all of them, or as many as fit in
+  /// kPumpSlice and at least one frame. An error says why the connection ended; received data stays readable.
   Status pump(std::chrono::milliseconds timeout);
 
-  /// As the server said it, but for the codec of strands and its reason, which are those of now.
+  /// Returns the server's Welcome; the strand codec and its reason are the present ones.
   const Welcome& welcome() const { return welcome_; }
   ViewerClient& client() { return *client_; }
-  /// For other threads that send.
+  /// Returns the connection for other threads that send.
   std::shared_ptr<ViewerClient> shared_client() const { return client_; }
   StrandReplay& replay() { return *replay_; }
   const StrandReplay& replay() const { return *replay_; }
 
-  /// Null until it arrived.
+  /// Returns the asset; null until it arrived.
   const SceneAsset* asset() const { return asset_.get(); }
   std::shared_ptr<const SceneAsset> shared_asset() const { return asset_; }
-  /// What is to be shown: strands or the server's pictures, whichever was decoded last; before the first,
-  /// what the Welcome says. A change of mode thus shows only once there is something to show.
+  /// Returns the mode to show: strands or the server's pictures, whichever was decoded last. Before the first
+  /// frame it is the Welcome's. So a change of mode takes effect only once there is something to show.
   StreamMode mode() const { return modes_->shown(); }
-  /// Why, for a person.
+  /// Returns the reason of the mode for a person.
   std::string mode_reason() const { return modes_->look().reason; }
   uint64_t mode_changes() const { return modes_->look().changes; }
-  /// Asks for another mode, or leaves the choice to the server, which carries out one request a second, the
-  /// newest.
+  /// Requests another mode, or leaves the choice to the server. The server carries out the newest request, at
+  /// most one a second.
   void request_mode(StreamMode mode);
-  /// From now on `modes` is what knows the mode: it begins with this session.
+  /// Makes `modes` the owner of the mode; it begins a session there.
   void follow(std::shared_ptr<ModeControl> modes);
 
-  /// True once there is something to show: asset and snapshot, or a picture.
+  /// Returns true once there is something to show: asset and snapshot, or a picture.
   bool has_picture() const;
-  /// Frames of one colour only, and moments without anything to show after the first frame: must be 0.
+  /// Counts frames of one single colour, and moments without anything to show after the first frame; it must
+  /// be 0.
   uint64_t blank_pictures() const { return blank_pictures_; }
-  /// The newest decoded picture of the server, null before the first.
+  /// Returns the server's newest decoded picture, null before the first.
   const Image* image() const { return image_.get(); }
   std::shared_ptr<const Image> shared_image() const { return image_; }
   uint64_t image_count() const { return image_count_; }
-  /// Of the newest picture.
+  /// Returns the simulation time of the newest picture, ns.
   int64_t image_sim_time_ns() const { return image_sim_time_ns_; }
 
-  /// How the server codes strands for this viewer; changes with the link.
+  /// Returns how the server codes strands for this viewer; it changes with the link.
   const StreamQuality& quality() const { return quality_; }
   uint64_t quality_changes() const { return quality_changes_; }
 
-  /// What the scene looks like now, and its own camera: as the Welcome said, or a LookChange since.
+  /// Returns the scene's present look and camera, from the Welcome or a later LookChange.
   const LookChange& look() const { return look_; }
   uint64_t look_changes() const { return look_changes_; }
-  /// Where somebody who controls had this viewer look from last; nothing: nobody did.
+  /// Returns the camera that a controller last gave this viewer; empty if none did.
   const std::optional<CameraDesc>& moved_camera() const { return moved_camera_; }
   uint64_t camera_moves() const { return camera_moves_; }
-  /// That, else the scene's own.
+  /// Returns the camera given by a controller, else the scene's own.
   const CameraDesc& camera() const { return moved_camera_ ? *moved_camera_ : look_.camera; }
-  /// Of the server's parameters those that were asked for last, as they are now; null: nobody has asked yet.
+  /// Returns the present values of the server's parameters that were requested last; null before the first
+  /// request.
   std::shared_ptr<const std::vector<ParameterInfo>> parameters() const { return parameters_; }
-  /// The answer to the last SceneRequest, once.
+  /// Returns the answer to the last SceneRequest once, then empty.
   std::optional<SceneText> take_scene() { return std::exchange(scene_, std::nullopt); }
 
-  /// How the server makes pictures for this viewer; nothing before it said so.
+  /// Returns how the server makes pictures for this viewer; empty before it said so.
   const std::optional<FrameQuality>& frame_quality() const { return frame_quality_; }
 
   const ServerStatus& status() const { return status_; }
   bool has_status() const { return has_status_; }
-  /// What the server said when it last ran in slow motion; empty if it never did.
+  /// Returns the server's last message about slow motion; empty if there was none.
   const std::string& last_slow_motion() const { return last_slow_motion_; }
-  /// Notices since the last call, the newest kMaxWaitingNotices.
+  /// Returns the notices since the last call, at most the newest kMaxWaitingNotices.
   std::vector<Notice> take_notices() { return notices_.take(); }
   const PictureStats& picture_stats() const { return picture_stats_; }
   const StageTimer& picture_decode_timer() const { return picture_decode_timer_; }
-  /// From the arrival of a motion sample at the server to what was decoded and shows it, in this mode, ms.
+  /// Times from a motion sample's arrival at the server to the decoded frame that shows it, in the present
+  /// mode, ms.
   const StageTimer& motion_latency_timer() const {
     return mode() == StreamMode::Frames ? picture_latency_.timer() : replay_->motion_latency_timer();
   }
-  /// Frames decoded so far, strands and pictures.
+  /// Returns the number of decoded frames, strands and pictures.
   uint64_t decoded_frames() const;
   double connected_s() const;
 
   void set_snapshot_listener(SnapshotListener listener) { listener_ = std::move(listener); }
-  /// Every decoded frame, strands and pictures, goes into it with its times, from now on.
+  /// Sets the trace that records every decoded frame, strands and pictures, from now on.
   void set_trace(std::shared_ptr<FrameTrace> trace);
 
  private:

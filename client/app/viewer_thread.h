@@ -1,6 +1,6 @@
-// ViewerThread: receives, decodes and acknowledges on a thread of its own, so that slow drawing delays no
-// acknowledgement and slow decoding no picture. It hands over one immutable state, the newest; its size is
-// bounded by what a ViewerSession keeps. All functions from one other thread.
+// ViewerThread: receives, decodes and acknowledges frames on its own thread. So slow drawing does not delay
+// acknowledgements, and slow decoding does not delay pictures. It publishes the newest state, which is
+// immutable and whose size a ViewerSession bounds. All functions from one other thread.
 #pragma once
 
 #include <atomic>
@@ -17,7 +17,7 @@
 
 namespace strandcast {
 
-/// What there is to show and to tell, as of one moment.
+/// State of the viewer at one moment, to be shown and reported.
 struct ViewerState {
   uint64_t session_number = 0;  // 0 = there has been none; another one after every new connection
   bool is_connected = false;
@@ -54,31 +54,32 @@ struct ViewerState {
   int64_t made_ns = 0;
 };
 
-/// Told on the receiving thread of each new state, at once.
+/// Receives each new state immediately, on the receiving thread.
 using NewsListener = std::function<void(const std::shared_ptr<const ViewerState>&)>;
 
 class ViewerThread {
  public:
-  /// `live` need not have a session yet.
+  /// Starts the thread; `live` need not have a session yet.
   explicit ViewerThread(std::unique_ptr<LiveConnection> live, NewsListener listener = {});
   /// Ends the thread.
   ~ViewerThread();
   ViewerThread(const ViewerThread&) = delete;
   ViewerThread& operator=(const ViewerThread&) = delete;
 
-  /// The newest state; never null.
+  /// Returns the newest state; never null.
   std::shared_ptr<const ViewerState> look() const;
-  /// Notices since the last call, the newest kMaxWaitingNotices.
+  /// Returns the notices since the last call, at most the newest kMaxWaitingNotices.
   std::vector<Notice> take_notices();
-  /// The answer to the last SceneRequest, once.
+  /// Returns the answer to the last SceneRequest once, then empty.
   std::optional<SceneText> take_scene();
-  /// As ViewerClient::send, to the running connection; Unavailable before the first.
+  /// Sends a message on the current connection like ViewerClient::send; Unavailable before the first
+  /// connection.
   Status send(const ClientMessage& message);
   void set_playout(Playout playout) { playout_ = playout; }
-  /// Asks the server for this mode, at once, and in later sessions too.
+  /// Requests this mode from the server, immediately and in later sessions.
   void request_mode(StreamMode mode);
   StreamMode wanted_mode() const { return modes_->look().wanted; }
-  /// Ends the thread; what it measured. Nothing when there was no session.
+  /// Ends the thread and returns its measurements; empty if there was no session.
   std::optional<ViewReport> stop_and_report();
 
  private:

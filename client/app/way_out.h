@@ -1,4 +1,4 @@
-// What a person can do about a connection that could not be made or was lost. Pure, any thread.
+// Remedies for a connection that failed or was lost, as text for a person. Pure, any thread.
 #pragma once
 
 #include <string>
@@ -7,11 +7,11 @@
 
 namespace strandcast {
 
-/// The server itself refused or ended the session, in words of its own.
+/// Returns whether the server itself refused or ended the session, giving its own reason.
 bool is_refusal(const Error& error);
 
-/// One sentence without a full stop; empty when there is nothing but waiting. `step` is what the connection
-/// was at.
+/// Returns a remedy in one sentence without a full stop; empty if only waiting helps. `step` is the stage
+/// that the connection had reached.
 std::string way_out(const Error& error, ConnectStep step, const Address& address);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// The viewer with a window. Main thread only.
+// The viewer's window. Main thread only.
 #pragma once
 
 #include <atomic>
@@ -8,8 +8,8 @@
 
 namespace strandcast {
 
-/// Shows the server's hair until the person quits, the options' time is over or `stop` is set. The error is
-/// one sentence for the user: no server, no display, or a refusal that will not go away.
+/// Shows the server's hair until the person quits, the time in the options is over or `stop` is set. The
+/// error is one sentence for the user: no server, no display, or a permanent refusal.
 Result<ViewReport> run_windowed(const ViewOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace strandcast

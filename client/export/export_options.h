@@ -1,4 +1,4 @@
-// What an export is to be like. Plain data.
+// Options of an export. Plain data.
 #pragma once
 
 #include <filesystem>
@@ -9,7 +9,7 @@ namespace strandcast {
 enum class ExportUnit { Centimetre, Metre };
 enum class ExportUp { Y, Z };
 enum class ExportSpace { Head, World };
-/// What Unreal makes of the curves.
+/// What Unreal uses the curves for.
 enum class ExportRole {
   Strands,  // hair that is drawn
   Guides,   // hair that drives other hair
@@ -28,7 +28,7 @@ struct ExportOptions {
   bool is_quiet = false;       // no progress on standard error
 };
 
-/// Metres per unit of the file.
+/// Returns the metres per unit of the file.
 inline double metres_of(ExportUnit unit) {
   return unit == ExportUnit::Centimetre ? 0.01 : 1.0;
 }

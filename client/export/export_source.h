@@ -1,5 +1,4 @@
-// ExportSource: states of strands in the order of their time, from wherever they come: a running server or a
-// recording.
+// ExportSource: states of strands in time order, from a running server or a recording.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +13,7 @@
 
 namespace strandcast {
 
-/// What stays the same of all states.
+/// Data that is the same for all states.
 struct ExportScene {
   std::shared_ptr<const SceneAsset> asset;
   float strand_radius_m = 0.0f;  // as drawn, at the root
@@ -26,14 +25,15 @@ class ExportSource {
   virtual ~ExportSource() = default;
 
   virtual const ExportScene& scene() const = 0;
-  /// Leaves states out that frames from `from_s` after the first state on do not need, where it can. Returns
-  /// the time of the first state where it is known already. Comes before next().
+  /// Skips states, if possible, that frames from `from_s` after the first state on do not need. Returns the
+  /// time of the first state if it is already known. Call it before next().
   virtual Result<std::optional<int64_t>> skip_to([[maybe_unused]] double from_s) {
     return std::optional<int64_t>();
   }
-  /// The next state, of a later time than the last one unless time began anew; null when there are no more.
+  /// Returns the next state; null if there are no more. Its time is later than the last one's, unless time
+  /// began anew.
   virtual Result<std::shared_ptr<const Snapshot>> next() = 0;
-  /// Sentences about what a person should know of the states so far: "12 states were lost on the way".
+  /// Returns remarks for a person about the states so far, for example "12 states were lost on the way".
   virtual std::vector<std::string> remarks() const = 0;
 };
 

@@ -1,5 +1,5 @@
-// export_strands: states of a source, resampled and written as a file for other programs. One thread, which
-// it keeps until the end.
+// export_strands: resamples the states of a source and writes them to a file for other programs. One thread,
+// which it occupies until the end.
 #pragma once
 
 #include <atomic>
@@ -25,11 +25,12 @@ struct ExportReport {
   std::vector<std::string> remarks;  // a sentence for each thing that a person should know
 };
 
-/// BadInput or Unsupported where the file's extension or a setting cannot be had; says what to do instead.
+/// Checks the options. BadInput or Unsupported for a file extension or setting that is impossible; the error
+/// names an alternative.
 Status check_export(const ExportOptions& options);
 
-/// Writes what the source gives until it ends, the range does or `stop` is set; what was written by then is
-/// whole. Errors of the source count only while there is no frame; later they are remarks.
+/// Writes the states until the source or the range ends or `stop` is set; the file is complete up to then. An
+/// error of the source is returned only if there is no frame yet, and reported as a remark later.
 Result<ExportReport> export_strands(ExportSource& source, const ExportOptions& options,
                                     const std::atomic<bool>& stop);
 

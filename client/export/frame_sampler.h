@@ -1,5 +1,5 @@
-// FrameSampler: frames at an even rate from states at any, by the interpolation that viewers use. Keeps the
-// few states that the next frames need. Pure logic; one thread.
+// FrameSampler: makes frames at an even rate from states at any rate, with the viewers' interpolation. Keeps
+// only the few states that the next frames need. Pure logic; one thread.
 #pragma once
 
 #include <cstdint>
@@ -33,15 +33,15 @@ class FrameSampler {
     WentBack,  // time began anew: it is not kept, and no other will be
   };
 
-  /// `fill` makes strands that states lack.
+  /// Starts a range; `fill` makes strands that states lack.
   FrameSampler(const SampleRange& range, StrandFill fill);
 
   Outcome add(std::shared_ptr<const Snapshot> state);
-  /// No more states come: frames up to the last one are due.
+  /// Notes that no more states come, so that frames up to the last state are due.
   void finish() { is_finished_ = true; }
-  /// The next frame that can be made of the states so far.
+  /// Returns the next frame that the states so far determine.
   std::optional<SampledFrame> next();
-  /// All frames of the range were given out.
+  /// Returns whether all frames of the range were returned.
   bool is_done() const;
 
  private:

@@ -1,4 +1,4 @@
-// Numbers as short text: decimals without zeros behind. For formats of text; the locale plays no part.
+// Formats numbers as short text without trailing zeros, for text file formats; independent of the locale.
 #pragma once
 
 #include <charconv>
@@ -7,7 +7,7 @@
 
 namespace strandcast {
 
-/// Room that a number takes at most.
+/// Largest number of characters of a number.
 inline constexpr size_t kMostDecimalChars = 24;
 
 /// Writes `value` rounded to `decimals` (0 to 9) at `out` and returns its end. |value| is below 1e9.

@@ -1,5 +1,5 @@
-// StrandWriter: writes frames of strands to a file of some format, one by one, so that memory stays the same
-// however long an export is. One thread.
+// StrandWriter: writes frames of strands to a file of some format, one by one, so that memory does not grow
+// with the length of an export. One thread.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace strandcast {
 
-/// A frame in the units and axes of the file.
+/// A frame in the file's units and axes.
 struct ExportFrame {
   uint64_t number = 0;                 // from 1
   double time_s = 0.0;                 // simulated
@@ -31,11 +31,11 @@ class StrandWriter {
  public:
   virtual ~StrandWriter() = default;
   virtual Status write(const ExportFrame& frame) = 0;
-  /// Completes what was written; nothing follows.
+  /// Completes the file; nothing may be written afterwards.
   virtual Result<WrittenBytes> finish() = 0;
 };
 
-/// Writers of each format, the rest shape written as frame 0. `strands` outlives them.
+/// Make the writer of each format; the rest shape is written as frame 0. `strands` must outlive them.
 Result<std::unique_ptr<StrandWriter>> make_usda_writer(const ExportOptions& options,
                                                        const StrandSet& strands);
 Result<std::unique_ptr<StrandWriter>> make_ply_writer(const ExportOptions& options, const StrandSet& strands);

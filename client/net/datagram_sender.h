@@ -1,4 +1,4 @@
-// DatagramSender: sends datagrams to one address. One thread.
+// DatagramSender: sends UDP datagrams to one address. One thread.
 #pragma once
 
 #include <cstddef>
@@ -13,13 +13,13 @@ namespace strandcast {
 
 class DatagramSender {
  public:
-  /// NotFound when the host is not known.
+  /// Opens a socket to the address; NotFound if the host is unknown.
   static Result<std::unique_ptr<DatagramSender>> open(const Address& to);
   ~DatagramSender();
   DatagramSender(const DatagramSender&) = delete;
   DatagramSender& operator=(const DatagramSender&) = delete;
 
-  /// False when it could not be handed to the network; nobody tells whether it arrives.
+  /// Sends a datagram; returns false if the network did not take it. Arrival is not confirmed.
   bool send(std::span<const std::byte> bytes);
 
  private:

@@ -13,7 +13,7 @@ namespace strandcast {
 
 // Of an answer: whatever it contains, no more than their sum is read.
 inline constexpr uint64_t kMaxHttpBodyBytes = 1u << 20;
-/// The header; and the heads of chunks and the trailer of a chunked body, each by itself.
+/// Limit of the header; also of each chunk's head and of the trailer of a chunked body.
 inline constexpr uint64_t kMaxHttpAnswerHeaderBytes = 16u << 10;
 
 struct HttpAnswer {
@@ -26,8 +26,8 @@ struct HttpAccess {
   std::string token;                      // sent as Authorization: Bearer when not empty
 };
 
-/// Unavailable when nobody listens or the answer is not HTTP, LimitExceeded when it is longer than the limits
-/// above, Timeout when it takes too long, Unauthorized or Unsupported when TLS fails.
+/// Sends the request and returns the answer. Unavailable if nobody listens or the answer is not HTTP,
+/// LimitExceeded beyond the limits above, Timeout, and Unauthorized or Unsupported if TLS fails.
 Result<HttpAnswer> http_get(const Address& address, const std::string& target,
                             std::chrono::milliseconds timeout, const HttpAccess& access = {});
 

@@ -1,5 +1,5 @@
-// What every module's functions for scripts have in common: how they are seen, and the one place where they
-// leave why they failed, for strand_core_error(). One thread.
+// Common parts of the WebAssembly modules' functions for scripts: their visibility, and the storage of the
+// last error for strand_core_error(). One thread.
 #pragma once
 
 #include "common/base/result.h"

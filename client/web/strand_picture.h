@@ -1,6 +1,6 @@
-// What a page draws strands from, for scripts, by plain functions as in strand_core.h: strands expanded, lit
-// and ordered for a graphics card, or drawn here, tile by tile, where there is none. Whoever calls has one
-// thread. Memory may grow in every call: views of it are made anew behind each.
+// Pictures of strands for scripts, as plain functions like those of strand_core.h. Strands are expanded, lit
+// and sorted for a graphics card, or drawn here tile by tile if there is none. One thread. Any call may grow
+// the memory, so scripts must make new views of it after each.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 struct StrandPicture;
 
-/// Numbers of a look, all of LookDesc (common/scene/scene_desc.h) but its name of a colour and its methods.
+/// A look's numbers: all of LookDesc (common/scene/scene_desc.h) except its colour name and methods.
 struct StrandPictureLook {
   float root_color[3], tip_color[3];                            // 0
   float eumelanin, pheomelanin, strand_radius_m, tip_scale;     // 6
@@ -28,7 +28,7 @@ struct StrandPictureLook {
 };
 static_assert(sizeof(StrandPictureLook) == 57 * sizeof(float));
 
-/// One picture.
+/// View and size of one picture.
 struct StrandPictureView {
   float width_px, height_px;
   float offset_m[3], target_m[3], fov_y_rad;  // of the camera
@@ -38,7 +38,7 @@ struct StrandPictureView {
 };
 static_assert(sizeof(StrandPictureView) == 17 * sizeof(float));
 
-/// Where scripts find what was made; pointers are offsets in the module's memory.
+/// Locations of the results for scripts; pointers are offsets in the module's memory.
 struct StrandPictureParts {
   uint32_t block;          // 0: TileBlock, as shaders/render/tile_frame.glsl declares it
   uint32_t block_bytes;    // 4
@@ -61,7 +61,7 @@ struct StrandPictureParts {
 };
 static_assert(sizeof(StrandPictureParts) == 88);
 
-/// Of the head that is drawn under the hair.
+/// Mesh of the head under the hair.
 struct StrandPictureHead {
   uint32_t vertex_count;    // 0
   uint32_t triangle_count;  // 4
@@ -74,24 +74,26 @@ static_assert(sizeof(StrandPictureHead) == 24);
 
 extern "C" {
 
-/// Of the payload of an asset message; nullptr, and strand_core_error() says why.
+/// Makes a picture from the payload of an asset message; nullptr on failure, when strand_core_error() says
+/// why.
 StrandPicture* strand_picture_make(const std::byte* payload, size_t size_bytes);
 void strand_picture_delete(StrandPicture* picture);
 const StrandPictureHead* strand_picture_head(const StrandPicture* picture);
 
-/// `hair_color`: a name of common/scene/hair_color.h.
+/// Sets the look; `hair_color` is a name of common/scene/hair_color.h.
 void strand_picture_set_look(StrandPicture* picture, const StrandPictureLook* look, const char* hair_color,
                              size_t hair_color_bytes);
-/// Where the next state's positions go: head space, m, (vertex_count x strand_count x 3), all strands.
+/// Returns the memory for the next state's positions: head space, m, (vertex_count x strand_count x 3), all
+/// strands.
 float* strand_picture_positions(StrandPicture* picture);
-/// New ones are there.
+/// Notes that the positions have changed.
 void strand_picture_changed(StrandPicture* picture);
 
-/// Strands for a graphics card; nullptr for a view that is none.
+/// Prepares strands for a graphics card; nullptr for an invalid view.
 const StrandPictureParts* strand_picture_prepare(StrandPicture* picture, const StrandPictureView* view);
-/// Begins a picture made by this processor ...
+/// Begins a picture that this processor draws; strand_picture_draw_tiles() continues it.
 const StrandPictureParts* strand_picture_begin(StrandPicture* picture, const StrandPictureView* view);
-/// ... and draws tiles of it, so that whoever waits for another one need not wait for all of them. Nothing
-/// else is asked of the picture between.
+/// Draws some tiles of the picture, so that other work can run between calls. Call no other function of the
+/// picture until all tiles are drawn.
 void strand_picture_draw_tiles(StrandPicture* picture, uint32_t begin, uint32_t end);
 }

@@ -1,5 +1,5 @@
-// A form to be filled in beside the picture: fields with ranges, and what a person did to them. Plain data:
-// what the fields mean knows the application, how they are drawn form_panel.h.
+// A form beside the picture: fields with ranges, and the person's edits. Plain data: the application defines
+// the fields' meaning, form_panel.h draws them.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -10,7 +10,7 @@
 
 namespace strandcast {
 
-/// Of a number, of a colour or direction, of a name.
+/// Value of a number, of a colour or direction, or of a name.
 using FormValue = std::variant<double, glm::vec3, std::string>;
 
 // Stops: names in an order, along a slider.
@@ -52,7 +52,7 @@ struct FormEdit {
   bool operator==(const FormEdit&) const = default;
 };
 
-/// What a person did.
+/// Edits and button presses of a person.
 struct FormActions {
   std::vector<FormEdit> edits;      // in order
   std::optional<std::string> file;  // another name
@@ -64,18 +64,18 @@ struct FormActions {
   void add(FormActions later);
 };
 
-/// Where something comes from, seen from the middle: degrees about the up axis from +Z towards +X, and above
-/// the horizon.
+/// Direction from which something comes, as seen from the centre: degrees about the up axis from +Z towards
+/// +X, and degrees above the horizon.
 struct DirectionAngles {
   double azimuth_deg = 0.0;
   double elevation_deg = 0.0;
 };
-/// Of what travels along `direction`, which has a length.
+/// Returns the angles from which something comes that travels along `direction`, which must not be zero.
 DirectionAngles angles_of(const glm::vec3& direction);
-/// Inverse, of this length.
+/// Inverse of angles_of(); the result has this length.
 glm::vec3 direction_of(const DirectionAngles& angles, float length);
 
-/// What displays show of linear light, 0..1, and back (IEC 61966-2-1).
+/// Converts linear light, 0..1, to display values and back (sRGB, IEC 61966-2-1).
 float to_srgb(float linear);
 float from_srgb(float shown);
 

@@ -1,4 +1,4 @@
-// The form beside the picture, drawn with Dear ImGui between its NewFrame() and Render(). Main thread only.
+// Draws the form beside the picture with Dear ImGui, between its NewFrame() and Render(). Main thread only.
 #pragma once
 
 #include "client/window/form.h"
@@ -6,7 +6,7 @@
 
 namespace strandcast {
 
-/// At the right edge, as high as the window at most. Adds what the person does to `actions`.
+/// Draws the form at the right edge, at most as high as the window. Adds the person's edits to `actions`.
 PanelSize draw_form_panel(const FormState& form, FormActions& actions);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// What the window's panels say. Plain data, filled by the application for every picture.
+// Content of the window's panels. Plain data, filled by the application for every picture.
 #pragma once
 
 #include <optional>
@@ -12,13 +12,13 @@ struct HudRow {
   std::string value;
 };
 
-/// One part of a bar that is made of several.
+/// One part of a bar with several parts.
 struct HudPart {
   std::string name;
   double ms = 0.0;
 };
 
-/// In the middle of the window while there is no connection.
+/// Text in the middle of the window while there is no connection.
 struct HudBanner {
   std::string headline;  // "connecting to 127.0.0.1:7878"
   std::string trouble;   // why not; may be empty
@@ -26,7 +26,7 @@ struct HudBanner {
   std::string doing;     // what is tried, or what the keys do
 };
 
-/// Below the picture of a recording that is played.
+/// Timeline below the picture of a recording.
 struct TimelineState {
   double time_s = 0.0;
   double length_s = 0.0;
@@ -34,7 +34,7 @@ struct TimelineState {
   bool is_playing = false;
   bool is_looping = false;
 };
-/// What was done with it since the last time.
+/// A person's actions on the timeline since the last call.
 struct TimelineActions {
   std::optional<double> time_s;  // it was dragged to
   std::optional<double> speed;
@@ -53,9 +53,9 @@ struct HudState {
   std::optional<TimelineState> timeline;  // with it, what is seen is a recording
 };
 
-/// How much of the panel is there.
+/// How much of the panel is visible.
 enum class HudFold { Small, Unfolded, Hidden };
-/// Small, unfolded, hidden, and again.
+/// Returns the next state, cyclically: small, unfolded, hidden.
 constexpr HudFold next_fold(HudFold fold) {
   return fold == HudFold::Small      ? HudFold::Unfolded
          : fold == HudFold::Unfolded ? HudFold::Hidden

@@ -17,19 +17,20 @@ inline constexpr float kMaxOrbitPanM = 10.0f;  // of the target from the head jo
 
 class OrbitCamera {
  public:
-  /// `home` is the view that reset() returns to.
+  /// Starts at `home`, the view that reset() returns to.
   explicit OrbitCamera(const CameraDesc& home);
 
-  /// Left drag, in window heights, right and down positive: the scene turns with the hand.
+  /// Orbits by a left drag, in window heights, right and down positive: the scene turns with the hand.
   void orbit(const glm::vec2& drag_heights);
-  /// Middle or right drag, in window heights: the point under the cursor stays under it.
+  /// Pans by a middle or right drag, in window heights: the point under the cursor stays under it.
   void pan(const glm::vec2& drag_heights);
-  /// Wheel steps, positive comes closer.
+  /// Zooms by wheel steps; positive comes closer.
   void zoom(float wheel_steps);
   void reset();
-  /// From there at once; the view to return to stays.
+  /// Moves to this camera immediately; the view of reset() stays.
   void look_from(const CameraDesc& camera);
-  /// Another view to return to; who looks from the old one looks from there at once. True then.
+  /// Sets another view for reset(). If the camera is at the old one, it moves to the new one; returns true
+  /// then.
   bool set_home(const CameraDesc& home);
 
   const CameraDesc& camera() const { return camera_; }

@@ -1,6 +1,6 @@
-// Window: a GLFW window, its mouse and keys as actions, and a picture with panels over it, drawn with Dear
-// ImGui and plain OpenGL 3.3. It draws nothing that takes long. Main thread only but for wake(). Knows
-// nothing of servers or hair.
+// Window: a GLFW window that reports mouse and keys as actions and shows a picture with panels over it, drawn
+// with Dear ImGui and plain OpenGL 3.3. It draws nothing that takes long. Main thread only, except for
+// wake(). Knows nothing of servers or hair.
 #pragma once
 
 #include <chrono>
@@ -24,7 +24,7 @@ inline constexpr int64_t kPanelNs = 250 * kMsInNs;            // how often the n
 inline constexpr int64_t kMessageNs = 4'000 * kMsInNs;        // how long a notice stays on it
 inline constexpr std::chrono::milliseconds kLongestWait{50};  // how late a stop is noticed
 
-/// What the person asked for since the last call.
+/// Actions of the person since the last call.
 struct WindowActions {
   bool is_touched = false;            // what is shown may have to change: a key, a drag, another size
   bool wants_quit = false;            // Esc, Q, or the window was closed
@@ -47,32 +47,32 @@ struct WindowActions {
   TimelineActions timeline;           // or on the timeline; O wants a loop too
 };
 
-/// How a picture of other sides than the window's is shown.
+/// How a picture is shown whose shape differs from the window's.
 enum class PictureFit { Inside, Stretched };
 
 class Window {
  public:
-  /// Opens the window. Unavailable without a display, and says what to do then.
+  /// Opens the window. Unavailable without a display; the error names a remedy.
   static Result<std::unique_ptr<Window>> open(const std::string& title, RenderSize size);
-  /// Whether there is a display at all; opens nothing. Not while there is a window.
+  /// Checks whether there is a display without opening a window. Must not be called while there is one.
   static Status check_display();
   ~Window();
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;
 
-  /// Waits until something happens, wake() was called or the time is over.
+  /// Waits for an action, a call of wake() or the timeout.
   WindowActions wait(std::chrono::milliseconds timeout);
   /// Ends the wait. Any thread, while there is a window.
   static void wake();
-  /// Size of the framebuffer, pixels; 0 x 0 while minimised.
+  /// Returns the framebuffer's size in pixels; 0 x 0 while minimised.
   RenderSize framebuffer_size() const;
-  /// Whether the person has unfolded the measurements (U).
+  /// Returns whether the person has unfolded the measurements (U).
   bool is_unfolded() const;
-  /// Whether the person has opened the form (L).
+  /// Returns whether the person has opened the form (L).
   bool is_form_visible() const;
-  /// Shows this picture (dark grey when there is none) with the panels over it, the form too when it is given
-  /// and open; waits for the display, and returns once it is handed to it. What is done in the form comes
-  /// with the next wait().
+  /// Shows the picture (dark grey if null) with the panels over it, and the form if it is given and open.
+  /// Waits for the display and returns once the picture was passed to it. Edits in the form come with the
+  /// next wait().
   void present(const std::shared_ptr<const Image>& image, PictureFit fit, const HudState& hud,
                const std::optional<FormState>& form);
 

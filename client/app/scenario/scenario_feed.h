@@ -1,5 +1,5 @@
-// What a scenario feeds: motion and wind as functions of time, sent in real time by a thread and a connection
-// of its own, or sample by sample for the steps of a server in lockstep.
+// Motion and wind that a scenario feeds, as functions of time. They are sent in real time on a thread and
+// connection of their own, or sample by sample for the steps of a server in lockstep.
 #pragma once
 
 #include <atomic>
@@ -13,13 +13,13 @@
 
 namespace strandcast {
 
-/// The functions of a feed, from its `from_s` on. Loads its files; errors name them.
+/// Returns the functions of a feed, from its `from_s` on. Loads its files; errors name them.
 Result<FeedPlan> plan_of(const ScenarioFeed& feed);
 
-/// Head of shake: to and fro along x with this peak acceleration, which a first period leads up to.
+/// Returns a pose of a head shaken along x with this peak acceleration; the first period builds it up.
 Pose shake_motion(double t_s, double peak_mps2, double rate_hz);
 
-/// Feeds in real time until it goes, or the connection ends.
+/// Feeds in real time until it is destroyed or the connection ends.
 class LiveFeed {
  public:
   static Result<std::unique_ptr<LiveFeed>> start(FeedPlan plan, const ClientConfig& config);
@@ -27,7 +27,7 @@ class LiveFeed {
   LiveFeed(const LiveFeed&) = delete;
   LiveFeed& operator=(const LiveFeed&) = delete;
 
-  /// As of the newest second.
+  /// Returns the progress as of the newest second.
   FeedProgress progress() const;
 
  private:
@@ -42,8 +42,8 @@ class LiveFeed {
   std::thread thread_;
 };
 
-/// Samples for the steps after `begin_tick`, and for that tick itself to begin with: what their times are
-/// counted from.
+/// Makes samples for the steps after `begin_tick`, and one for that tick itself, from which times are
+/// counted.
 class SteppedFeed {
  public:
   SteppedFeed(FeedPlan plan, uint64_t begin_tick, double step_rate_hz)
@@ -52,7 +52,7 @@ class SteppedFeed {
         next_tick_(begin_tick),
         step_rate_hz_(step_rate_hz) {}
 
-  /// What is to be sent before the simulation goes on to `tick`.
+  /// Returns the messages to send before the simulation continues to `tick`.
   std::vector<ClientMessage> samples_up_to(uint64_t tick);
 
  private:

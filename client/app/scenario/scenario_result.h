@@ -1,5 +1,5 @@
-// What came of a scenario: a line per check for people, JUnit XML for build servers, a plot of what was
-// measured on the way. Pure text, any thread.
+// Result of a scenario: a line per check for people, JUnit XML for build servers, and a plot of the
+// measurements. Pure text, any thread.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct CheckResult {
   double seconds = 0.0;  // since the one before
 };
 
-/// What was seen at one moment.
+/// Measurements at one moment.
 struct TraceSample {
   double time_s = 0.0;     // since the start of the scenario
   std::string viewer;      // empty: of the server
@@ -40,13 +40,13 @@ struct ScenarioResult {
   size_t failed_count() const;
 };
 
-/// "  ok    12  stretch of viewer: wanted below 0.01, measured 0.002".
+/// Formats a check: "  ok    12  stretch of viewer: wanted below 0.01, measured 0.002".
 std::string to_line(const CheckResult& check);
 
-/// One <testsuite> per scenario, one <testcase> per check.
+/// Formats JUnit XML with one <testsuite> per scenario and one <testcase> per check.
 std::string to_junit(const std::vector<ScenarioResult>& results);
 
-/// Stretch, pace, kbit/s and frames per second over time, as SVG.
+/// Plots stretch, speed, kbit/s and frames per second over time, as SVG.
 std::string to_plot(const ScenarioResult& result);
 
 }  // namespace strandcast

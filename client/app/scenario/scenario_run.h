@@ -1,6 +1,6 @@
-// ScenarioRun: carries out a scenario against a server that it starts, or one that runs already, and checks
-// what is expected. Nothing waits without end: the scenario's limit ends everything. One thread, beside those
-// of its viewers and feeds.
+// ScenarioRun: runs a scenario against a server that it starts or that already runs, and checks its
+// expectations. The scenario's time limit bounds every wait. One thread, besides those of its viewers and
+// feeds.
 #pragma once
 
 #include <functional>
@@ -27,10 +27,10 @@ struct ScenarioOptions {
   const std::atomic<bool>* stop = nullptr;
 };
 
-/// Told of every check as it is done.
+/// Receives every check when it is done.
 using CheckListener = std::function<void(const CheckResult&)>;
 
-/// Of a span of time that was stepped or run.
+/// A span of time that was stepped or run, and its measurements.
 struct MeasuredSpan {
   double seconds = 0.0;     // simulated where it was stepped, else real
   double realtime = -1.0;   // -1 = not measured
@@ -47,7 +47,7 @@ class ScenarioRun {
   ScenarioRun(const Scenario& scenario, ScenarioOptions options, CheckListener listener);
   ~ScenarioRun();
 
-  /// All actions in order, until one fails that the others need.
+  /// Runs all actions in order, until one fails that later ones need.
   ScenarioResult run();
 
  private:
@@ -96,7 +96,7 @@ class ScenarioRun {
   void expect_pace(const ScenarioExpect& expect);
   void expect_slow_motion(const ScenarioExpect& expect);
   void expect_mode(const ScenarioExpect& expect);
-  /// Waits for what may come by itself; false when it does not within so long.
+  /// Waits until `condition` holds; returns false if it does not within `seconds`.
   bool await(double seconds, const std::function<bool()>& condition);
   void expect_state(const ScenarioExpect& expect);
   void save_evidence();
@@ -104,7 +104,7 @@ class ScenarioRun {
   double elapsed_s() const;
   double left_s() const { return scenario_.limit_s - elapsed_s(); }
   bool is_stopped() const { return options_.stop != nullptr && *options_.stop; }
-  /// An error when the time is over or somebody stops.
+  /// Returns an error when the time limit is over or the run is stopped.
   Status go_on() const;
 
   const Scenario& scenario_;
@@ -140,7 +140,7 @@ class ScenarioRun {
   std::set<std::filesystem::path> renewed_;  // goldens
 };
 
-/// A picture of what a viewer has, as the viewer's window would draw it.
+/// Draws what a viewer has received, as the viewer's window would.
 Result<Image> draw(const ViewerPicture& picture, RenderSize size);
 
 }  // namespace strandcast

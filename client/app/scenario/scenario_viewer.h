@@ -1,5 +1,5 @@
-// ScenarioViewer: a viewer of a scenario on a thread of its own: decodes all that it gets, comes back after
-// the server was away, and measures. Its link may be a slow one (common/chaos).
+// ScenarioViewer: a viewer of a scenario on its own thread: decodes everything it receives, reconnects after
+// the server was away, and measures. Its link may be artificially slow (common/chaos).
 #pragma once
 
 #include <atomic>
@@ -18,7 +18,7 @@
 
 namespace strandcast {
 
-/// Totals since it joined; of two looks the difference counts.
+/// Totals since it joined; subtract two to get those of an interval.
 struct ViewerCounts {
   uint64_t frames = 0;  // decoded, strands and pictures
   uint64_t strand_frames = 0;
@@ -27,7 +27,7 @@ struct ViewerCounts {
   uint64_t rejected_frames = 0;
 };
 
-/// What it has at one moment.
+/// State of the viewer at one moment.
 struct ViewerLook {
   ViewerCounts counts;
   bool is_connected = false;
@@ -43,7 +43,7 @@ struct ViewerLook {
   std::string codec;
 };
 
-/// What a picture is drawn of.
+/// Data from which a picture is drawn.
 struct ViewerPicture {
   std::shared_ptr<const SceneAsset> asset;
   std::shared_ptr<const Snapshot> state;  // of strands
@@ -54,7 +54,7 @@ struct ViewerPicture {
 
 class ScenarioViewer {
  public:
-  /// Connects, through a relay where the link is limited; errors as ViewerSession::open.
+  /// Connects, through a relay if the link is limited; errors as ViewerSession::open().
   static Result<std::unique_ptr<ScenarioViewer>> join(const ScenarioView& view, ClientConfig config);
   ~ScenarioViewer();
   ScenarioViewer(const ScenarioViewer&) = delete;
@@ -64,7 +64,7 @@ class ScenarioViewer {
   const ScenarioView& view() const { return view_; }
   ViewerLook look() const;
   ViewerPicture picture() const;
-  /// The largest stretch and speed count from now on.
+  /// Restarts the measurement of the largest stretch and speed.
   void begin_measure();
 
  private:

@@ -1,5 +1,5 @@
-// ServerProcess: strandcast-server as a child, on a free port, with tokens of its own, its output in a file.
-// It always ends with its owner. One thread.
+// ServerProcess: strandcast-server as a child process on a free port, with its own tokens and its output in a
+// file. It always ends with its owner. One thread.
 #pragma once
 
 #include <sys/types.h>
@@ -28,12 +28,12 @@ class ServerProcess {
   ServerProcess(const ServerProcess&) = delete;
   ServerProcess& operator=(const ServerProcess&) = delete;
 
-  /// Starts it and waits until it serves. Its own sentence when it ends instead, Timeout, or Unavailable
-  /// when `stop` is set.
+  /// Starts the server and waits until it serves. Returns the server's own error if it ends instead, Timeout,
+  /// or Unavailable if `stop` is set.
   Status start(double timeout_s, const std::atomic<bool>& stop);
-  /// Kills it and starts it again on the same port.
+  /// Kills the server and starts it again on the same port.
   Status restart(double timeout_s, const std::atomic<bool>& stop);
-  /// Asks it to end, and kills it when it does not.
+  /// Asks the server to end, and kills it if it does not.
   void stop();
 
   bool has_ended();

@@ -1,4 +1,4 @@
-// strandcast-ctl test: scenarios one after the other, with a line per check, and JUnit XML.
+// strandcast-ctl test: runs scenarios in order, prints a line per check, and writes JUnit XML.
 #pragma once
 
 #include <filesystem>
@@ -18,7 +18,8 @@ struct TestOptions {
   bool renews_goldens = false;
 };
 
-/// Exit code: 0 all holds, 1 something does not, 2 a file is wrong or there is no server.
+/// Runs the scenarios. Exit code: 0 = all checks hold, 1 = a check fails, 2 = a file is wrong or there is no
+/// server.
 int run_test(const CtlTarget& target, const TestOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace strandcast

@@ -1,8 +1,8 @@
-// What the core's errors use of fmt, where the core is WebAssembly: there fmt would take a fifth of the
-// module. The same words come out (tests/web/as_native.sh compares them): of texts, integers ({}, {:#x},
-// {:04x}) and floating point ({},
-// {:.3g}), whose digits the script finds that loads the module (client/web/strand_core.mjs). Formats are the
-// code's own and were checked where fmt compiled them.
+// Replacement for the parts of fmt that the core's errors use, for WebAssembly, where fmt would take a fifth
+// of the module. It gives the same text (tests/web/as_native.sh compares): strings, integers ({}, {:#x},
+// {:04x}) and floating point ({}, {:.3g}). The script that loads the module (client/web/strand_core.mjs)
+// computes the digits of floating-point numbers. Format strings are fixed in the code and were checked where
+// fmt compiled them.
 #pragma once
 
 #include <cstdint>
