@@ -1,14 +1,18 @@
-// strandcast-server: reads the command line, serves until a signal. Exit code 0 after a clean stop, 2 for bad
-// input.
+// strandcast-server: reads the command line, serves until a signal. Exit code 0 after a clean stop, 1 where
+// the simulation failed or a recording is not whole, 2 for bad input.
 #include <pthread.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
+#include <optional>
+#include <thread>
 
 #include "common/base/file.h"
+#include "common/base/output_file.h"
 #include "common/base/profile.h"
 #include "common/base/units.h"
 #include "common/client/client_token.h"
@@ -33,6 +37,7 @@ namespace {
 
 constexpr int kExitBadInput = 2;
 constexpr int kExitFailure = 1;
+constexpr int kExitEarly = 0;  // somebody wanted it to end
 constexpr long kPollNs = 100'000'000;
 /// Between two looks at what a service manager is told.
 constexpr int64_t kServiceNs = 500'000'000;
@@ -56,6 +61,39 @@ sigset_t handled_signals() {
   sigaddset(&signals, SIGHUP);
   return signals;
 }
+
+/// Ends the program at a signal that comes before the server has begun to wait for them: a scene takes long
+/// to be built, and a pipe is read for ever.
+class EarlyEnd {
+ public:
+  EarlyEnd() : thread_([this] { run(); }) {}
+  ~EarlyEnd() { stop(); }
+  EarlyEnd(const EarlyEnd&) = delete;
+  EarlyEnd& operator=(const EarlyEnd&) = delete;
+
+  /// From now on signals wait for somebody else.
+  void stop() {
+    is_over_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+
+ private:
+  void run() {
+    sigset_t signals;
+    sigemptyset(&signals);
+    sigaddset(&signals, SIGINT);
+    sigaddset(&signals, SIGTERM);
+    const timespec poll{0, kPollNs / 5};
+    while (!is_over_) {
+      if (sigtimedwait(&signals, nullptr, &poll) < 0) continue;
+      tell("stopped before it served");
+      std::_Exit(kExitEarly);
+    }
+  }
+
+  std::atomic<bool> is_over_{false};
+  std::thread thread_;
+};
 
 int explain_head(const ServerOptions& options, ServerConfig config) {
   const Result<SceneContent> content = load_scene_content(config.scene);
@@ -152,10 +190,18 @@ Status write_port(const std::filesystem::path& path, uint16_t port) {
   return save_file(path, std::as_bytes(std::span(text)));
 }
 
+/// From all lines on standard error.
+void hide(const std::vector<AccessToken>& tokens) {
+  std::vector<std::string> secrets;
+  for (const AccessToken& token : tokens) secrets.push_back(token.secret);
+  hide_in_lines(secrets);
+}
+
 /// The tokens of the file; new ones are shown on the terminal, this once.
 Result<std::vector<AccessToken>> load_tokens(const ServerOptions& options) {
   if (options.token_path.empty()) return std::vector<AccessToken>{};
   ASSIGN_OR_RETURN(TokenFile file, open_token_file(options.token_path));
+  hide(file.tokens);
   if (file.is_new) {
     fmt::print("New tokens, stored in {} and shown this once:\n{}", options.token_path.string(),
                to_text(file.tokens));
@@ -171,6 +217,7 @@ void reload_tokens(Served& server, const std::filesystem::path& path) {
   if (!std::filesystem::exists(path, failure))
     return log_error("app", "the old tokens stay: there is no file {}", path.string());
   auto file = open_token_file(path);
+  if (file) hide(file->tokens);
   const Status status = file ? server.set_tokens(std::move(file->tokens)) : Status(file.error());
   if (!status) return log_error("app", "the old tokens stay: {}", status.error().to_string());
   log_info("app", "tokens read again: who joins needs one of them, and sessions without one end");
@@ -263,6 +310,12 @@ int run_until_end(Served& server, const ServerOptions& options, const NetConfig&
     tell(failure->to_string());
     return kExitFailure;
   }
+  if constexpr (requires { server.recording_failure(); }) {
+    if (const std::optional<Error> lost = server.recording_failure()) {
+      tell(fmt::format("the recording is not whole: {}", lost->to_string()));
+      return kExitFailure;
+    }
+  }
   return 0;
 }
 
@@ -275,16 +328,17 @@ Status prepare(const ServerOptions& options, NetConfig& net) {
 }
 
 /// The signals are blocked in every thread.
-int serve(const ServerOptions& options, ServerConfig config) {
+int serve(const ServerOptions& options, ServerConfig config, EarlyEnd& early_end) {
   ServiceManager service = ServiceManager::of_environment();
   if (const Status status = prepare(options, config.net); !status) return fail(status.error());
   auto server = Server::start(config);
   if (!server) return fail(server.error());
+  early_end.stop();
   return run_until_end(**server, options, config.net,
                        fmt::format("Serving '{}'", names_of_heads(config.scene)), service);
 }
 
-int relay(const ServerOptions& options) {
+int relay(const ServerOptions& options, EarlyEnd& early_end) {
   ServiceManager service = ServiceManager::of_environment();
   RelayConfig config{options.config.net, {}};
   const UpstreamOptions& upstream = *options.upstream;
@@ -292,11 +346,13 @@ int relay(const ServerOptions& options) {
   if (!upstream.token_path.empty()) {
     auto token = load_token(upstream.token_path, Role::Viewer);
     if (!token) return fail(token.error());
+    hide_in_lines({*token});
     config.upstream.token = std::move(token).value();
   }
   if (const Status status = prepare(options, config.net); !status) return fail(status.error());
   auto relay = Relay::start(config);
   if (!relay) return fail(relay.error());
+  early_end.stop();
   return run_until_end(**relay, options, config.net, "Relaying " + upstream.address.to_string(), service);
 }
 
@@ -310,20 +366,25 @@ int run(int argc, const char* const* argv) {
   if (!options->replay_path.empty()) return replay_command(*options);
   const bool is_serving = !options->is_printing_scene && !options->is_explaining && !options->is_checking;
   const sigset_t signals = handled_signals();
-  if (is_serving) pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  if (options->upstream) return relay(*options);
+  std::optional<EarlyEnd> early_end;
+  if (is_serving) {
+    pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+    early_end.emplace();
+  }
+  if (options->upstream) return relay(*options, *early_end);
   const Result<ServerConfig> config = load_config(*options);
   if (!config) return fail(config.error());
   if (options->is_printing_scene) return fmt::print("{}", to_text(config->scene)), 0;
   if (options->is_checking) return check_command(*options, *config);
   if (options->is_explaining) return explain_command(*options, *config);
-  return serve(*options, *config);
+  return serve(*options, *config, *early_end);
 }
 
 }  // namespace
 }  // namespace strandcast
 
 int main(int argc, char** argv) {
+  strandcast::open_standard_files();
   try {
     return strandcast::run(argc, argv);
   } catch (const std::exception& exception) {

@@ -7,6 +7,7 @@
 #include "client/app/ctl_table.h"
 #include "client/app/stop_signal.h"
 #include "client/app/view_options.h"
+#include "common/base/output_file.h"
 #include "common/base/version.h"
 #include "common/log/log.h"
 
@@ -90,6 +91,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  open_standard_files();
   try {
     return run(argc, argv);
   } catch (const std::exception& failure) {

@@ -135,6 +135,9 @@ int run_recover(const std::filesystem::path& from, std::filesystem::path to) {
   if (!recovery) return ctl_failure(recovery.error());
   std::cout << fmt::format("{}: {} chunks kept, {} damaged ones left out, {} bytes cut off\n", to.string(),
                            recovery->kept_chunks, recovery->left_out_chunks, recovery->cut_bytes);
+  if (recovery->left_out_frames > 0)
+    std::cout << fmt::format("{} frames left out that cannot be decoded without them\n",
+                             recovery->left_out_frames);
   std::cout << check_text(recovery->check) << '\n';
   print_problems(recovery->check);
   return recovery->check.is_sound() ? kDoneExit : kRefusedExit;

@@ -10,6 +10,7 @@
 #include "client/app/view_options.h"
 #include "client/app/view_report.h"
 #include "client/app/windowed_view.h"
+#include "common/base/output_file.h"
 #include "common/log/log.h"
 
 namespace {
@@ -63,6 +64,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  open_standard_files();
   try {
     return run(argc, argv);
   } catch (const std::exception& failure) {

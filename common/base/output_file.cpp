@@ -1,6 +1,10 @@
 #include "common/base/output_file.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <system_error>
 #include <utility>
@@ -64,6 +68,11 @@ Status OutputFile::finish() {
                             : fail("cannot be written");
   std::filesystem::remove(part_, failure);
   return failed;
+}
+
+void open_standard_files() {
+  for (const int file : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(file, F_GETFD) < 0 && ::open("/dev/null", O_RDWR) < 0) std::abort();
 }
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
 // OutputFile: a file that is written piece by piece, however large, and is there under its name only once it
-// is whole. One thread.
+// is whole. One thread. And what the files of a program must not be.
 #pragma once
 
 #include <cstdint>
@@ -39,5 +39,9 @@ class OutputFile {
   std::FILE* file_;
   uint64_t size_bytes_ = 0;
 };
+
+/// Opens /dev/null where standard input, output or error is closed: else the next file has that number, and
+/// what the program prints is written into it. The first call in main().
+void open_standard_files();
 
 }  // namespace strandcast

@@ -6,13 +6,44 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <string>
+#include <mutex>
+#include <set>
 
 namespace strandcast {
 
 static_assert(kMaxLogLineBytes <= PIPE_BUF);
 
-void LineWriter::write(std::string_view line) {
+namespace {
+
+struct HiddenTexts {
+  std::mutex mutex;
+  std::set<std::string> texts;
+};
+HiddenTexts& hidden() {
+  static HiddenTexts texts;
+  return texts;
+}
+
+}  // namespace
+
+void hide_in_lines(const std::vector<std::string>& secrets) {
+  const std::lock_guard lock(hidden().mutex);
+  for (const std::string& secret : secrets)
+    if (!secret.empty()) hidden().texts.insert(secret);
+}
+
+std::string without_secrets(std::string_view text) {
+  constexpr std::string_view kHidden = "(token)";
+  std::string shown(text);
+  const std::lock_guard lock(hidden().mutex);
+  for (const std::string& secret : hidden().texts)
+    for (size_t place = shown.find(secret); place != std::string::npos; place = shown.find(secret, place))
+      shown.replace(place, secret.size(), kHidden), place += kHidden.size();
+  return shown;
+}
+
+void LineWriter::write(std::string_view given) {
+  const std::string line = without_secrets(given);
   const uint64_t untold = dropped_ - told_;
   if (untold > 0) {
     if (!write_now(fmt::format("{} lines are missing here: nobody read the log\n", untold))) {
@@ -22,10 +53,9 @@ void LineWriter::write(std::string_view line) {
     told_ += untold;
   }
   constexpr std::string_view kCut = "...\n";
-  const bool is_written =
-      line.size() <= kMaxLogLineBytes
-          ? write_now(line)
-          : write_now(std::string(line.substr(0, kMaxLogLineBytes - kCut.size())) + std::string(kCut));
+  const bool is_written = line.size() <= kMaxLogLineBytes
+                              ? write_now(line)
+                              : write_now(line.substr(0, kMaxLogLineBytes - kCut.size()) + std::string(kCut));
   if (!is_written) ++dropped_;
 }
 

@@ -5,12 +5,20 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace strandcast {
 
 /// Longest line with its end. A pipe that has room at all takes as much at once (PIPE_BUF).
 inline constexpr size_t kMaxLogLineBytes = 4'096;
+
+/// From now on all lines of the process have "(token)" in place of each of these: strangers put them into a
+/// path, a name or an assignment. Earlier ones stay hidden. Any thread.
+void hide_in_lines(const std::vector<std::string>& secrets);
+/// The text without them.
+std::string without_secrets(std::string_view text);
 
 class LineWriter {
  public:

@@ -109,7 +109,8 @@ bool is_logged(LogLevel level) {
 
 void log_line(LogLevel level, const char* tag, std::string_view message) {
   if (!is_logged(level)) return;
-  const std::string line = one_line(message, kMaxLogMessageChars);
+  // Before it is cut or quoted: half of a token is no less a secret.
+  const std::string line = one_line(without_secrets(message), kMaxLogMessageChars);
   if (format_of_lines == LogFormat::Json)
     spdlog::log(spdlog_level(level), "\"tag\":\"{}\",\"message\":\"{}\"", tag, in_quotes(line));
   else

@@ -93,18 +93,29 @@ Status check_footer(const mcap::Footer& footer, uint64_t data_begin, uint64_t fo
   return {};
 }
 
-/// A chunk that the index names, if there is one.
-Status add_indexed(ByteSource& source, const mcap::ChunkIndex& index, uint64_t data_begin, uint64_t data_end,
+/// What an index is about.
+struct IndexedData {
+  uint64_t begin = 0;
+  uint64_t end = 0;
+  bool is_index_checked = false;  // by its CRC
+};
+
+/// A chunk that the index names, if there is one. An index with a CRC is believed where the head of a chunk
+/// says otherwise.
+Status add_indexed(ByteSource& source, const mcap::ChunkIndex& index, const IndexedData& data,
                    ChunkList& list) {
   const uint64_t offset = index.chunk_start_offset;
-  if (offset < data_begin || offset > data_end || index.chunk_length > data_end - offset)
+  if (offset < data.begin || offset > data.end || index.chunk_length > data.end - offset ||
+      index.chunk_length < mcap::kRecordHeadBytes)
     return make_error(ErrorCode::BadInput, "the index names a chunk of {} bytes at {}, outside of {} .. {}",
-                      index.chunk_length, offset, data_begin, data_end);
+                      index.chunk_length, offset, data.begin, data.end);
   if (!list.chunks.empty() && offset < list.chunks.back().offset + list.chunks.back().size_bytes)
     return make_error(ErrorCode::BadInput, "the index names a chunk at {} that overlaps the one before",
                       offset);
-  ASSIGN_OR_RETURN(const mcap::RecordHead head, head_at(source, offset, data_end));
-  if (head.opcode != mcap::Opcode::Chunk || head.content_bytes + mcap::kRecordHeadBytes != index.chunk_length)
+  const auto head = head_at(source, offset, data.end);
+  const bool is_there = head && head->opcode == mcap::Opcode::Chunk &&
+                        head->content_bytes + mcap::kRecordHeadBytes == index.chunk_length;
+  if (!is_there && !data.is_index_checked)
     return make_error(ErrorCode::BadInput, "the index names a chunk at {}, where there is none", offset);
   const auto& channels = index.message_index_offsets;
   const uint16_t channel = channels.empty()       ? kUnknownChannel
@@ -125,6 +136,7 @@ Status read_index(ByteSource& source, uint64_t data_begin, ChunkList& list) {
     return make_error(ErrorCode::BadInput, "the CRC of the index is {:08x}, and {:08x} was written",
                       crc32(bytes), footer.summary_crc);
   auto rest = std::span<const std::byte>(bytes).first(static_cast<size_t>(footer_at - footer.summary_start));
+  const IndexedData data{data_begin, footer.summary_start, footer.summary_crc != 0};
   while (!rest.empty()) {
     ASSIGN_OR_RETURN(const mcap::Record record, mcap::read_record(rest));
     rest = rest.subspan(record.size_bytes);
@@ -135,7 +147,7 @@ Status read_index(ByteSource& source, uint64_t data_begin, ChunkList& list) {
     }
     if (record.opcode == mcap::Opcode::ChunkIndex) {
       ASSIGN_OR_RETURN(const mcap::ChunkIndex index, mcap::read_chunk_index(record.content));
-      RETURN_IF_ERROR(add_indexed(source, index, data_begin, footer.summary_start, list));
+      RETURN_IF_ERROR(add_indexed(source, index, data, list));
     }
   }
   list.is_indexed = true;
@@ -196,6 +208,12 @@ Status walk(ByteSource& source, uint64_t data_begin, ChunkList& list) {
 }
 
 }  // namespace
+
+Status check_is_recording(ByteSource& source) {
+  ChunkList list;
+  ASSIGN_OR_RETURN([[maybe_unused]] const uint64_t data_begin, read_beginning(source, list));
+  return {};
+}
 
 Result<ChunkList> walk_chunks(ByteSource& source) {
   ChunkList list;

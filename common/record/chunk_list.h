@@ -36,6 +36,8 @@ struct ChunkList {
   uint32_t data_crc = 0;      // as said there; 0 = not
 };
 
+/// Whether it begins with the magic and a header of ours, or BadInput.
+Status check_is_recording(ByteSource& source);
 /// Begins with the magic and a header of ours, or BadInput.
 Result<ChunkList> list_chunks(ByteSource& source);
 /// Likewise, never by the index.

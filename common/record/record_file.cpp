@@ -1,6 +1,7 @@
 #include "common/record/record_file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -9,43 +10,90 @@
 #include <utility>
 
 #include "common/base/thread_name.h"
+#include "common/record/chunk_list.h"
 
 namespace strandcast {
 
-Result<std::unique_ptr<RecordFile>> RecordFile::make(const std::filesystem::path& path,
-                                                     IfPresent if_present) {
-  constexpr mode_t kMode = 0640;  // who connected is in it
-  int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode);
-  const bool is_new = file >= 0;
-  if (!is_new && errno == EEXIST) {
-    if (if_present == IfPresent::Refuse)
-      return at(path.string(), make_error(ErrorCode::BadInput,
-                                          "the file is there already: name another one, or say "
-                                          "--record-replace"));
-    file = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
-  }
-  if (file < 0)
-    return at(path.string(), make_error(ErrorCode::NotFound, "cannot be written: {}", std::strerror(errno)));
-  struct stat info {};
-  if (::fstat(file, &info) != 0 || !S_ISREG(info.st_mode)) {
-    ::close(file);
-    return at(path.string(), make_error(ErrorCode::BadInput, "not a regular file"));
-  }
-  return std::unique_ptr<RecordFile>(new RecordFile(file, path, is_new));
+namespace {
+
+constexpr mode_t kMode = 0640;  // who connected is in it
+
+/// One program writes into a recording. Where files cannot be locked, nobody is kept out.
+bool is_locked_by_another(int file) {
+  return ::flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
 }
 
-RecordFile::RecordFile(int file, std::filesystem::path path, bool is_new)
-    : file_(file), path_(std::move(path)), is_new_(is_new) {}
+Error locked() {
+  return make_error(ErrorCode::BadInput, "another program records into it");
+}
+
+/// What stands where the recording is to be: it stays open, and locked, until the new one bears its name.
+Result<int> hold_present(const std::filesystem::path& path, IfPresent if_present) {
+  // A device or a pipe is never opened: that could wait for another program.
+  struct stat present {};
+  if (::stat(path.c_str(), &present) != 0 || !S_ISREG(present.st_mode))
+    return make_error(ErrorCode::BadInput, "not a regular file");
+  if (if_present == IfPresent::Refuse && present.st_size > 0)
+    return make_error(ErrorCode::BadInput,
+                      "the file is there already: name another one, or say --record-replace");
+  const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NONBLOCK);
+  if (file < 0) return make_error(ErrorCode::NotFound, "cannot be written: {}", std::strerror(errno));
+  Status status;
+  if (is_locked_by_another(file)) status = locked();
+  if (status && present.st_size > 0) {
+    const auto source = open_byte_source(path);
+    const Status is_recording = source ? check_is_recording(**source) : Status(source.error());
+    if (!is_recording)
+      status =
+          make_error(ErrorCode::BadInput, "only a recording is replaced: {}", is_recording.error().message);
+  }
+  if (status) return file;
+  ::close(file);
+  return status.error();
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RecordFile>> RecordFile::make(const std::filesystem::path& path,
+                                                     IfPresent if_present) {
+  int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode);
+  if (file >= 0) {
+    ::flock(file, LOCK_EX | LOCK_NB);
+    return std::unique_ptr<RecordFile>(new RecordFile({file, kNoFile}, path, path));
+  }
+  if (errno != EEXIST)
+    return at(path.string(), make_error(ErrorCode::NotFound, "cannot be written: {}", std::strerror(errno)));
+  const auto present = hold_present(path, if_present);
+  if (!present) return at(path.string(), present.error());
+  std::filesystem::path part = path;
+  part += ".part";
+  file = ::open(part.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, kMode);
+  if (file >= 0 && !is_locked_by_another(file))
+    return std::unique_ptr<RecordFile>(new RecordFile({file, *present}, path, part));
+  const Error error =
+      file < 0 ? make_error(ErrorCode::NotFound, "cannot be written: {}", std::strerror(errno)) : locked();
+  if (file >= 0) ::close(file);
+  ::close(*present);
+  return at(path.string(), error);
+}
+
+RecordFile::RecordFile(Files files, std::filesystem::path path, std::filesystem::path first_path)
+    : file_(files.written),
+      present_(files.present),
+      path_(std::move(path)),
+      first_path_(std::move(first_path)) {}
 
 RecordFile::~RecordFile() {
   finish();
+  if (!is_kept_) ::unlink(first_path_.c_str());
   ::close(file_);
-  if (!is_kept_ && is_new_) ::unlink(path_.c_str());
+  if (present_ != kNoFile) ::close(present_);
 }
 
 void RecordFile::keep() {
   is_kept_ = true;
-  if (::ftruncate(file_, 0) != 0) {
+  const bool is_named = first_path_ == path_ || ::rename(first_path_.c_str(), path_.c_str()) == 0;
+  if (!is_named || ::ftruncate(file_, 0) != 0) {
     const std::lock_guard lock(mutex_);
     failure_ = make_error(ErrorCode::Unavailable, "{}", std::strerror(errno));
   }

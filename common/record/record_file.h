@@ -24,10 +24,11 @@ enum class IfPresent { Refuse, Replace };
 
 class RecordFile : public mcap::ByteSink {
  public:
-  /// Makes the file. BadInput where it is there and may not be replaced; NotFound or Unavailable where it
-  /// cannot be written. What it held stays until keep().
+  /// Makes the file, locked. BadInput where it is there and may not be replaced, is none of ours or another
+  /// program writes it; NotFound or Unavailable where it cannot be written. An empty file is as good as none.
+  /// What was there keeps its name until keep().
   static Result<std::unique_ptr<RecordFile>> make(const std::filesystem::path& path, IfPresent if_present);
-  /// finish(); a file that was not kept is as it was, or gone if it is new.
+  /// finish(); a file that was not kept is gone, and what was there is as it was.
   ~RecordFile() override;
   RecordFile(const RecordFile&) = delete;
   RecordFile& operator=(const RecordFile&) = delete;
@@ -44,13 +45,19 @@ class RecordFile : public mcap::ByteSink {
   std::optional<Error> failure() const;
 
  private:
-  RecordFile(int file, std::filesystem::path path, bool is_new);
+  static constexpr int kNoFile = -1;
+  struct Files {
+    int written = kNoFile;
+    int present = kNoFile;  // that is replaced; open so that nobody else replaces it too
+  };
+  RecordFile(Files files, std::filesystem::path path, std::filesystem::path first_path);
   void run();
   Status write(const mcap::Bytes& bytes);
 
   const int file_;
+  const int present_;
   const std::filesystem::path path_;
-  const bool is_new_;
+  const std::filesystem::path first_path_;  // its name until keep()
   bool is_kept_ = false;
 
   mutable std::mutex mutex_;  // guards the block below

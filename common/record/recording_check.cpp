@@ -132,7 +132,10 @@ class ItemCheck {
 };
 
 Status check_items(RecordingReader& reader, RecordingCheck& check) {
-  ASSIGN_OR_RETURN(auto decoder, make_recorded_decoder(reader));
+  std::unique_ptr<StrandDecoder> decoder;
+  if (reader.asset_frame() != nullptr) {
+    ASSIGN_OR_RETURN(decoder, make_recorded_decoder(reader));
+  }
   ItemCheck items(reader.start().codec, std::move(decoder), check);
   while (true) {
     const auto item = reader.next();
@@ -281,8 +284,14 @@ void note_starts(const RecordingStart& a, const RecordingStart& b, RecordingComp
 Result<RecordingCheck> check_recording(ByteSource& source) {
   RecordingCheck check;
   RETURN_IF_ERROR(check_file(source, check));
-  ASSIGN_OR_RETURN(const auto reader, RecordingReader::open(std::make_unique<BorrowedSource>(source)));
-  RETURN_IF_ERROR(check_items(*reader, check));
+  auto reader = RecordingReader::open(std::make_unique<BorrowedSource>(source));
+  if (!reader) {
+    const Error no_strands = reader.error();
+    reader = RecordingReader::open(std::make_unique<BorrowedSource>(source), RecordedPart::Messages);
+    if (!reader) return no_strands;
+    add_problem(check, fmt::format("inputs and steps can be read, strands cannot: {}", no_strands.message));
+  }
+  RETURN_IF_ERROR(check_items(**reader, check));
   return check;
 }
 

@@ -42,11 +42,13 @@ Result<RecordingCheck> check_recording(ByteSource& source);
 struct Recovery {
   uint64_t kept_chunks = 0;
   uint64_t left_out_chunks = 0;  // damaged
+  uint64_t left_out_frames = 0;  // sound, and lost what they build on
   uint64_t cut_bytes = 0;        // at the end
   RecordingCheck check;          // of what was made
 };
 
-/// Makes `to` of all chunks of `from` that are sound, with an index, and checks it. `to` must not be there.
+/// Makes `to` of all chunks of `from` that are sound, with an index, and checks it. `to` must not be there,
+/// and bears its name when it is whole. Inputs and steps are kept where the hair is lost.
 Result<Recovery> recover_recording(const std::filesystem::path& from, const std::filesystem::path& to);
 
 struct RecordingComparison {

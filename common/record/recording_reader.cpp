@@ -58,7 +58,9 @@ class RecordingReader::State {
  private:
   Status sort_chunks(const ChunkList& list);
   Status read_start();
+  Result<RecordingStart> start_in(const ChunkPlace& place);
   Status read_asset();
+  Result<EncodedFramePtr> asset_in(const ChunkPlace& place);
   void find_last_time();
   Result<ChannelRole> find_role(const ChunkPlace& place);
   Status add_keyframe(const ChunkPlace& place);
@@ -96,7 +98,8 @@ Status RecordingReader::State::open() {
   for (const auto& [id, topic] : topics_) uses_.add(id, topic);
   RETURN_IF_ERROR(sort_chunks(list));
   RETURN_IF_ERROR(read_start());
-  RETURN_IF_ERROR(read_asset());
+  // Who reads no strands needs no hair: inputs and steps of a file whose asset is damaged can be had.
+  if (const Status read = read_asset(); !read && part_ != RecordedPart::Messages) return read;
   find_last_time();
   return seek(info.first_sim_time_ns);
 }
@@ -153,18 +156,16 @@ Status RecordingReader::State::sort_chunks(const ChunkList& list) {
   return {};
 }
 
-/// The first message of the first chunk.
+/// The first message of the first chunk; of one behind it, where that is damaged.
 Status RecordingReader::State::read_start() {
-  const Error missing =
-      make_error(ErrorCode::BadInput, "the recording was cut off before anything was in it");
-  if (messages_.chunks.empty()) return missing;
-  ASSIGN_OR_RETURN(const auto message, first_message(messages_.chunks.front()));
-  if (!message) return missing;
-  const ChannelUse found = uses_.of(message->channel_id);
-  if (found.role != ChannelRole::Message || found.kind != 0)
-    return make_error(ErrorCode::BadInput, "the recording does not begin with what it is of");
-  ASSIGN_OR_RETURN(RecordedMessage first, decode_recorded(found.kind, message->data));
-  start = std::get<RecordingStart>(std::move(first));
+  if (messages_.chunks.empty())
+    return make_error(ErrorCode::BadInput, "the recording was cut off before anything was in it");
+  auto found = start_in(messages_.chunks.front());
+  for (size_t i = messages_.chunks.size(); !found && i-- > 1;)
+    if (messages_.chunks[i].channel == messages_.chunks.front().channel)
+      if (auto again = start_in(messages_.chunks[i])) found = std::move(again);
+  if (!found) return found.error();
+  start = std::move(found).value();
   if (start.version != kRecordingVersion)
     return make_error(ErrorCode::Unsupported,
                       "the recording has version {} of the format, and this program reads {}: take the "
@@ -173,20 +174,41 @@ Status RecordingReader::State::read_start() {
   return {};
 }
 
+Result<RecordingStart> RecordingReader::State::start_in(const ChunkPlace& place) {
+  ASSIGN_OR_RETURN(const auto message, first_message(place));
+  if (!message) return make_error(ErrorCode::BadInput, "the recording was cut off before anything was in it");
+  const ChannelUse found = uses_.of(message->channel_id);
+  if (found.role != ChannelRole::Message || found.kind != 0)
+    return make_error(ErrorCode::BadInput, "the recording does not begin with what it is of");
+  ASSIGN_OR_RETURN(RecordedMessage first, decode_recorded(found.kind, message->data));
+  return std::get<RecordingStart>(std::move(first));
+}
+
+/// The first chunk of strands; the last one, where that is damaged.
 Status RecordingReader::State::read_asset() {
+  if (frames_.chunks.empty())
+    return make_error(ErrorCode::BadInput, "the recording was cut off before its hair was in it");
+  auto found = asset_in(frames_.chunks.front());
+  if (!found) {
+    if (auto again = asset_in(frames_.chunks.back())) found = std::move(again);
+  }
+  if (!found) return found.error();
+  asset = std::move(found).value();
+  return {};
+}
+
+Result<EncodedFramePtr> RecordingReader::State::asset_in(const ChunkPlace& place) {
   const Error missing =
       make_error(ErrorCode::BadInput, "the recording was cut off before its hair was in it");
-  if (frames_.chunks.empty()) return missing;
-  ASSIGN_OR_RETURN(const auto message, first_message(frames_.chunks.front()));
+  ASSIGN_OR_RETURN(const auto message, first_message(place));
   if (!message || uses_.of(message->channel_id).role != ChannelRole::Asset) return missing;
   ASSIGN_OR_RETURN(const auto media, decode_media(message->data));
   ASSIGN_OR_RETURN(const FrameHeader header, unpack_frame_header(media));
   if (header.opcode != strandcast::Opcode::Asset) return missing;
   if (hash_bytes(media.subspan(kFrameHeaderBytes)) != start.asset_hash)
     return make_error(ErrorCode::BadInput, "the hair in the recording is not what its beginning says");
-  asset = std::make_shared<const EncodedFrame>(
-      EncodedFrame{header, std::vector<std::byte>(media.begin(), media.end())});
-  return {};
+  return EncodedFramePtr(std::make_shared<const EncodedFrame>(
+      EncodedFrame{header, std::vector<std::byte>(media.begin(), media.end())}));
 }
 
 Result<RecordedFrame> RecordingReader::State::frame_of(const ChunkItem& item) const {
@@ -207,13 +229,19 @@ Result<RecordedFrame> RecordingReader::State::frame_of(const ChunkItem& item) co
 void RecordingReader::State::find_last_time() {
   if (!keyframes_.empty()) info.first_sim_time_ns = keyframes_.front().sim_time_ns;
   info.last_sim_time_ns = keyframes_.empty() ? 0 : keyframes_.back().sim_time_ns;
-  if (frames_.chunks.size() < 2) return;
-  const auto chunk = load_chunk(*source_, frames_.chunks.back());
-  if (!chunk) return;
-  const ChunkItems found = items_of(chunk->records, uses_);
-  for (const ChunkItem& item : found.items)
-    if (const auto last = frame_of(item))
-      info.last_sim_time_ns = std::max(info.last_sim_time_ns, last->frame->header.sim_time_ns);
+  // Behind the last frames stands the asset once more.
+  for (size_t i = frames_.chunks.size(); i-- > 1;) {
+    const auto chunk = load_chunk(*source_, frames_.chunks[i]);
+    if (!chunk) return;
+    const ChunkItems found = items_of(chunk->records, uses_);
+    bool has_frames = false;
+    for (const ChunkItem& item : found.items) {
+      const auto last = frame_of(item);
+      has_frames = has_frames || last;
+      if (last) info.last_sim_time_ns = std::max(info.last_sim_time_ns, last->frame->header.sim_time_ns);
+    }
+    if (has_frames) return;
+  }
 }
 
 void RecordingReader::State::count(const ChunkPlace& place, RecordingContents& contents) const {
@@ -340,6 +368,7 @@ const EncodedFramePtr& RecordingReader::asset_frame() const {
   return state_->asset;
 }
 Result<SceneAsset> RecordingReader::asset() const {
+  if (state_->asset == nullptr) return make_error(ErrorCode::BadInput, "the recording's hair is damaged");
   return decode_scene_asset(std::span<const std::byte>(state_->asset->message).subspan(kFrameHeaderBytes));
 }
 RecordingContents RecordingReader::contents() const {

@@ -73,8 +73,9 @@ class RecordingReader {
   const RecordingStart& start() const;
   const RecordingInfo& info() const;
   /// What viewers got once: topology, strands at rest, the head. The Asset message whole, header in front.
+  /// Null where it is damaged and Messages are read.
   const EncodedFramePtr& asset_frame() const;
-  /// The same, decoded. Its payload's hash is checked against start().asset_hash.
+  /// The same, decoded, or BadInput. Its payload's hash is checked against start().asset_hash.
   Result<SceneAsset> asset() const;
 
   /// Reads all of the file; next() goes on where it was.

@@ -2,10 +2,14 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
+#include <optional>
+#include <system_error>
 #include <utility>
 
 #include "common/base/version.h"
+#include "common/record/chunk_items.h"
 #include "common/record/chunk_list.h"
 #include "common/record/mcap_writer.h"
 #include "common/record/recording_check.h"
@@ -51,44 +55,140 @@ Status check_channels(const ChunkList& list) {
   return {};
 }
 
-Status copy_chunks(ByteSource& source, const ChunkList& list, SyncSink& sink, Recovery& recovery) {
-  mcap::McapWriter writer(sink, {kRecordingProfile, fmt::format("strandcast {} recover", version())},
-                          recording_schemas(), recording_channels());
-  for (const ChunkPlace& place : list.chunks) {
-    auto loaded = load_chunk(source, place);
-    auto body = loaded ? chunk_body_of(std::move(loaded->records)) : Result<mcap::ChunkBody>(loaded.error());
-    if (!body) {
-      ++recovery.left_out_chunks;
-      continue;
-    }
-    const mcap::Bytes& stored = loaded->compression.empty() ? body->records : loaded->stored;
-    if (!writer.write(*body, stored, loaded->compression, true)) return sink.status();
-    ++recovery.kept_chunks;
-  }
-  writer.finish();
-  return sink.status();
+/// A chunk that can be written again as it stands.
+struct SoundChunk {
+  LoadedChunk loaded;
+  mcap::ChunkBody body;
+};
+
+Result<SoundChunk> load_sound(ByteSource& source, const ChunkPlace& place) {
+  SoundChunk chunk;
+  ASSIGN_OR_RETURN(chunk.loaded, load_chunk(source, place));
+  ASSIGN_OR_RETURN(chunk.body, chunk_body_of(std::move(chunk.loaded.records)));
+  return chunk;
 }
+
+/// Only of this channel.
+bool is_of(const mcap::ChunkBody& body, uint16_t channel) {
+  return body.index.size() == 1 && body.index.contains(channel);
+}
+
+/// Copies chunks, what the recording is of first and last, and leaves frames out that lost what they build
+/// on.
+class ChunkCopy {
+ public:
+  ChunkCopy(ByteSource& source, const ChunkList& list, SyncSink& sink, Recovery& recovery)
+      : source_(source),
+        list_(list),
+        recovery_(recovery),
+        writer_(sink, {kRecordingProfile, fmt::format("strandcast {} recover", version())},
+                recording_schemas(), recording_channels()) {
+    for (const auto& [id, topic] : list.topics) uses_.add(id, topic);
+  }
+
+  void run() {
+    const auto start = first_sound(kStartChannel);
+    const auto asset = first_sound(kAssetChannel);
+    const auto put_what_it_is_of = [&] {
+      if (start) put(*start);
+      if (asset) put(*asset);
+    };
+    put_what_it_is_of();
+    for (const ChunkPlace& place : list_.chunks) copy(place, asset.has_value());
+    put_what_it_is_of();
+    writer_.finish();
+  }
+
+ private:
+  static constexpr uint16_t kStartChannel = 1;
+
+  void put(const SoundChunk& chunk) {
+    const mcap::Bytes& stored = chunk.loaded.compression.empty() ? chunk.body.records : chunk.loaded.stored;
+    writer_.write(chunk.body, stored, chunk.loaded.compression, true);
+  }
+
+  std::optional<SoundChunk> first_sound(uint16_t channel) {
+    for (const ChunkPlace& place : list_.chunks) {
+      if (place.channel != channel && place.channel != kUnknownChannel) continue;
+      auto chunk = load_sound(source_, place);
+      if (chunk && is_of(chunk->body, channel)) return std::move(chunk).value();
+    }
+    return std::nullopt;
+  }
+
+  void copy(const ChunkPlace& place, bool has_asset) {
+    const auto chunk = load_sound(source_, place);
+    if (!chunk) {
+      ++recovery_.left_out_chunks;
+      return;
+    }
+    const bool has_frames = is_of(chunk->body, kKeyframeChannel) || is_of(chunk->body, kDeltaChannel);
+    if (has_frames && !(has_asset && follows(chunk->body))) {
+      recovery_.left_out_frames += items_of(chunk->body.records, uses_).items.size();
+      return;
+    }
+    ++recovery_.kept_chunks;
+    // These two were written before all else.
+    if (!is_of(chunk->body, kStartChannel) && !is_of(chunk->body, kAssetChannel)) put(*chunk);
+  }
+
+  /// Whether these frames can be decoded after those that were copied.
+  bool follows(const mcap::ChunkBody& body) {
+    const ChunkItems found = items_of(body.records, uses_);
+    bool is_first = true;
+    for (const ChunkItem& item : found.items) {
+      auto media = std::span<const std::byte>(item.bytes);
+      if (item.channel == kKeyframeChannel) {
+        const auto decoded = decode_media(item.bytes);
+        if (!decoded) return false;
+        media = *decoded;
+      }
+      const auto header = unpack_frame_header(media);
+      if (!header) return false;
+      const bool is_keyframe = header->opcode == Opcode::StrandKeyframe;
+      if (is_first && !is_keyframe && header->base_sequence != newest_sequence_) return false;
+      is_first = false;
+      newest_sequence_ = header->sequence;
+    }
+    return !is_first;
+  }
+
+  ByteSource& source_;
+  const ChunkList& list_;
+  Recovery& recovery_;
+  mcap::McapWriter writer_;
+  ChannelUses uses_;
+  uint32_t newest_sequence_ = 0;  // of the frames that were copied
+};
 
 }  // namespace
 
 Result<Recovery> recover_recording(const std::filesystem::path& from, const std::filesystem::path& to) {
   ASSIGN_OR_RETURN(const auto source, open_byte_source(from));
-  const auto list = walk_chunks(*source);
+  const auto list = list_chunks(*source);
   if (!list) return at(from.string(), list.error());
   if (const Status status = check_channels(*list); !status) return at(from.string(), status.error());
+  if (std::error_code error; std::filesystem::exists(std::filesystem::symlink_status(to, error)))
+    return at(to.string(), make_error(ErrorCode::BadInput, "the file is there already: name another one"));
+  // Written beside it: what bears the name is whole.
+  std::filesystem::path part = to;
+  part += ".part";
   constexpr mode_t kMode = 0640;
-  const int file = ::open(to.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode);
+  const int file = ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, kMode);
   if (file < 0)
     return at(to.string(), make_error(ErrorCode::BadInput, "cannot be made: {}", std::strerror(errno)));
   Recovery recovery;
   recovery.cut_bytes = list->cut_bytes;
   SyncSink sink(file);
-  const Status written = copy_chunks(*source, *list, sink, recovery);
+  ChunkCopy(*source, *list, sink, recovery).run();
+  const Status written = sink.status();
   const bool is_closed = ::close(file) == 0;
-  if (!written || !is_closed) {
-    ::unlink(to.c_str());
-    return at(to.string(),
-              written ? make_error(ErrorCode::Unavailable, "cannot be written") : written.error());
+  if (!written || !is_closed || ::rename(part.c_str(), to.c_str()) != 0) {
+    const Error failure =
+        written ? make_error(ErrorCode::Unavailable, "cannot be written: {}", std::strerror(errno))
+                : written.error();
+    ::unlink(part.c_str());
+    return at(to.string(), failure);
   }
   ASSIGN_OR_RETURN(recovery.check, check_recording(to));
   return recovery;

@@ -50,12 +50,18 @@ std::vector<mcap::Schema> recording_schemas() {
 
 RecordingWriter::RecordingWriter(mcap::ByteSink& sink, RecordingStart start, const EncodedFrame& asset)
     : start_(std::move(start)),
+      asset_(encode_media(asset.message)),
       file_(sink, {kRecordingProfile, fmt::format("strandcast {}", version())}, recording_schemas(),
             recording_channels()),
       newest_ns_(start_.server_time_ns) {
-  add(start_.server_time_ns, 0, start_);
+  put_what_it_is_of(0);
+}
+
+/// What no frame and no step can do without, in chunks of its own.
+void RecordingWriter::put_what_it_is_of(int64_t sim_time_ns) {
+  add(newest_ns_, sim_time_ns, start_);
   close_messages();
-  put(frames_, {kAssetChannel, start_.server_time_ns, 0}, encode_media(asset.message));
+  put(frames_, {kAssetChannel, newest_ns_, sim_time_ns}, asset_);
   close_frames();
 }
 
@@ -148,6 +154,7 @@ void RecordingWriter::flush() {
 
 void RecordingWriter::finish() {
   flush();
+  put_what_it_is_of(newest_sim_ns_);
   file_.finish();
 }
 

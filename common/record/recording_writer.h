@@ -27,7 +27,8 @@ class RecordingWriter {
   void add(int64_t time_ns, const EncodedFrame& frame);
   /// All that was added is given to the sink, as far as it takes it.
   void flush();
-  /// Likewise, and the index. Nothing can be added after.
+  /// Likewise, then start and asset once more, where damage to the first ones would cost all, and the index.
+  /// Nothing can be added after.
   void finish();
 
   uint64_t size_bytes() const { return file_.size_bytes(); }
@@ -56,8 +57,10 @@ class RecordingWriter {
   bool close(Part& part, bool is_vital);
   void close_frames();
   void close_messages();
+  void put_what_it_is_of(int64_t sim_time_ns);
 
   const RecordingStart start_;
+  const mcap::Bytes asset_;  // as a message
   mcap::McapWriter file_;
   Part frames_;
   Part messages_;

@@ -111,6 +111,7 @@ struct ScenarioAction {
 
 struct Scenario {
   std::string name;
+  std::filesystem::path folder;  // of its file
   std::string about;
   double limit_s = 120.0;
   uint32_t repeat = 1;

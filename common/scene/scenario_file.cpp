@@ -4,9 +4,11 @@
 #include <google/protobuf/text_format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <iterator>
+#include <string_view>
 
 #include "common/base/check.h"
 #include "common/base/file.h"
@@ -205,6 +207,19 @@ std::string ScenarioReader::word_or_file(const Part& part, const char* name, con
   return (folder_ / given).lexically_normal().string();
 }
 
+/// Options of the server that write no file, open no port to others and load no code: who runs somebody's
+/// scenario runs no more than the scenario.
+constexpr std::array<std::string_view, 12> kScenarioOptions = {
+    "--sim-device",     "--renderer",     "--gl-device", "--frame-viewers",
+    "--viewer-mbit",    "--log-level",    "--mocap",     "--mocap-subject",
+    "--messages-per-s", "--max-sessions", "--idle-ms",   "--stalled-ms"};
+
+/// With or without a value behind '='.
+bool is_scenario_option(std::string_view word) {
+  return std::find(kScenarioOptions.begin(), kScenarioOptions.end(), word.substr(0, word.find('='))) !=
+         kScenarioOptions.end();
+}
+
 ScenarioStart ScenarioReader::read_start(const Part& part) const {
   constexpr size_t kMaxWords = 64;
   ScenarioStart start;
@@ -212,6 +227,10 @@ ScenarioStart ScenarioReader::read_start(const Part& part) const {
   start.overrides = part.texts("set", kMaxWords);
   start.is_lockstep = part.flag("lockstep");
   start.options = part.texts("option", kMaxWords);
+  for (const std::string& word : start.options)
+    if (word.starts_with('-') && !is_scenario_option(word))
+      part.fail("option",
+                fmt::format("is '{}', a scenario may give: {}", word, fmt::join(kScenarioOptions, ", ")));
   return start;
 }
 
@@ -373,6 +392,7 @@ ScenarioAction ScenarioReader::read_action(const Part& part) const {
 Scenario ScenarioReader::read(const Part& file) const {
   Scenario scenario;
   scenario.name = file.text("name", "", kMaxWordBytes);
+  scenario.folder = folder_;
   scenario.about = file.text("about", "", kMaxTextBytes);
   scenario.limit_s = file.number("limit_s", scenario.limit_s, kLimit);
   scenario.repeat = file.count("repeat", 1, kRepeat);

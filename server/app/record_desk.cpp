@@ -328,6 +328,12 @@ void RecordDesk::add(const ServerStatus& status) {
   recorder->add(status);
 }
 
+std::optional<Error> RecordDesk::failure() const {
+  const auto recorder = this->recorder();
+  if (recorder == nullptr || !recorder->failure()) return std::nullopt;
+  return at(recorder->path().string(), *recorder->failure());
+}
+
 std::optional<RecordCounters> RecordDesk::counters() const {
   const auto recorder = this->recorder();
   return recorder != nullptr ? std::optional(recorder->counters()) : std::nullopt;

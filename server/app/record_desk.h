@@ -86,6 +86,8 @@ class RecordDesk {
   void add(const ServerStatus& status);
   /// Returns the counters of the recording; empty if nothing is recorded.
   std::optional<RecordCounters> counters() const;
+  /// Why the recording in hand is not whole; nothing while all is well, or without one. Any thread.
+  std::optional<Error> failure() const;
 
  private:
   struct Order {

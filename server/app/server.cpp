@@ -73,6 +73,7 @@ class Server::State {
   uint16_t port() const { return net_->port(); }
   StreamHub& hub(size_t head) { return heads_[head]->hub(); }
   std::optional<Error> failure() const;
+  std::optional<Error> recording_failure() const;
   Status reload_tls() { return net_->reload_tls(); }
   Status set_tokens(std::vector<AccessToken> tokens) { return net_->set_tokens(std::move(tokens)); }
   bool is_shut_down_wanted() const;
@@ -98,6 +99,7 @@ class Server::State {
 };
 
 Status Server::State::start() {
+  RETURN_IF_ERROR(NetServer::check_port(config_.net));
   shared_workers();  // no nicer than this thread, as the one that draws is
   for (const ServerConfig& config : configs_of_heads(config_)) {
     ServedHead::OtherHeads others;
@@ -106,7 +108,6 @@ Status Server::State::start() {
     if (!head) return config_.scene.heads.empty() ? head.error() : at(config.scene.name, head.error());
     heads_.push_back(std::move(head).value());
   }
-  // The port first: a port in use is told at once, not after compiling shaders.
   RETURN_IF_ERROR(open_live());
   RETURN_IF_ERROR(listen());
   for (const auto& head : heads_) RETURN_IF_ERROR(head->start(*net_));
@@ -195,6 +196,13 @@ std::optional<Error> Server::State::failure() const {
   return std::nullopt;
 }
 
+std::optional<Error> Server::State::recording_failure() const {
+  for (const auto& head : heads_)
+    if (head->records() != nullptr)
+      if (auto failure = head->records()->failure()) return failure;
+  return std::nullopt;
+}
+
 bool Server::State::is_shut_down_wanted() const {
   return std::any_of(heads_.begin(), heads_.end(),
                      [](const auto& head) { return head->is_shut_down_wanted(); });
@@ -257,6 +265,9 @@ bool Server::is_shut_down_wanted() const {
 }
 std::optional<Error> Server::failure() const {
   return state_->failure();
+}
+std::optional<Error> Server::recording_failure() const {
+  return state_->recording_failure();
 }
 void Server::stop() {
   state_->stop();

@@ -97,6 +97,8 @@ class Server {
   bool is_shut_down_wanted() const;
   /// Returns why the simulation ended by itself; empty while it runs.
   std::optional<Error> failure() const;
+  /// Returns why a recording ended before the server did, for example a full disk; empty while it is whole.
+  std::optional<Error> recording_failure() const;
   /// Says goodbye to all viewers and ends all threads. Takes at most about net.limits.close_ms and one step.
   void stop();
   /// Returns after stop(), when an admin requests the shutdown, or when the simulation ends by itself.

@@ -44,6 +44,7 @@ struct NetServer::State {
       : context(config, heads), acceptor(context.io), sweep_timer(context.io), accept_timer(context.io) {}
 
   Status open();
+  Status claim();
   Result<net::tcp::endpoint> find_place();
   void open_port(const net::tcp::endpoint& place, error_code& error);
   void accept();
@@ -65,6 +66,7 @@ struct NetServer::State {
   net::asio::steady_timer accept_timer;
   int64_t accept_told_ns = 0;
   uint16_t port = 0;
+  bool is_trusted = false;  // who comes by loopback, without a token
   int64_t stop_deadline_ns = 0;
   std::atomic<bool> has_stopped{false};
   std::thread thread;
@@ -92,20 +94,14 @@ Result<net::tcp::endpoint> NetServer::State::find_place() {
                     "'{}' is no numeric address to listen on (such as 127.0.0.1 or 0.0.0.0)", config.address);
 }
 
-Status NetServer::State::open() {
+/// The port, where nobody else has it and who may come in is known by a token or by loopback.
+Status NetServer::State::claim() {
   const NetConfig& config = context.config;
   ASSIGN_OR_RETURN(const net::tcp::endpoint place, find_place());
   const std::string address = place.address().to_string();
-  const bool is_trusted = place.address().is_loopback() && config.loopback_trust == LoopbackTrust::Trusted &&
-                          config.trusted_proxies.empty();
+  is_trusted = place.address().is_loopback() && config.loopback_trust == LoopbackTrust::Trusted &&
+               config.trusted_proxies.empty();
   RETURN_IF_ERROR(check_listening(is_trusted, address, config.tokens));
-  if (config.tls) {
-    ASSIGN_OR_RETURN(context.tls, make_server_tls(*config.tls));
-  } else if (!is_trusted) {
-    log_warn("net",
-             "listening on {} without TLS: whoever is on the way can read tokens and frames (--tls-cert)",
-             address);
-  }
   error_code error;
   if (config.socket < 0) open_port(place, error);
   if (error == net::asio::error::address_in_use)
@@ -116,6 +112,19 @@ Status NetServer::State::open() {
     return make_error(ErrorCode::Unavailable, "cannot listen on {} port {}: {}", address, place.port(),
                       error.message());
   port = acceptor.local_endpoint(error).port();
+  return {};
+}
+
+Status NetServer::State::open() {
+  const NetConfig& config = context.config;
+  RETURN_IF_ERROR(claim());
+  if (config.tls) {
+    ASSIGN_OR_RETURN(context.tls, make_server_tls(*config.tls));
+  } else if (!is_trusted) {
+    log_warn("net",
+             "listening on {} without TLS: whoever is on the way can read tokens and frames (--tls-cert)",
+             config.address);
+  }
   return {};
 }
 
@@ -225,6 +234,11 @@ NetServer::NetServer(std::unique_ptr<State> state) : state_(std::move(state)) {}
 
 NetServer::~NetServer() {
   stop();
+}
+
+Status NetServer::check_port(const NetConfig& config) {
+  if (config.socket >= 0) return {};
+  return State(config, {}).claim();
 }
 
 Result<std::unique_ptr<NetServer>> NetServer::listen(const NetConfig& config, std::vector<NetHead> heads) {

@@ -59,6 +59,8 @@ struct NetHead {
 
 class NetServer {
  public:
+  /// Opens the port and closes it again: what listen() would refuse is told before a scene is built.
+  static Status check_port(const NetConfig& config);
   /// Opens the port; connections wait until start(). `heads`: who names none in the Hello gets the first,
   /// whose handler also answers for /metrics. Unavailable when the port is in use, BadInput for an address
   /// that is none, Unauthorized beyond loopback without a token.

@@ -231,6 +231,7 @@ void Recorder::write_frame(int64_t time_ns, const EncodedFramePtr& frame) {
 
 bool Recorder::is_keyframe_due(const FrameHeader& delta) const {
   if (keyframe_sim_ns_ == kNever || delta.sim_time_ns - keyframe_sim_ns_ < kRecordKeyframeNs) return false;
+  if (delta.sim_time_ns - keyframe_sim_ns_ >= kRecordMostKeyframeNs) return true;
   const auto steps = static_cast<double>(tick_ - std::min(keyframe_tick_, tick_));
   const auto frame_vertices = static_cast<double>(vertices_since_keyframe_);
   const double stepped_vertices = step_cost_ * steps * static_cast<double>(vertex_count_);

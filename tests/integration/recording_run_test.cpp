@@ -117,6 +117,26 @@ TEST_F(RecordedRun, IsSimulatedAgainBitForBit) {
   EXPECT_TRUE(notes_.empty()) << testing::PrintToString(notes_);
 }
 
+// A groom so small that decoding all of it takes nothing.
+TEST_F(RecordedRun, HasAKeyframeWithinFiveSeconds) {
+  ServerConfig recorded = config();
+  recorded.is_lockstep = true;
+  ASSERT_TRUE(start(recorded));
+  constexpr double kRunS = 12.0;
+  const auto count = static_cast<uint32_t>(kRunS * recorded.scene.step_rate_hz);
+  EXPECT_EQ(run_command(ctl_target(), ControlCommand{Command::StepOnce, count}), kDoneExit);
+  server_->stop();
+  server_.reset();
+  const auto reader = RecordingReader::open(path_);
+  ASSERT_TRUE(reader) << reader.error().to_string();
+  std::vector<int64_t> times_ns = (*reader)->info().keyframe_sim_time_ns;
+  times_ns.push_back((*reader)->info().last_sim_time_ns);
+  EXPECT_GE(times_ns.back(), static_cast<int64_t>(0.9 * kRunS * kNsPerS));
+  for (size_t i = 1; i < times_ns.size(); ++i)
+    EXPECT_LE(times_ns[i] - times_ns[i - 1], kRecordMostKeyframeNs + static_cast<int64_t>(0.2 * kNsPerS))
+        << "a keyframe comes a few frames after it was asked for";
+}
+
 TEST_F(RecordedRun, SaysWhoChangedWhatAndWhatCameIn) {
   record();
   if (IsSkipped()) return;

@@ -101,6 +101,24 @@ TEST_F(ScenarioProgram, TroubleEndsAScenarioAndIsAFailure) {
   EXPECT_THAT(text_of("said"), AllOf(HasSubstr("the server did not start"), HasSubstr("known: dftl")));
 }
 
+TEST_F(ScenarioProgram, PicturesAreRenewedBelowItsFolderOnly) {
+  std::filesystem::create_directories(folder_.path() / "mine");
+  std::filesystem::create_directory_symlink(folder_.path(), folder_.path() / "mine/link");
+  const auto path = write("mine/look.textproto",
+                          std::string("name: \"look\"\n") + kStart +
+                              "do { view { name: \"a\" width: 64 height: 48 } }\n"
+                              "do { step: 6 }\n"
+                              "do { expect { viewer: \"a\" picture { golden: \"golden/in.png\" } } }\n"
+                              "do { expect { viewer: \"a\" picture { golden: \"../out.png\" } } }\n"
+                              "do { expect { viewer: \"a\" picture { golden: \"link/out.png\" } } }\n");
+  EXPECT_EQ(run({"--scenario", path.string(), "--renew"}), 1) << text_of("said");
+  EXPECT_THAT(text_of("said"),
+              AllOf(HasSubstr("ok    line 5"), HasSubstr("FAIL  line 6"), HasSubstr("FAIL  line 7"),
+                    HasSubstr("does not lie below the scenario's folder")));
+  EXPECT_TRUE(std::filesystem::exists(folder_.path() / "mine/golden/in.png"));
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "out.png"));
+}
+
 TEST_F(ScenarioProgram, AWrongFileIsExitCodeTwoAndOneSentence) {
   const auto path = write("typo.textproto", "name: \"typo\"\ndo { stepp: 1 }\n");
   EXPECT_EQ(run({"--scenario", path.string()}), 2);

@@ -9,6 +9,7 @@
 #include "common/record/chunk_list.h"
 #include "tests/support/child_process.h"
 #include "tests/support/lacks_gl.h"
+#include "tests/support/raw_client.h"
 #include "tests/support/temporary_folder.h"
 
 namespace strandcast::secrets_test {
@@ -92,6 +93,12 @@ TEST_F(Secrets, AreNeverWritten) {
   EXPECT_EQ(ctl({"--token", good[0], "monitor", "--seconds", "0.2"}), 0) << client_output_;
   EXPECT_EQ(ctl({"--token", good[1], "kick", "12345"}), 1);
   EXPECT_EQ(ctl({"--token", good[1], "set", "substeps=2"}), 0) << client_output_;
+  // Where people and programs put one by mistake.
+  const auto port = static_cast<uint16_t>(std::stoi(connect_.substr(connect_.find(':') + 1)));
+  test::http_get(port, "/v1/" + good[0]);
+  test::http_get(port, "/healthz?token=" + good[1]);
+  EXPECT_TRUE(eventually([&] { return server_output().find("/v1/(token)") != std::string::npos; }))
+      << server_output();
   EXPECT_EQ(ctl({"--token-file", token_path_, "shutdown"}), 0) << client_output_;
   EXPECT_EQ(server->wait(), 0) << server_output();
 

@@ -5,6 +5,7 @@
 #include <netinet/in.h>
 #include <spawn.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -16,6 +17,7 @@
 #include <set>
 #include <sstream>
 
+#include "common/record/recording_check.h"
 #include "tests/support/eventually.h"
 #include "tests/support/lacks_gl.h"
 #include "tests/support/manager_socket.h"
@@ -152,6 +154,54 @@ TEST_F(ServerProgram, PrintsSolversSceneAndPlan) {
   EXPECT_THAT(out(), HasSubstr("scene/gusts        not requested"));
   EXPECT_THAT(out(), HasSubstr("Viewers of strands get step where"));
   EXPECT_THAT(out(), HasSubstr(", else tangent; "));
+}
+
+// A scene takes seconds to be built: what cannot be served is said before.
+TEST_F(ServerProgram, SaysThatThePortIsInUseBeforeItBuildsTheScene) {
+  const int listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in own{};
+  own.sin_family = AF_INET;
+  own.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof(own);
+  ASSERT_EQ(bind(listener, reinterpret_cast<const sockaddr*>(&own), size), 0);
+  ASSERT_EQ(listen(listener, 1), 0);
+  ASSERT_EQ(getsockname(listener, reinterpret_cast<sockaddr*>(&own), &size), 0);
+  EXPECT_EQ(run({"--port", std::to_string(ntohs(own.sin_port)), "--sim-device", "nonsense"}), 2);
+  EXPECT_THAT(err(), HasSubstr("is in use by another program"));
+  close(listener);
+}
+
+/// Whether a process handles SIGTERM by itself already.
+bool is_terminable(pid_t process) {
+  std::ifstream status(fmt::format("/proc/{}/status", process));
+  constexpr uint64_t kBit = uint64_t{1} << (SIGTERM - 1);
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with("SigBlk:")) return (std::stoull(line.substr(7), nullptr, 16) & kBit) != 0;
+  return false;
+}
+
+TEST_F(ServerProgram, EndsAtOnceWhileItStillReadsItsScene) {
+  const std::filesystem::path pipe = folder_.path() / "scene.textproto";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);  // nobody ever writes into it
+  const pid_t process = spawn({"--scene", pipe.string()});
+  ASSERT_TRUE(eventually([&] { return is_terminable(process); }));
+  ASSERT_EQ(kill(process, SIGTERM), 0);
+  EXPECT_EQ(wait(process), 0);
+  EXPECT_THAT(err(), HasSubstr("stopped before it served"));
+}
+
+TEST_F(ServerProgram, PrintsNothingIntoARecordingWhereItsOutputsAreClosed) {
+  const std::filesystem::path recording = folder_.path() / "run.mcap";
+  program_ = "/bin/sh";
+  const uint16_t port = serve({"-c", fmt::format("exec {} \"$@\" <&- >&- 2>&-", STRANDCAST_SERVER_PROGRAM),
+                               "sh", "--record", recording.string(), "--log-level", "info"});
+  if (port == 0 && test::lacks_gl(err())) GTEST_SKIP() << "needs OpenGL 4.5: " << err();
+  ASSERT_NE(port, 0);
+  ASSERT_EQ(kill(process_, SIGTERM), 0);
+  EXPECT_EQ(wait(process_), 0);
+  const auto check = check_recording(recording);
+  ASSERT_TRUE(check) << check.error().to_string();
+  EXPECT_TRUE(check->is_sound()) << testing::PrintToString(check->problems);
 }
 
 TEST_F(ServerProgram, ServesUntilTerminated) {

@@ -1,5 +1,6 @@
 // Recordings: the bytes of the file, its reader in a whole, a cut and a damaged one, and the file on disk.
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <csignal>
 #include <cstring>
@@ -387,6 +388,7 @@ TEST(RecordingReader, WalksWhereTheIndexPointsOutside) {
 TEST(RecordingReader, RefusesWhatIsTooLargeBeforeItTakesMemory) {
   mcap::Bytes bytes = sample_recording();
   const ChunkPlace first = chunk_of(bytes, 1);
+  bytes.resize(chunk_of(bytes, 4).offset);                                       // no copy of the asset
   put_at(bytes, first.offset + mcap::kRecordHeadBytes + 16, uint64_t{1} << 50);  // uncompressed_size
   const auto reader = open_bytes(bytes);
   ASSERT_FALSE(reader);
@@ -552,15 +554,74 @@ TEST(RecordingRecover, MakesAWholeFileOfOneThatWasCutOff) {
   EXPECT_FALSE(recover_recording(cut, folder.path() / "whole.mcap")) << "nothing is replaced";
 }
 
-TEST(RecordingRecover, LeavesOutWhatIsDamaged) {
+TEST(RecordingRecover, LeavesOutWhatIsDamagedAndWhatCannotBeDecodedWithoutIt) {
+  const TemporaryFolder folder;
+  const mcap::Bytes whole = test::moving_recording(45);
+  const auto source = memory_byte_source(whole);
+  const auto walked = walk_chunks(*source);
+  ASSERT_TRUE(walked);
+  size_t damaged_deltas = 0;
+  for (const ChunkPlace& place : walked->chunks) {
+    mcap::Bytes bytes = whole;
+    put_at(bytes, place.offset + place.size_bytes - 3, uint8_t{0x5A});
+    const std::filesystem::path to = folder.path() / fmt::format("{}.mcap", place.offset);
+    const auto recovery = recover_recording(save(folder, "run.mcap", bytes), to);
+    ASSERT_TRUE(recovery) << recovery.error().to_string();
+    EXPECT_EQ(recovery->left_out_chunks, 1u);
+    EXPECT_TRUE(recovery->check.is_whole);
+    EXPECT_TRUE(recovery->check.is_sound()) << testing::PrintToString(recovery->check.problems);
+    EXPECT_GE(recovery->check.decoded_frames, 35u) << "more than the second that was damaged is lost";
+    damaged_deltas += place.channel == kDeltaChannel ? 1 : 0;
+  }
+  EXPECT_GT(damaged_deltas, 3u);
+}
+
+TEST(RecordingRecover, KeepsInputsAndStepsWhereTheHairIsLost) {
   const TemporaryFolder folder;
   mcap::Bytes bytes = test::moving_recording(25);
-  const ChunkPlace damaged = chunk_of(bytes, 4);
-  put_at(bytes, damaged.offset + damaged.size_bytes - 3, uint8_t{0x5A});
+  const auto source = memory_byte_source(bytes);
+  const auto walked = walk_chunks(*source);
+  ASSERT_TRUE(walked);
+  for (const ChunkPlace& place : walked->chunks)
+    if (place.channel == kAssetChannel) put_at(bytes, place.offset + place.size_bytes - 3, uint8_t{0x5A});
   const auto recovery = recover_recording(save(folder, "run.mcap", bytes), folder.path() / "out.mcap");
   ASSERT_TRUE(recovery) << recovery.error().to_string();
-  EXPECT_EQ(recovery->left_out_chunks, 1u);
-  EXPECT_TRUE(recovery->check.is_whole);
+  EXPECT_EQ(recovery->left_out_chunks, 2u);
+  EXPECT_EQ(recovery->left_out_frames, 25u);
+  EXPECT_EQ(recovery->check.states, 25u);
+  EXPECT_THAT(recovery->check.problems, testing::Contains(HasSubstr("strands cannot")));
+  const auto messages = RecordingReader::open(folder.path() / "out.mcap", RecordedPart::Messages);
+  ASSERT_TRUE(messages) << messages.error().to_string();
+  EXPECT_FALSE((*messages)->asset());
+  EXPECT_EQ(read_all(**messages).size(), 25u + 24u) << "states and steps";
+}
+
+// What stands in front stands at the end once more.
+TEST(RecordingReader, NeedsNeitherTheFirstStartNorTheFirstAsset) {
+  const mcap::Bytes whole = sample_recording();
+  const std::vector<std::string> all = read_all(whole);
+  for (const size_t first : {0, 1}) {
+    const ChunkPlace place = chunk_of(whole, first);
+    mcap::Bytes bytes = whole;
+    put_at(bytes, place.offset + place.size_bytes - 3, uint8_t{0x5A});
+    const auto reader = open_bytes(bytes);
+    ASSERT_TRUE(reader) << reader.error().to_string();
+    EXPECT_TRUE((*reader)->start() == sample_start());
+    EXPECT_TRUE((*reader)->asset());
+    const std::vector<std::string> read = read_all(**reader);
+    EXPECT_GE(read.size(), all.size());
+    EXPECT_TRUE(std::equal(all.rbegin(), all.rend(), read.rbegin()));
+    // A file that was not closed has them once.
+    bytes.resize(chunk_of(whole, 4).offset);
+    EXPECT_FALSE(open_bytes(bytes));
+  }
+}
+
+TEST(RecordingReader, BelievesTheIndexWhereTheHeadOfAChunkIsDamaged) {
+  mcap::Bytes bytes = sample_recording();
+  const std::vector<std::string> all = read_all(bytes);
+  put_at(bytes, chunk_of(bytes, 3).offset + 2, uint8_t{0xFF});
+  EXPECT_EQ(read_all(bytes), all);
 }
 
 TEST(RecordingCompare, NamesTheFirstStepThatDiffersAndHowFar) {
@@ -586,14 +647,16 @@ TEST(RecordingCompare, NamesTheFirstStepThatDiffersAndHowFar) {
   EXPECT_NEAR(different->max_distance_m, shift_m, 1e-6 * shift_m + 1e-7);
 }
 
-TEST(RecordFile, NeverReplacesAFileUnlessTold) {
+TEST(RecordFile, ReplacesNothingButARecordingAndThatWhenTold) {
   const TemporaryFolder folder;
-  const auto path = folder.write("run.mcap", "precious");
+  const mcap::Bytes old = sample_recording();
+  const auto path = save(folder, "run.mcap", old);
   const auto refused = RecordFile::make(path, IfPresent::Refuse);
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().to_string(), HasSubstr("--record-replace"));
   { const auto given_up = RecordFile::make(path, IfPresent::Replace); }
-  EXPECT_EQ(*load_text(path, 100), "precious") << "the server did not start, and the old file is gone";
+  EXPECT_EQ(std::filesystem::file_size(path), old.size())
+      << "the server did not start, and the old file is gone";
   {
     const auto file = RecordFile::make(path, IfPresent::Replace);
     ASSERT_TRUE(file) << file.error().to_string();
@@ -603,9 +666,48 @@ TEST(RecordFile, NeverReplacesAFileUnlessTold) {
     EXPECT_EQ((*file)->written_bytes(), 3u);
   }
   EXPECT_EQ(*load_text(path, 100), "new");
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "run.mcap.part"));
+  const auto other = folder.write("precious.txt", "precious");
+  const auto kept = RecordFile::make(other, IfPresent::Replace);
+  ASSERT_FALSE(kept);
+  EXPECT_THAT(kept.error().to_string(), HasSubstr("only a recording is replaced"));
+  EXPECT_EQ(*load_text(other, 100), "precious");
+  EXPECT_TRUE(RecordFile::make(folder.write("empty.mcap", ""), IfPresent::Refuse)) << "nothing is in it";
   const auto nowhere = RecordFile::make(folder.path() / "no" / "folder.mcap", IfPresent::Refuse);
   ASSERT_FALSE(nowhere);
   EXPECT_THAT(nowhere.error().to_string(), HasSubstr("cannot be written"));
+}
+
+TEST(RecordFile, WaitsForNoPipeAndTakesNoDevice) {
+  const TemporaryFolder folder;
+  const auto pipe = folder.path() / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  for (const std::filesystem::path& path : {pipe, std::filesystem::path("/dev/full")})
+    for (const IfPresent if_present : {IfPresent::Refuse, IfPresent::Replace}) {
+      const auto refused = RecordFile::make(path, if_present);
+      ASSERT_FALSE(refused);
+      EXPECT_THAT(refused.error().to_string(), HasSubstr("not a regular file"));
+    }
+}
+
+TEST(RecordFile, IsWrittenByOneProgramOnly) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "run.mcap";
+  const auto expect_locked = [&] {
+    const auto second = RecordFile::make(path, IfPresent::Replace);
+    ASSERT_FALSE(second);
+    EXPECT_THAT(second.error().to_string(), HasSubstr("another program records into it"));
+  };
+  for (int i = 0; i < 2; ++i) {  // a new file, then one that replaces it
+    const auto first = RecordFile::make(path, IfPresent::Replace);
+    ASSERT_TRUE(first) << first.error().to_string();
+    expect_locked();
+    (*first)->keep();
+    expect_locked();
+    EXPECT_TRUE((*first)->take(sample_recording(), true));
+    (*first)->finish();
+    expect_locked();
+  }
 }
 
 TEST(RecordFile, EndsWholeWhereTheDiskIsFull) {

@@ -119,6 +119,10 @@ TEST(ScenarioFile, SaysWhereItIsWrong) {
       {head + "do { set: \"a\\nb\" }", "printable"},
       {head + "repeat: 11 do { step: 1 }", "repeat is 11"},
       {head + "limit_s: 0 do { step: 1 }", "limit_s is 0"},
+      {head + "do { start { option: \"--record=/etc/passwd\" } }", "option is '--record=/etc/passwd'"},
+      {head + "do { start { option: \"--listen\" option: \"0.0.0.0\" } }",
+       "a scenario may give: --sim-device"},
+      {head + "do { start { option: \"--shader-dir\" option: \"/tmp\" } }", "option is '--shader-dir'"},
       {head, "the scenario does nothing"},
       {"do { step: 1 }", "the scenario has no name"},
       {"name", "test.textproto:1:5"}};

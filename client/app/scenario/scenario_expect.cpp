@@ -62,6 +62,17 @@ const char* name_of(ScenarioInput input) {
   return kNames[static_cast<size_t>(input)];
 }
 
+/// Links followed.
+bool lies_below(const std::filesystem::path& path, const std::filesystem::path& folder) {
+  std::error_code failure;
+  const auto inner = std::filesystem::weakly_canonical(path, failure);
+  if (failure) return false;
+  auto outer = std::filesystem::weakly_canonical(folder.empty() ? "." : folder, failure);
+  if (failure) return false;
+  if (!outer.has_filename()) outer = outer.parent_path();  // "folder/"
+  return std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end();
+}
+
 }  // namespace
 
 Result<Image> draw(const ViewerPicture& picture, RenderSize size) {
@@ -258,6 +269,9 @@ void ScenarioRun::expect_picture(const ScenarioExpect& expect) {
   if (!seen) return report(what, wanted, seen.error().to_string(), false);
   // Others that share it compare with what the first of them wrote.
   if (options_.renews_goldens && renewed_.insert(golden_path).second) {
+    if (!lies_below(golden_path, scenario_.folder))
+      return report(what, "written anew",
+                    fmt::format("{} does not lie below the scenario's folder", golden_path.string()), false);
     const Status saved = save_png(golden_path, *seen);
     return report(what, "written anew", saved ? golden_path.string() : saved.error().to_string(), saved.ok());
   }
