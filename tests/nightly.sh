@@ -3,7 +3,7 @@
 # and looks at the programs as a whole.
 #   bash tests/nightly.sh                      all of it, 60 s for each fuzzer
 #   bash tests/nightly.sh --seconds 5 fuzz     the short form: only the fuzzers, 5 s each
-# Parts: fuzz, grids (property, comparing and OpenGL tests), dev (address and undefined behaviour, all tests), tsan (threads, all
+# Parts: fuzz, grids (property, comparing, OpenGL and unit tests), dev (address and undefined behaviour, all tests), tsan (threads, all
 # tests but those of grids), lto (do all files agree on every type, and does each include what it uses), arm (do the strand
 # kernels compile for NEON), packages (as root: do the Debian packages install, run and go in a clean Debian 12, and does the
 # container), fleet (sessions, relays and viewers with a Slurm and an HAProxy of their own: deploy/fleet/try.sh), wasm (does the strand core in WebAssembly decode what this one does, bit for bit, and does the page work in a browser). A part that fails
@@ -37,7 +37,7 @@ build() {
 run_part() {
   case "$1" in
     fuzz) build fuzz -DSTRANDCAST_FUZZ_SECONDS="$seconds" && bash tests/run_preset.sh nightly build/fuzz "$jobs" ;;
-    grids) build ci && STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci "$jobs" -L 'property|compare|gl' ;;
+    grids) build ci && STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci "$jobs" -L 'property|compare|gl|unit' ;;
     dev) build dev && bash tests/run_preset.sh dev build/dev "$jobs" ;;
     # The laws of solvers take most of an hour here and have one thread of ours.
     tsan) build tsan && bash tests/run_preset.sh tsan build/tsan "$jobs" -LE 'property|compare' ;;

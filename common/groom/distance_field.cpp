@@ -20,6 +20,8 @@ constexpr double kMarginM = 0.002;
 /// Distances are exact up to here: strands look up cells that lie within half a millimetre of the skin.
 constexpr double kBandCells = 2.0;
 constexpr double kBandM = 0.0006;
+/// So much larger than computed is a ball about a triangle, for roundings.
+constexpr double kRoundedUp = 1.0 + 1e-6;
 /// Winding numbers farther than this from what closed meshes have (0, 1, 2 ...) are in doubt, and nodes near
 /// the surface of which at most such a share may be in doubt, or inside of what is inside out.
 constexpr double kDoubt = 0.25;
@@ -93,6 +95,9 @@ class FieldMaker {
     const auto [y_first, y_last] = nodes_within(low.y, high.y, 1);
     if (y_first > y_last) return;
     const glm::dvec3 normal = glm::normalize(glm::cross(b - a, c - a));
+    const glm::dvec3 middle = (a + b + c) / 3.0;
+    const double reach_m =
+        kRoundedUp * std::max({glm::distance(middle, a), glm::distance(middle, b), glm::distance(middle, c)});
     for (uint32_t z = z_first; z <= z_last; ++z)
       for (uint32_t y = y_first; y <= y_last; ++y) {
         // Of the row only what is near the triangle's plane.
@@ -109,8 +114,11 @@ class FieldMaker {
         }
         const auto [x_first, x_last] = nodes_within(row_low, row_high, 0);
         for (uint32_t x = x_first; x <= x_last && x_first <= x_last; ++x) {
-          const double distance = distance_to_triangle_m(point_of(glm::dvec3(x, y, z)), a, b, c);
+          const glm::dvec3 point = point_of(glm::dvec3(x, y, z));
           float& least = distance_m_[index_of(x, y, z)];
+          // Most triangles lie in a ball that is further away than one that came before.
+          if (glm::distance(point, middle) - reach_m > static_cast<double>(least)) continue;
+          const double distance = distance_to_triangle_m(point, a, b, c);
           if (distance <= band_m_) least = std::min(least, static_cast<float>(distance));
         }
       }

@@ -6,6 +6,10 @@
 #include <limits>
 #include <span>
 
+// Four fill a register that every processor has.
+#define STRANDCAST_LANE_COUNT 4
+#include "common/simd/lanes.h"
+
 namespace strandcast {
 namespace {
 
@@ -72,16 +76,36 @@ const std::array kHead = {
 /// Mirrored parts meet round, not in a crease, over this width.
 constexpr float kSeam = 0.04f;
 
-float ellipsoid_distance(const glm::vec3& point, const glm::vec3& radii) {
-  const float scaled = glm::length(point / radii);
-  const float slope = glm::length(point / (radii * radii));
-  return slope > 0.0f ? scaled * (scaled - 1.0f) / slope : -std::min({radii.x, radii.y, radii.z});
+/// Points side by side.
+struct LanePoints {
+  simd::Float x, y, z;
+};
+
+simd::Float length_of(const LanePoints& v) {
+  return simd::sqrt(v.x * v.x + v.y * v.y + v.z * v.z);
 }
 
-float capsule_distance(const glm::vec3& point, const Part& part) {
-  const glm::vec3 axis = part.to - part.from, offset = point - part.from;
-  const float along = std::clamp(glm::dot(offset, axis) / glm::dot(axis, axis), 0.0f, 1.0f);
-  return glm::length(offset - along * axis) - glm::mix(part.from_radius, part.to_radius, along);
+LanePoints from_point(const LanePoints& points, const glm::vec3& point) {
+  return {points.x - point.x, points.y - point.y, points.z - point.z};
+}
+
+LanePoints over(const LanePoints& v, const glm::vec3& divisor) {
+  return {v.x / divisor.x, v.y / divisor.y, v.z / divisor.z};
+}
+
+simd::Float ellipsoid_distance(const LanePoints& offset, const glm::vec3& radii) {
+  const simd::Float scaled = length_of(over(offset, radii));
+  const simd::Float slope = length_of(over(offset, radii * radii));
+  return simd::select(slope > 0.0f, scaled * (scaled - 1.0f) / slope,
+                      simd::Float(-std::min({radii.x, radii.y, radii.z})));
+}
+
+simd::Float capsule_distance(const LanePoints& offset, const Part& part) {
+  const glm::vec3 axis = part.to - part.from;
+  const simd::Float way = offset.x * axis.x + offset.y * axis.y + offset.z * axis.z;
+  const simd::Float along = simd::clamp(way / glm::dot(axis, axis), 0.0f, 1.0f);
+  const LanePoints across = {offset.x - along * axis.x, offset.y - along * axis.y, offset.z - along * axis.z};
+  return length_of(across) - (part.from_radius * (1.0f - along) + part.to_radius * along);
 }
 
 bool is_in_the_middle(const Part& part) {
@@ -89,19 +113,21 @@ bool is_in_the_middle(const Part& part) {
 }
 
 /// Smaller of two distances with a rounded seam (polynomial smooth minimum).
-float smooth_min(float a, float b, float softness) {
-  if (softness <= 0.0f) return std::min(a, b);
-  const float near = std::max(softness - std::abs(a - b), 0.0f) / softness;
-  return std::min(a, b) - near * near * softness * 0.25f;
+simd::Float smooth_min(simd::Float a, simd::Float b, float softness) {
+  if (softness <= 0.0f) return simd::min(a, b);
+  const simd::Float near = simd::max(softness - simd::abs(a - b), 0.0f) / softness;
+  return simd::min(a, b) - near * near * softness * 0.25f;
 }
 
 /// `distance` is that of what there is already.
-float with_parts(float distance, std::span<const Part> parts, const glm::vec3& point) {
-  const glm::vec3 mirrored(std::hypot(point.x, kSeam), point.y, point.z);
+simd::Float with_parts(simd::Float distance, std::span<const Part> parts, const LanePoints& points) {
+  LanePoints mirrored = points;
+  for (uint32_t lane = 0; lane < simd::kLanes; ++lane)
+    mirrored.x.v[lane] = std::hypot(points.x.v[lane], kSeam);
   for (const Part& part : parts) {
-    const glm::vec3& here = is_in_the_middle(part) ? point : mirrored;
-    const float own = part.shape == Shape::Ellipsoid ? ellipsoid_distance(here - part.from, part.to)
-                                                     : capsule_distance(here, part);
+    const LanePoints offset = from_point(is_in_the_middle(part) ? points : mirrored, part.from);
+    const simd::Float own =
+        part.shape == Shape::Ellipsoid ? ellipsoid_distance(offset, part.to) : capsule_distance(offset, part);
     switch (part.blend) {
       case Blend::Add:
         distance = smooth_min(distance, own, part.softness);
@@ -117,35 +143,72 @@ float with_parts(float distance, std::span<const Part> parts, const glm::vec3& p
   return distance;
 }
 
+simd::Float bust_distance_of(const LanePoints& points) {
+  return with_parts(std::numeric_limits<float>::max(), kBust, points);
+}
+
+simd::Float head_distance_of(const LanePoints& points) {
+  return with_parts(bust_distance_of(points), kHead, points);
+}
+
+/// As many as there are points.
 template <class Distance>
-glm::vec3 normal_of(const Distance& distance, const glm::vec3& point) {
-  constexpr float kStep = 2e-3f;
-  glm::vec3 slope;
-  for (int axis = 0; axis < 3; ++axis) {
-    glm::vec3 step(0.0f);
-    step[axis] = kStep;
-    slope[axis] = distance(point + step) - distance(point - step);
+std::vector<float> distances_of(const Distance& distance, std::span<const glm::vec3> points) {
+  std::vector<float> distances(points.size());
+  for (size_t begin = 0; begin < points.size(); begin += simd::kLanes) {
+    const size_t count = std::min<size_t>(simd::kLanes, points.size() - begin);
+    LanePoints lanes{0.0f, 0.0f, 0.0f};
+    for (size_t i = 0; i < count; ++i) {
+      const glm::vec3& point = points[begin + i];
+      lanes.x.v[i] = point.x, lanes.y.v[i] = point.y, lanes.z.v[i] = point.z;
+    }
+    const simd::Float found = distance(lanes);
+    for (size_t i = 0; i < count; ++i) distances[begin + i] = found.v[i];
   }
-  const float length = glm::length(slope);
-  return length > 0.0f ? slope / length : glm::vec3(0.0f, 1.0f, 0.0f);
+  return distances;
+}
+
+template <class Distance>
+std::vector<glm::vec3> normals_of(const Distance& distance, std::span<const glm::vec3> points) {
+  constexpr float kStep = 2e-3f;
+  std::vector<glm::vec3> slopes(points.size()), moved(points.begin(), points.end());
+  for (int axis = 0; axis < 3; ++axis) {
+    for (size_t i = 0; i < points.size(); ++i) moved[i][axis] = points[i][axis] + kStep;
+    const std::vector<float> above = distances_of(distance, moved);
+    for (size_t i = 0; i < points.size(); ++i) moved[i][axis] = points[i][axis] - kStep;
+    const std::vector<float> below = distances_of(distance, moved);
+    for (size_t i = 0; i < points.size(); ++i) {
+      slopes[i][axis] = above[i] - below[i];
+      moved[i][axis] = points[i][axis];
+    }
+  }
+  for (glm::vec3& slope : slopes) {
+    const float length = glm::length(slope);
+    slope = length > 0.0f ? slope / length : glm::vec3(0.0f, 1.0f, 0.0f);
+  }
+  return slopes;
 }
 
 }  // namespace
 
 float bust_distance(const glm::vec3& point) {
-  return with_parts(std::numeric_limits<float>::max(), kBust, point);
+  return bust_distance_of({point.x, point.y, point.z}).v[0];
 }
 
 glm::vec3 bust_normal(const glm::vec3& point) {
-  return normal_of(bust_distance, point);
+  return normals_of(bust_distance_of, {&point, 1}).front();
 }
 
 float head_distance(const glm::vec3& point) {
-  return with_parts(bust_distance(point), kHead, point);
+  return head_distance_of({point.x, point.y, point.z}).v[0];
 }
 
-glm::vec3 head_normal(const glm::vec3& point) {
-  return normal_of(head_distance, point);
+std::vector<float> head_distances(std::span<const glm::vec3> points) {
+  return distances_of(head_distance_of, points);
+}
+
+std::vector<glm::vec3> head_normals(std::span<const glm::vec3> points) {
+  return normals_of(head_distance_of, points);
 }
 
 }  // namespace strandcast

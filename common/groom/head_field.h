@@ -3,6 +3,8 @@
 #pragma once
 
 #include <glm/glm.hpp>
+#include <span>
+#include <vector>
 
 namespace strandcast {
 
@@ -10,8 +12,11 @@ namespace strandcast {
 /// closed.
 float head_distance(const glm::vec3& point);
 
-/// Returns the outward unit normal of the surface through `point`.
-glm::vec3 head_normal(const glm::vec3& point);
+/// Returns head_distance() of each point, four at a time: a quarter of the time.
+std::vector<float> head_distances(std::span<const glm::vec3> points);
+
+/// Returns the outward unit normals of the surfaces through `points`.
+std::vector<glm::vec3> head_normals(std::span<const glm::vec3> points);
 
 /// Distance and normal of neck and bust alone.
 float bust_distance(const glm::vec3& point);

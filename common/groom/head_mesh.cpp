@@ -55,12 +55,13 @@ class HeadMesher {
     size_ = glm::ivec3(line_[0].size(), line_[1].size(), line_[2].size());
     distance_.resize(static_cast<size_t>(size_.x) * size_.y * size_.z);
     vertex_.assign(distance_.size(), kNoTriangle);
-    for_each(size_, [&](const glm::ivec3& at) { distance_[index_of(at)] = head_distance(corner(at)); });
+    measure_corners();
   }
 
   /// In skull radii.
   Mesh build() {
     for_each(size_ - 1, [&](const glm::ivec3& cell) { add_vertex(cell); });
+    project();
     for_each(size_ - 1, [&](const glm::ivec3& at) {
       for (int axis = 0; axis < 3; ++axis) add_quad(at, axis);
     });
@@ -84,7 +85,25 @@ class HeadMesher {
   bool is_inside(const glm::ivec3& at) const { return distance_[index_of(at)] < 0.0f; }
   static glm::ivec3 step(int axis) { return {axis == 0, axis == 1, axis == 2}; }
 
-  /// A vertex at the mean of the crossings on the cell's edges, then moved onto the surface.
+  /// Layer by layer; of each one half, and its mirror image.
+  void measure_corners() {
+    const int middle = size_.x / 2;
+    std::vector<glm::vec3> corners;
+    for (int z = 0; z < size_.z; ++z) {
+      corners.clear();
+      for (int y = 0; y < size_.y; ++y)
+        for (int x = middle; x < size_.x; ++x) corners.push_back(corner({x, y, z}));
+      const std::vector<float> distances = head_distances(corners);
+      auto distance = distances.begin();
+      for (int y = 0; y < size_.y; ++y)
+        for (int x = middle; x < size_.x; ++x) {
+          distance_[index_of({2 * middle - x, y, z})] = *distance;
+          distance_[index_of({x, y, z})] = *distance++;
+        }
+    }
+  }
+
+  /// A vertex at the mean of the crossings on the cell's edges.
   void add_vertex(const glm::ivec3& cell) {
     glm::vec3 sum(0.0f);
     int crossings = 0;
@@ -99,15 +118,24 @@ class HeadMesher {
       }
     }
     if (crossings == 0) return;
-    const glm::vec3 low = corner(cell), high = corner(cell + 1);
-    glm::vec3 point = sum / static_cast<float>(crossings);
-    for (int i = 0; i < kProjections; ++i) {
-      // Kept inside of its cell, so that neighbouring quads never fold over each other.
-      point = glm::clamp(point - head_distance(point) * head_normal(point), low, high);
-    }
     vertex_[index_of(cell)] = static_cast<uint32_t>(mesh_.position_m.size());
-    mesh_.position_m.push_back(point);
-    mesh_.normal.push_back(head_normal(point));
+    mesh_.position_m.push_back(sum / static_cast<float>(crossings));
+    cell_of_vertex_.push_back(cell);
+  }
+
+  /// Moves the vertices onto the surface.
+  void project() {
+    for (int round = 0; round < kProjections; ++round) {
+      const std::vector<float> distance = head_distances(mesh_.position_m);
+      const std::vector<glm::vec3> normal = head_normals(mesh_.position_m);
+      for (size_t i = 0; i < distance.size(); ++i) {
+        // Kept inside of its cell, so that neighbouring quads never fold over each other.
+        glm::vec3& point = mesh_.position_m[i];
+        const glm::ivec3& cell = cell_of_vertex_[i];
+        point = glm::clamp(point - distance[i] * normal[i], corner(cell), corner(cell + 1));
+      }
+    }
+    mesh_.normal = head_normals(mesh_.position_m);
   }
 
   /// The quad of the four cells round a grid edge that crosses the surface.
@@ -132,6 +160,7 @@ class HeadMesher {
   glm::ivec3 size_{0};
   std::vector<float> distance_;   // by grid corner
   std::vector<uint32_t> vertex_;  // by cell
+  std::vector<glm::ivec3> cell_of_vertex_;
   Mesh mesh_;
 };
 

@@ -16,5 +16,8 @@ Result<std::unique_ptr<VideoEncoder>> make_h264_encoder(const VideoConfig&) {
 Result<std::unique_ptr<VideoDecoder>> make_h264_decoder() {
   return no_h264();
 }
+bool is_h264_installed() {
+  return false;
+}
 
 }  // namespace strandcast

@@ -1,13 +1,19 @@
-// H.264 by libavcodec.
+// H.264 by libavcodec, which is loaded when the first stream needs it: it brings a hundred libraries, and
+// linked it would make every program start 0.1 s later.
+#include <dlfcn.h>
 extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavutil/opt.h>
 }
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
+#include <filesystem>
 #include <utility>
+#include <vector>
 
 #include "common/pictures/video_rows.h"
 #include "common/pictures/yuv_planes.h"
@@ -21,16 +27,76 @@ constexpr int kFinestH264Quantizer = 12;  // of 0..51
 constexpr int64_t kUnlimitedBits = 1'000'000'000;
 constexpr int64_t kMaxDecodedPixels = int64_t{kMaxPictureWidth + 16} * (kMaxPictureHeight + 16);
 
+/// What is called of libavcodec, and of libavutil, which comes with it.
+// clang-format off
+#define LIBAV_FUNCTIONS(X) \
+  X(av_dict_free) X(av_dict_set) X(av_frame_alloc) X(av_frame_free) X(av_frame_get_buffer) \
+  X(av_frame_make_writable) X(av_frame_unref) X(av_log_set_level) X(av_new_packet) X(av_packet_alloc) \
+  X(av_packet_free) X(av_packet_unref) X(av_strerror) X(avcodec_alloc_context3) X(avcodec_find_decoder) \
+  X(avcodec_find_encoder_by_name) X(avcodec_free_context) X(avcodec_open2) X(avcodec_receive_frame) \
+  X(avcodec_receive_packet) X(avcodec_send_frame) X(avcodec_send_packet)
+// clang-format on
+
+struct LibAv {
+#define LIBAV_MEMBER(name) decltype(&::name) name = nullptr;
+  LIBAV_FUNCTIONS(LIBAV_MEMBER)
+#undef LIBAV_MEMBER
+};
+
+/// The one that the headers are of.
+std::string libav_file() {
+  return fmt::format("libavcodec.so.{}", LIBAVCODEC_VERSION_MAJOR);
+}
+
+/// Loaded for good.
+Result<LibAv> load_libav() {
+  const std::string file = libav_file();
+  void* const library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (library == nullptr) return make_error(ErrorCode::Unsupported, "no H.264: {}", dlerror());
+  LibAv loaded;
+#define LIBAV_FIND(name)                                                    \
+  loaded.name = reinterpret_cast<decltype(&::name)>(dlsym(library, #name)); \
+  if (loaded.name == nullptr) return make_error(ErrorCode::Unsupported, "{} has no {}", file, #name);
+  LIBAV_FUNCTIONS(LIBAV_FIND)
+#undef LIBAV_FIND
+  loaded.av_log_set_level(AV_LOG_QUIET);  // it would print what hostile input makes it think
+  return loaded;
+}
+
+const Result<LibAv>& libav_or_error() {
+  static const Result<LibAv> loaded = load_libav();
+  return loaded;
+}
+
+/// For what exists only where it is loaded.
+const LibAv& libav() {
+  return *libav_or_error();
+}
+
+/// Folders that the dynamic linker looks into, but for those of its cache's configuration.
+std::vector<std::filesystem::path> library_folders() {
+  void* const program = dlopen(nullptr, RTLD_NOW);
+  Dl_serinfo size{};
+  if (program == nullptr || dlinfo(program, RTLD_DI_SERINFOSIZE, &size) != 0) return {};
+  std::vector<std::max_align_t> memory(size.dls_size / sizeof(std::max_align_t) + 1);
+  auto* const info = reinterpret_cast<Dl_serinfo*>(memory.data());
+  std::vector<std::filesystem::path> folders;
+  if (dlinfo(program, RTLD_DI_SERINFOSIZE, info) != 0 || dlinfo(program, RTLD_DI_SERINFO, info) != 0)
+    return {};
+  for (unsigned i = 0; i < info->dls_cnt; ++i) folders.emplace_back(info->dls_serpath[i].dls_name);
+  return folders;
+}
+
 struct FreeContext {
-  void operator()(AVCodecContext* context) const { avcodec_free_context(&context); }
+  void operator()(AVCodecContext* context) const { libav().avcodec_free_context(&context); }
 };
 using ContextPtr = std::unique_ptr<AVCodecContext, FreeContext>;
 struct FreeFrame {
-  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
+  void operator()(AVFrame* frame) const { libav().av_frame_free(&frame); }
 };
 using FramePtr = std::unique_ptr<AVFrame, FreeFrame>;
 struct FreePacket {
-  void operator()(AVPacket* packet) const { av_packet_free(&packet); }
+  void operator()(AVPacket* packet) const { libav().av_packet_free(&packet); }
 };
 using PacketPtr = std::unique_ptr<AVPacket, FreePacket>;
 
@@ -46,17 +112,8 @@ constexpr std::array<std::pair<const char*, const char*>, 5> kEncoderOptions = {
 
 Error av_error(const char* what, int code, ErrorCode kind) {
   std::array<char, AV_ERROR_MAX_STRING_SIZE> text{};
-  av_strerror(code, text.data(), text.size());
+  libav().av_strerror(code, text.data(), text.size());
   return make_error(kind, "{}: {}", what, text.data());
-}
-
-/// The library would print what hostile input makes it think.
-void be_quiet() {
-  static const bool is_quiet = [] {
-    av_log_set_level(AV_LOG_QUIET);
-    return true;
-  }();
-  (void)is_quiet;
 }
 
 YuvPlanes planes_of(const AVFrame& frame) {
@@ -72,9 +129,9 @@ void set_rate(AVCodecContext& context, double bits_per_s, VideoRate rate) {
 }
 
 Result<ContextPtr> open_encoder(const VideoConfig& config, VideoRate rate) {
-  const AVCodec* codec = avcodec_find_encoder_by_name(kEncoder);
+  const AVCodec* codec = libav().avcodec_find_encoder_by_name(kEncoder);
   if (codec == nullptr) return make_error(ErrorCode::Unsupported, "libavcodec has no {}", kEncoder);
-  ContextPtr context(avcodec_alloc_context3(codec));
+  ContextPtr context(libav().avcodec_alloc_context3(codec));
   if (!context) return make_error(ErrorCode::Internal, "no memory for an H.264 encoder");
   context->width = static_cast<int>(config.width);
   context->height = static_cast<int>(config.height);
@@ -92,9 +149,9 @@ Result<ContextPtr> open_encoder(const VideoConfig& config, VideoRate rate) {
   context->qmin = kFinestH264Quantizer;
   set_rate(*context, config.bits_per_s, rate);
   AVDictionary* options = nullptr;
-  for (const auto& [key, value] : kEncoderOptions) av_dict_set(&options, key, value, 0);
-  const int opened = avcodec_open2(context.get(), codec, &options);
-  av_dict_free(&options);
+  for (const auto& [key, value] : kEncoderOptions) libav().av_dict_set(&options, key, value, 0);
+  const int opened = libav().avcodec_open2(context.get(), codec, &options);
+  libav().av_dict_free(&options);
   if (opened < 0) return av_error(kEncoder, opened, ErrorCode::Unsupported);
   return context;
 }
@@ -106,8 +163,8 @@ struct Buffers {
 };
 
 Result<Buffers> make_buffers() {
-  be_quiet();
-  Buffers buffers{FramePtr(av_frame_alloc()), PacketPtr(av_packet_alloc())};
+  RETURN_IF_ERROR(libav_or_error());
+  Buffers buffers{FramePtr(libav().av_frame_alloc()), PacketPtr(libav().av_packet_alloc())};
   if (!buffers.frame || !buffers.packet)
     return make_error(ErrorCode::Internal, "no memory for an H.264 picture");
   return buffers;
@@ -124,7 +181,7 @@ class H264Encoder : public VideoEncoder {
     frame_->width = static_cast<int>(config().width);
     frame_->height = static_cast<int>(config().height);
     frame_->pts = 0;
-    if (const int made = av_frame_get_buffer(frame_.get(), 0); made < 0)
+    if (const int made = libav().av_frame_get_buffer(frame_.get(), 0); made < 0)
       return av_error("no memory for an H.264 picture", made, ErrorCode::Internal);
     return {};
   }
@@ -137,17 +194,17 @@ class H264Encoder : public VideoEncoder {
     } else {
       set_rate(*context_, config().bits_per_s, rate);  // x264 looks whether it is another one
     }
-    if (const int ready = av_frame_make_writable(frame_.get()); ready < 0)
+    if (const int ready = libav().av_frame_make_writable(frame_.get()); ready < 0)
       return av_error("no memory for an H.264 picture", ready, ErrorCode::Internal);
     fill_planes(image, planes_of(*frame_));
     frame_->pict_type = frame == VideoFrame::Keyframe ? AV_PICTURE_TYPE_I : AV_PICTURE_TYPE_NONE;
     ++frame_->pts;
-    int done = avcodec_send_frame(context_.get(), frame_.get());
-    if (done >= 0) done = avcodec_receive_packet(context_.get(), packet_.get());
+    int done = libav().avcodec_send_frame(context_.get(), frame_.get());
+    if (done >= 0) done = libav().avcodec_receive_packet(context_.get(), packet_.get());
     if (done < 0) return av_error("cannot encode H.264", done, ErrorCode::Internal);
     const auto* begin = reinterpret_cast<const std::byte*>(packet_->data);
     std::vector<std::byte> bytes(begin, begin + packet_->size);
-    av_packet_unref(packet_.get());
+    libav().av_packet_unref(packet_.get());
     return bytes;
   }
 
@@ -157,15 +214,15 @@ class H264Encoder : public VideoEncoder {
 };
 
 Result<ContextPtr> open_decoder() {
-  const AVCodec* codec = avcodec_find_decoder(AV_CODEC_ID_H264);
-  ContextPtr context(codec != nullptr ? avcodec_alloc_context3(codec) : nullptr);
+  const AVCodec* codec = libav().avcodec_find_decoder(AV_CODEC_ID_H264);
+  ContextPtr context(codec != nullptr ? libav().avcodec_alloc_context3(codec) : nullptr);
   if (!context) return make_error(ErrorCode::Unsupported, "libavcodec has no H.264 decoder");
   context->thread_count = 1;
   context->flags |= AV_CODEC_FLAG_LOW_DELAY;
   context->max_pixels = kMaxDecodedPixels;
   context->error_concealment = FF_EC_FAVOR_INTER;  // anything but 0, or parts that are missing go unnoticed
   context->err_recognition = AV_EF_EXPLODE | AV_EF_BITSTREAM | AV_EF_BUFFER;
-  if (const int opened = avcodec_open2(context.get(), codec, nullptr); opened < 0)
+  if (const int opened = libav().avcodec_open2(context.get(), codec, nullptr); opened < 0)
     return av_error("cannot start the H.264 decoder", opened, ErrorCode::Internal);
   return context;
 }
@@ -184,12 +241,12 @@ class H264Decoder : public VideoDecoder {
     if (info.is_keyframe) {
       ASSIGN_OR_RETURN(context_, open_decoder());
     }
-    av_packet_unref(packet_.get());
-    if (const int made = av_new_packet(packet_.get(), static_cast<int>(frame.size())); made < 0)
+    libav().av_packet_unref(packet_.get());
+    if (const int made = libav().av_new_packet(packet_.get(), static_cast<int>(frame.size())); made < 0)
       return av_error("no memory for an H.264 frame", made, ErrorCode::Internal);
     std::memcpy(packet_->data, frame.data(), frame.size());
-    int done = avcodec_send_packet(context_.get(), packet_.get());
-    if (done >= 0) done = avcodec_receive_frame(context_.get(), frame_.get());
+    int done = libav().avcodec_send_packet(context_.get(), packet_.get());
+    if (done >= 0) done = libav().avcodec_receive_frame(context_.get(), frame_.get());
     if (done < 0) return av_error("damaged H.264 frame", done, ErrorCode::BadInput);
     const bool is_whole = frame_->decode_error_flags == 0 && (frame_->flags & AV_FRAME_FLAG_CORRUPT) == 0;
     const bool is_plain = frame_->format == AV_PIX_FMT_YUV420P || frame_->format == AV_PIX_FMT_YUVJ420P;
@@ -198,7 +255,7 @@ class H264Decoder : public VideoDecoder {
       return make_error(ErrorCode::BadInput, "an H.264 frame of {} bytes gives no picture of {} x {}",
                         frame.size(), info.width, info.height);
     Image image = make_image(planes_of(*frame_), info.width, info.height);
-    av_frame_unref(frame_.get());
+    libav().av_frame_unref(frame_.get());
     return image;
   }
 
@@ -208,6 +265,13 @@ class H264Decoder : public VideoDecoder {
 };
 
 }  // namespace
+
+bool is_h264_installed() {
+  const std::vector<std::filesystem::path> folders = library_folders();
+  return std::any_of(folders.begin(), folders.end(),
+                     [](const auto& folder) { return std::filesystem::exists(folder / libav_file()); }) ||
+         libav_or_error().ok();
+}
 
 Result<std::unique_ptr<VideoEncoder>> make_h264_encoder(const VideoConfig& config) {
   ASSIGN_OR_RETURN(Buffers buffers, make_buffers());

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "common/pictures/video_codec.h"
+#include "common/pictures/video_rows.h"
 
 namespace strandcast {
 namespace {
@@ -25,7 +25,7 @@ class OneMessage : public Picture {
 }  // namespace
 
 PictureCodecs decodable_picture_codecs() {
-  static const bool has_h264 = make_video_decoder(PictureCodec::H264).ok();
+  static const bool has_h264 = is_h264_installed();
   return has_h264 ? kAllPictureCodecs : kAllPictureCodecs & ~codec_bit(PictureCodec::H264);
 }
 

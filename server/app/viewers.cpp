@@ -15,9 +15,11 @@ constexpr uint32_t kH264SizeStep = 4;
 
 /// What a client decodes and this server encodes that moves with the fewest bytes.
 PictureCodec best_codec(PictureCodecs decodable, const RenderSize& size) {
-  PictureCodecs usable = decodable & encodable_picture_codecs();
+  PictureCodecs usable = decodable;
   if (size.width % kH264SizeStep != 0 || size.height % kH264SizeStep != 0)
     usable &= ~codec_bit(PictureCodec::H264);
+  // What is encodable is asked for H.264 alone: that loads its library.
+  if ((usable & codec_bit(PictureCodec::H264)) != 0) usable &= encodable_picture_codecs();
   for (const PictureCodec codec : {PictureCodec::H264, PictureCodec::Vp8, PictureCodec::JpegTiles})
     if ((usable & codec_bit(codec)) != 0) return codec;
   return PictureCodec::Jpeg;

@@ -11,7 +11,8 @@ gl::PassReports picture_passes(const PictureTimers& timers, const gl::PassReport
       gl::make_report("encode/decode", gl::PassFate::Kept, "writes what a viewer would have", timers.decode)};
   passes.insert(passes.end(), painted.begin(), painted.end());
   for (const PictureCodec codec : kPictureCodecs) {
-    if ((encodable_picture_codecs() & codec_bit(codec)) == 0) continue;
+    // Of what nobody wants it is not tried whether its encoder starts.
+    if ((decodable_picture_codecs() & codec_bit(codec)) == 0) continue;
     const bool is_wanted = (wanted & codec_bit(codec)) != 0;
     passes.push_back(gl::make_report(
         fmt::format("encode/{}", to_string(codec)), is_wanted ? gl::PassFate::Kept : gl::PassFate::Unread,

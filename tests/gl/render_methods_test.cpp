@@ -31,7 +31,10 @@ class RenderMethods : public GlTest {
     ASSERT_TRUE(groom) << groom.error().to_string();
     asset_ = make_scene_asset(*groom, make_head(kHeadRadiusM));
   }
-  void TearDown() override { EXPECT_EQ(glGetError(), static_cast<GLenum>(GL_NO_ERROR)); }
+  void TearDown() override {
+    renderers_.clear();  // before their context
+    EXPECT_EQ(glGetError(), static_cast<GLenum>(GL_NO_ERROR));
+  }
 
   // Hair fills the middle of the picture.
   static CameraDesc side() {
@@ -53,15 +56,29 @@ class RenderMethods : public GlTest {
     return look;
   }
 
-  Image draw(const LookDesc& look) {
-    auto renderer = Renderer::make(gl::ShaderLibrary(), context_->info(), asset_, look);
-    if (!renderer) {
-      ADD_FAILURE() << renderer.error().to_string();
-      return {};
+  /// The renderer that drew these methods last, with another look: what it draws is what a new one would
+  /// (SetLookTest), and to make one takes most of the time.
+  Renderer* renderer_for(const LookDesc& look) {
+    for (const auto& [methods, renderer] : renderers_) {
+      if (methods != look.methods) continue;
+      const Status set = renderer->set_look(look);
+      EXPECT_TRUE(set) << set.error().to_string();
+      return renderer.get();
     }
-    const Status status = (*renderer)->draw({{}, asset_.rest_position_m}, side(), kSize);
+    auto made = Renderer::make(gl::ShaderLibrary(), context_->info(), asset_, look);
+    if (!made) {
+      ADD_FAILURE() << made.error().to_string();
+      return nullptr;
+    }
+    return renderers_.emplace_back(look.methods, std::move(*made)).second.get();
+  }
+
+  Image draw(const LookDesc& look) {
+    Renderer* const renderer = renderer_for(look);
+    if (renderer == nullptr) return {};
+    const Status status = renderer->draw({{}, asset_.rest_position_m}, side(), kSize);
     EXPECT_TRUE(status) << status.error().to_string();
-    return (*renderer)->read_image();
+    return renderer->read_image();
   }
 
   /// Shown colours, 0..1, of the pixels in the middle of the picture.
@@ -102,6 +119,7 @@ class RenderMethods : public GlTest {
   }
 
   SceneAsset asset_;
+  std::vector<std::pair<RenderMethodsDesc, std::unique_ptr<Renderer>>> renderers_;
 };
 
 TEST_F(RenderMethods, TheDefaultsAreSadeghiInTheVolumePerVertex) {

@@ -142,7 +142,7 @@ class RootsInMotion : public FollicleLimits {
     ASSERT_TRUE(content) << content.error().to_string();
     double most_free_deg = 0.0;
     for (const SolverRow& row : solver_table()) {
-      const SolverKind kind = kinds_of(row).front();
+      const SolverKind kind = kind_of_long_test(row);
       // In double, on one thread.
       const Groom groom = test::some_strands(content->groom, row.has_kernel ? strand_count : 6);
       for (const Excitation& excitation : kExcitations) {

@@ -46,6 +46,12 @@ class SolverTest : public testing::Test {
     return kinds;
   }
 
+  /// What a long test of one row runs on: lanes on the small grid, for the same reason.
+  static SolverKind kind_of_long_test(const SolverRow& row) {
+    const std::vector<SolverKind> kinds = kinds_of(row);
+    return row.has_kernel && test_grid() == TestGrid::Small ? kinds[1] : kinds.front();
+  }
+
   /// Hair for laws that every strand keeps by itself: in double, on one thread, more of it takes most of the
   /// time.
   static Groom make_law_groom(TestGroomDesc desc = {}) {

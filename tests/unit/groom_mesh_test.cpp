@@ -4,6 +4,7 @@
 #include <map>
 
 #include "common/base/hash.h"
+#include "common/groom/head_field.h"
 #include "common/groom/mesh.h"
 #include "tests/support/temporary_folder.h"
 
@@ -232,6 +233,29 @@ TEST(Head, HasTheProfileOfAFace) {
   EXPECT_GT(chin, dip);
   EXPECT_NEAR(chin, lips, 0.12f) << "neither a receding nor a jutting chin";
   EXPECT_LT(throat, chin - 0.4f);
+}
+
+TEST(Head, IsAsFarFromManyPointsAsFromOneAndTheSameOnBothSides) {
+  for (const size_t count : {0u, 1u, 3u, 4u, 9u, 400u}) {
+    std::vector<glm::vec3> points(count), mirrored(count);
+    for (size_t i = 0; i < count; ++i) {
+      const auto at = static_cast<float>(i);
+      points[i] = {2.0f * std::sin(0.7f * at), -1.5f + 2.5f * std::sin(1.3f * at), std::sin(2.9f * at)};
+      mirrored[i] = points[i] * glm::vec3(-1.0f, 1.0f, 1.0f);
+    }
+    const std::vector<float> distances = head_distances(points);
+    ASSERT_EQ(distances.size(), count);
+    EXPECT_EQ(head_distances(mirrored), distances);
+    const std::vector<glm::vec3> normals = head_normals(points);
+    ASSERT_EQ(normals.size(), count);
+    for (size_t i = 0; i < count; ++i) {
+      ASSERT_EQ(distances[i], head_distance(points[i])) << "point " << i << " of " << count;
+      ASSERT_EQ(normals[i], head_normals({&points[i], 1}).front());
+      ASSERT_EQ(glm::vec3(-normals[i].x, normals[i].y, normals[i].z),
+                head_normals({&mirrored[i], 1}).front());
+    }
+  }
+  EXPECT_NE(head_distance({0.5f, 0.0f, 0.9f}), head_distance({0.5f, 0.0f, -0.9f})) << "a face has a back";
 }
 
 TEST(Head, ScalesWithItsRadius) {

@@ -48,7 +48,7 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"common/replay", with({"common/simd"}, kStrands)},
       {"common/pictures", kPictures},
       {"common/motion", kMath},
-      {"common/groom", kStrands},
+      {"common/groom", with({"common/simd"}, kStrands)},
       {"common/scene", kScene},
       {"common/wire", kWire},
       {"common/record", kWire},
