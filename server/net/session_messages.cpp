@@ -20,6 +20,10 @@ CloseCode close_code_for(const Error& error) {
       return CloseCode::TryLater;
     case ErrorCode::Unauthorized:
       return CloseCode::Unauthorized;
+    case ErrorCode::Unsupported:
+      return CloseCode::Refused;
+    case ErrorCode::NotFound:
+      return CloseCode::NotFound;
     default:
       return CloseCode::Policy;
   }
@@ -96,7 +100,7 @@ void Session::join(const Hello& hello) {
   if (!check_token(hello)) return;
   if (!context_.has_room(peer_.key)) return close_as_full();
   const Result<size_t> found = context_.find_head(hello.head);
-  if (!found) return close(CloseCode::Policy, found.error().message);
+  if (!found) return close(close_code_for(found.error()), found.error().message);
   head_ = *found;
   subscription_.begin(hello);
   Result<Admission> admission =

@@ -47,7 +47,7 @@ void RelayDesk::move_views(const CameraChange& camera) {
 Status RelayDesk::check(const Hello& hello, const Relayed& relayed) const {
   const auto& relays = relayed.welcome.relays;
   if (!hello.relay_id.empty() && std::find(relays.begin(), relays.end(), hello.relay_id) != relays.end())
-    return make_error(ErrorCode::BadInput,
+    return make_error(ErrorCode::Unsupported,
                       "This relay stands behind yours: relays must not stand in a ring.");
   if (!hello.relay_id.empty() && hello.strand_class >= relayed.streams.classes.size())
     return make_error(ErrorCode::Unavailable, "There is no class {} of strands now.", hello.strand_class);
@@ -55,7 +55,7 @@ Status RelayDesk::check(const Hello& hello, const Relayed& relayed) const {
   if (hello.head.empty() || hello.head == relayed.welcome.scene_name) return {};
   if (parts_.has_all_heads && std::find(heads.begin(), heads.end(), hello.head) != heads.end())
     return make_error(ErrorCode::Unavailable, "Head '{}' has not come here yet: try again.", hello.head);
-  return make_error(ErrorCode::BadInput, "There is no head called '{}' here: this relay passes on '{}'.",
+  return make_error(ErrorCode::NotFound, "There is no head called '{}' here: this relay passes on '{}'.",
                     hello.head, relayed.welcome.scene_name);
 }
 
@@ -67,7 +67,7 @@ SimulatedModel RelayDesk::model(const Relayed& relayed) const {
 
 Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello) {
   if (hello.relay_id == parts_.id)
-    return make_error(ErrorCode::BadInput,
+    return make_error(ErrorCode::Unsupported,
                       "This relay stands behind itself: its --upstream must be another server.");
   RETURN_IF_ERROR(upstream_.connected());
   const RelayedPtr relayed = this->relayed();

@@ -13,7 +13,8 @@ namespace {
 
 CloseCode close_code_for(const Error& error) {
   if (error.code == ErrorCode::Unauthorized) return CloseCode::Unauthorized;
-  return is_final(error) ? CloseCode::Policy : CloseCode::TryLater;
+  if (error.code == ErrorCode::NotFound) return CloseCode::NotFound;
+  return is_final(error, Standing::Newcomer) ? CloseCode::Refused : CloseCode::TryLater;
 }
 
 /// Answers, and what was asked for; what everybody is told comes from elsewhere.
