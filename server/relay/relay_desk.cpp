@@ -99,7 +99,7 @@ Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello
     if (hello.frame_width > 0) welcome.frame_width = hello.frame_width;
     if (hello.frame_height > 0) welcome.frame_height = hello.frame_height;
     welcome.mode_reason = "frames were asked for, and come through a relay";
-    parts_.voices.open_pictures(visitor.session, viewer, number_);
+    parts_.voices.open_pictures({visitor.session, viewer, visitor.peer}, number_);
   } else {
     admission.asset = relayed->asset;
   }
@@ -107,7 +107,7 @@ Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello
     subscription.strands.strand_class = hello.strand_class;
     teller_.add(visitor.session);
   }
-  leaves_[visitor.session] = {viewer, &subscription, {}, false};
+  leaves_[visitor.session] = {viewer, visitor.peer, &subscription, {}, false};
   follow_demand();
   if (!hello.keeps_camera && subscription.gets(StreamMode::Strands)) {
     const std::lock_guard lock(mutex_);
@@ -118,7 +118,8 @@ Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello
 
 void RelayDesk::say(SessionId session, const ClientMessage& message) {
   const auto found = leaves_.find(session);
-  if (found != leaves_.end()) parts_.voices.say(session, found->second.hello, message);
+  if (found != leaves_.end())
+    parts_.voices.say({session, found->second.hello, found->second.address}, message);
 }
 
 /// Of viewers of pictures; the others draw by themselves.
