@@ -89,6 +89,8 @@ class StateSource {
   // `who` asked for it, for people who look at a recording.
   virtual void post(const ControlCommand& command, Reply reply, const std::string& who) = 0;
   virtual void post(const SetParameter& parameter, Reply reply, const std::string& who) = 0;
+  /// `who` is gone: counted steps of theirs end, and those that wait are left out.
+  virtual void leave(const std::string& /*who*/) {}
   /// Whoever hears of every step from now on (null: nobody), in place of who did; `on_tapped` comes on any
   /// thread, never once the source has stopped or failed. One that takes no steps has nothing to tell.
   virtual void set_tap(StepTap* /*tap*/, OnTapped on_tapped) { on_tapped(stats().tick); }
