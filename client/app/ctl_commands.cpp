@@ -17,12 +17,14 @@
 #include "client/app/line_budget.h"
 #include "client/app/mocap_packet.h"
 #include "client/app/save_scene.h"
+#include "client/app/steady_client.h"
 #include "client/app/step_speed.h"
 #include "client/app/stream_check.h"
 #include "client/app/view_options.h"
 #include "client/net/datagram_sender.h"
 #include "client/net/http_get.h"
 #include "common/base/text.h"
+#include "common/base/units.h"
 #include "common/client/client_token.h"
 #include "common/motion/wind_csv.h"
 #include "common/scene/scene_file.h"
@@ -35,6 +37,8 @@ using std::chrono::milliseconds;
 constexpr milliseconds kAnswerTimeout{5000};
 constexpr milliseconds kHealthTimeout{3000};
 constexpr float kGustLengthM = 9.0f;
+constexpr double kLongWaitS = 0.5;    // less is what a connection takes
+constexpr double kLeastFeedS = 0.01;  // 0 is without end
 constexpr int64_t kInputsIntervalNs = 2'000'000'000;
 constexpr size_t kMaxInputLineChars = 1'000;
 constexpr size_t kMaxShownValues = 6;  // of one input, so that the lines of two fit into their budget
@@ -52,10 +56,15 @@ std::optional<Error> stopped(const CtlTarget& target) {
 }
 
 /// To say or to hear something, not to watch: no strand is sent for it.
-Result<std::unique_ptr<ViewerClient>> connect(const CtlTarget& target, Role role) {
+Result<ClientConfig> speaking_config(const CtlTarget& target, Role role) {
   ASSIGN_OR_RETURN(ClientConfig config, client_config_for(target, role));
   config.hello.gets_no_stream = true;
-  return ViewerClient::connect(config);
+  return config;
+}
+
+Result<std::unique_ptr<ViewerClient>> connect(const CtlTarget& target, Role role) {
+  ASSIGN_OR_RETURN(const ClientConfig config, speaking_config(target, role));
+  return connect_patiently(config);
 }
 
 // ---- feed ----
@@ -229,16 +238,20 @@ FeedListener progress_listener() {
   return isatty(STDERR_FILENO) != 0 ? FeedListener(print_progress) : FeedListener();
 }
 
-/// Of the head that is named; else of each that the server has.
-Result<std::vector<std::unique_ptr<ViewerClient>>> connect_sources(const CtlTarget& target) {
-  std::vector<std::unique_ptr<ViewerClient>> heads;
-  ASSIGN_OR_RETURN(heads.emplace_back(), connect(target, Role::Source));
+/// Of the head that is named; else of each that the server has. Waits for the server, `limit` at most.
+Result<std::vector<std::unique_ptr<SteadyClient>>> connect_sources(const CtlTarget& target,
+                                                                   const std::atomic<bool>& stop,
+                                                                   milliseconds limit) {
+  std::vector<std::unique_ptr<SteadyClient>> heads;
+  ASSIGN_OR_RETURN(ClientConfig config, speaking_config(target, Role::Source));
+  heads.push_back(std::make_unique<SteadyClient>(config));
+  RETURN_IF_ERROR(heads.front()->await_welcome(stop, limit));
   if (!target.head.empty()) return heads;
   const std::vector<std::string> names = heads.front()->welcome().heads;
   for (size_t i = 1; i < names.size(); ++i) {
-    CtlTarget further = target;
-    further.head = names[i];
-    ASSIGN_OR_RETURN(heads.emplace_back(), connect(further, Role::Source));
+    config.hello.head = names[i];
+    heads.push_back(std::make_unique<SteadyClient>(config));
+    RETURN_IF_ERROR(heads.back()->await_welcome(stop, limit));
   }
   return heads;
 }
@@ -269,15 +282,23 @@ int run_mocap_feed(const FeedOptions& options, const FeedPlan& plan, const std::
 
 int run_feed(const CtlTarget& target, const FeedOptions& options, const std::atomic<bool>& stop) {
   // Files first: a typing error must not need a server to be found.
-  const auto plan = make_feed_plan(options);
+  auto plan = make_feed_plan(options);
   if (!plan) return ctl_failure(plan.error());
   if (!options.as.empty()) return run_mocap_feed(options, *plan, stop);
   if (options.rate_hz > kMaxFeedRateHz)
     return ctl_failure(make_error(ErrorCode::BadInput,
                                   "--rate {:g} is more than a server takes: {:g} at most", options.rate_hz,
                                   kMaxFeedRateHz));
-  const auto heads = connect_sources(target);
+  const bool has_limit = options.seconds > 0.0;
+  const int64_t begin_ns = now_ns();
+  const auto heads = connect_sources(
+      target, stop,
+      has_limit ? milliseconds(static_cast<int64_t>(options.seconds * 1e3)) : milliseconds::max());
   if (!heads) return ctl_failure(heads.error());
+  // The wait for the server counts.
+  const double waited_s = static_cast<double>(now_ns() - begin_ns) / kNsPerS;
+  if (has_limit && waited_s > kLongWaitS)
+    plan->duration_s = std::max(plan->duration_s - waited_s, kLeastFeedS);
   const std::vector<std::string>& names = heads->front()->welcome().heads;
   std::cerr << fmt::format("feeding {}{}: motion {}, wind {}, {} samples per second\n", target.connect,
                            heads->size() > 1 ? fmt::format(" ({})", fmt::join(names, ", ")) : "",
@@ -295,16 +316,21 @@ int run_feed(const CtlTarget& target, const FeedOptions& options, const std::ato
       "rejected\n",
       done->elapsed_s, done->motion_samples, done->wind_samples, done->worst_lateness_ms,
       done->skipped_samples, done->unsent_samples, done->rejected_samples);
+  if (done->reconnects > 0)
+    std::cout << fmt::format("reconnects {}, outage_s {:.1f}\n", done->reconnects, done->outage_s);
   if (!done->last_notice.empty()) std::cout << "the server says: " << done->last_notice << '\n';
-  return kDoneExit;
+  if (done->is_heard) return kDoneExit;
+  return ctl_failure(make_error(ErrorCode::Unavailable,
+                                "this feed was not heard: no head motion arrives where hair is simulated"),
+                     kRefusedExit);
 }
 
 int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>& stop) {
   // A source gets status but no frames; whose token is not good for that watches.
-  auto client = connect(target, Role::Source);
-  if (!client && (client.error().code == ErrorCode::BadInput || client.error().code == ErrorCode::NotFound))
-    client = connect(target, Role::Viewer);
-  if (!client) return ctl_failure(client.error());
+  auto config = speaking_config(target, Role::Source);
+  if (!config) config = speaking_config(target, Role::Viewer);
+  if (!config) return ctl_failure(config.error());
+  auto client = std::make_unique<SteadyClient>(*config);
   LineBudget lines;
   const auto print = [&lines](const std::string& line) {
     if (!lines.take(now_ns())) return;
@@ -319,8 +345,9 @@ int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>
   bool was_slow = false;
   int64_t next_inputs_ns = 0;
   std::string told_detail;
+  bool was_connected = false;
   while (!stop && std::cout && !is_over()) {
-    for (const ClientEvent& event : (*client)->wait(milliseconds(100))) {
+    const Status pumped = client->pump(milliseconds(100), [&](const ClientEvent& event) {
       if (const auto* status = std::get_if<ServerStatus>(&event)) {
         print(to_line(*status));
         // As often as a person reads.
@@ -337,9 +364,17 @@ int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>
         told_detail = status->detail;
       }
       if (const auto* notice = std::get_if<Notice>(&event)) print(notice->text);
-      if (const auto* closed = std::get_if<ClosedEvent>(&event))
-        return ctl_failure(closed->error, kRefusedExit);
+    });
+    const bool has_joined = client->policy().standing() == Standing::Member;
+    if (!pumped && pumped.error().code == ErrorCode::Unsupported && !has_joined &&
+        config->hello.role == Role::Source) {
+      config = speaking_config(target, Role::Viewer);
+      if (!config) return ctl_failure(config.error());
+      client = std::make_unique<SteadyClient>(*config);
+      continue;
     }
+    if (!pumped) return ctl_failure(pumped.error(), has_joined ? kRefusedExit : kBadInputExit);
+    if (std::exchange(was_connected, client->is_connected()) && !was_connected) print("not connected");
   }
   return kDoneExit;
 }

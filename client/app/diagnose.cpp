@@ -88,7 +88,7 @@ class Examination {
       help =
           fmt::format("the server speaks TLS: use wss://{}, and --tls-ca FILE for a certificate of your own",
                       config.address.to_string());
-    if (step == ConnectStep::AwaitWelcome && is_refusal(error) && error.code == ErrorCode::BadInput &&
+    if (step == ConnectStep::AwaitWelcome && is_refusal(error) && error.code == ErrorCode::Unsupported &&
         config.hello.role == Role::Controller && would_be_viewer(config))
       help = "--view-only works with this token, and steers nothing";
     add(Finding::Missing, subject_of(step, error), error.to_string(), help);
@@ -121,7 +121,7 @@ class Examination {
 
   static const char* subject_of(ConnectStep step, const Error& error) {
     const bool is_refused =
-        is_refusal(error) && (error.code == ErrorCode::Unauthorized || error.code == ErrorCode::BadInput);
+        is_refusal(error) && (error.code == ErrorCode::Unauthorized || error.code == ErrorCode::Unsupported);
     return step == ConnectStep::BeginTls                     ? "TLS"
            : step == ConnectStep::AwaitWelcome && is_refused ? "role"
                                                              : "server";

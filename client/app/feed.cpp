@@ -77,7 +77,7 @@ void count(bool is_sent, uint64_t& counter, FeedProgress& progress) {
 /// To a server, as a source of its own for each head.
 class SessionWay {
  public:
-  explicit SessionWay(std::span<const std::unique_ptr<ViewerClient>> heads)
+  explicit SessionWay(std::span<const std::unique_ptr<SteadyClient>> heads)
       : heads_(heads), told_(heads.size()) {}
 
   void send(const FeedPlan& plan, int64_t sample_ns, FeedProgress& progress) {
@@ -88,11 +88,15 @@ class SessionWay {
         const std::vector<glm::dvec3> places = plan.joints(progress.motion_s);
         message.samples.front().joint_m.assign(places.begin(), places.end());
       }
-      for (const auto& head : heads_) count(head->send(message).ok(), progress.motion_samples, progress);
+      for (size_t i = 0; i < heads_.size(); ++i) {
+        const bool is_sent = send_to(*heads_[i], message);
+        count(is_sent, progress.motion_samples, progress);
+        if (is_sent && told_[i].sent_ns == 0) told_[i].sent_ns = now_ns();
+      }
     }
     if (plan.wind) {
       const WindSamples message{{{sample_ns, plan.wind(progress.motion_s)}}};
-      for (const auto& head : heads_) count(head->send(message).ok(), progress.wind_samples, progress);
+      for (const auto& head : heads_) count(send_to(*head, message), progress.wind_samples, progress);
     }
   }
 
@@ -100,9 +104,15 @@ class SessionWay {
     for (size_t i = 0; i < heads_.size(); ++i) RETURN_IF_ERROR(read_events_of(i, plan, progress));
     progress.rejected_samples = 0;
     progress.pace = 1.0;
-    for (const Told& told : told_) {
+    progress.is_heard = true;
+    progress.reconnects = 0;
+    for (size_t i = 0; i < heads_.size(); ++i) {
+      const Told& told = told_[i];
       progress.rejected_samples += told.rejected_samples;
       progress.pace = std::min(progress.pace, told.pace);
+      progress.is_heard = progress.is_heard && told.is_heard;
+      progress.reconnects += heads_[i]->policy().reconnects();
+      progress.outage_s = std::max(progress.outage_s, heads_[i]->policy().outage_s(now_ns()));
     }
     return {};
   }
@@ -110,7 +120,8 @@ class SessionWay {
   void flush() {
     const int64_t end_ns = now_ns() + std::chrono::nanoseconds(kFlushWait).count();
     for (const auto& head : heads_)
-      while (head->queued_messages() > 0 && now_ns() < end_ns) std::this_thread::sleep_for(milliseconds(1));
+      while (head->client() != nullptr && head->client()->queued_messages() > 0 && now_ns() < end_ns)
+        std::this_thread::sleep_for(milliseconds(1));
   }
 
  private:
@@ -118,22 +129,49 @@ class SessionWay {
   struct Told {
     double pace = 1.0;
     uint64_t rejected_samples = 0;
+    int64_t sent_ns = 0;  // the first sample of motion of this connection; 0: none yet
+    uint64_t tick = 0;    // of the first status after that
+    bool is_heard = true;
+    bool is_away = false;
   };
+
+  static bool send_to(SteadyClient& head, const ClientMessage& message) {
+    return head.client() != nullptr && head.client()->send(message).ok();
+  }
 
   Status read_events_of(size_t index, const FeedPlan& plan, FeedProgress& progress) {
     Told& told = told_[index];
-    for (ClientEvent& event : heads_[index]->poll()) {
-      if (const auto* closed = std::get_if<ClosedEvent>(&event)) return closed->error;
+    SteadyClient& head = *heads_[index];
+    RETURN_IF_ERROR(head.pump(milliseconds(0), [&](ClientEvent& event) {
       if (auto* notice = std::get_if<Notice>(&event)) progress.last_notice = std::move(notice->text);
       if (const auto* status = std::get_if<ServerStatus>(&event)) {
         told.rejected_samples = status->rejected_samples;
         if (!plan.is_live) told.pace = follow_pace(told.pace, *status);
+        listen(told, *status, progress.last_notice);
       }
-    }
+    }));
+    const bool is_away = head.client() == nullptr;
+    if (is_away) told.sent_ns = 0;
+    if (std::exchange(told.is_away, is_away) != is_away && !plan.is_live) told.pace = is_away ? 0.0 : 1.0;
     return {};
   }
 
-  std::span<const std::unique_ptr<ViewerClient>> heads_;
+  /// Whether steps are taken with what was sent.
+  static void listen(Told& told, const ServerStatus& status, const std::string& last_notice) {
+    if (told.sent_ns == 0) return;
+    if (told.tick == 0 || status.tick < told.tick) told.tick = status.tick;
+    if (!status.is_motion_stale) {
+      told.is_heard = true;
+      return;
+    }
+    const bool is_late = now_ns() - told.sent_ns >= std::chrono::nanoseconds(kUnheardTime).count();
+    const bool goes_on = !status.is_paused && status.tick > told.tick;
+    if (is_late && goes_on && std::exchange(told.is_heard, false))
+      log_warn("net", "not heard: no head motion arrives at the server{}",
+               last_notice.empty() ? std::string() : ", which says: " + last_notice);
+  }
+
+  std::span<const std::unique_ptr<SteadyClient>> heads_;
   std::vector<Told> told_;
 };
 
@@ -163,7 +201,7 @@ double follow_pace(double present, const ServerStatus& status) {
   return next >= kSteadyPace ? 1.0 : next;
 }
 
-Result<FeedProgress> feed(std::span<const std::unique_ptr<ViewerClient>> heads, const FeedPlan& plan,
+Result<FeedProgress> feed(std::span<const std::unique_ptr<SteadyClient>> heads, const FeedPlan& plan,
                           const std::atomic<bool>& stop, const FeedListener& listener) {
   SessionWay way(heads);
   return Feeder(way, plan).run(stop, listener);

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -13,8 +14,8 @@
 #include <string>
 #include <vector>
 
+#include "client/app/steady_client.h"
 #include "common/base/result.h"
-#include "common/client/viewer_client.h"
 #include "common/math/pose.h"
 
 namespace strandcast {
@@ -53,6 +54,9 @@ struct FeedProgress {
   uint64_t rejected_samples = 0;   // as the server reports it, of all sources
   double worst_lateness_ms = 0.0;  // of a sample behind its time
   std::string last_notice;         // from the server
+  bool is_heard = true;     // motion that is sent arrives where hair is simulated, as far as it is told
+  uint64_t reconnects = 0;  // of all heads
+  double outage_s = 0.0;    // without a connection, of the worst head
 };
 
 /// Sends one moment of a plan where there is no server to talk to.
@@ -61,9 +65,13 @@ using SendMoment = std::function<bool(double time_s, const Pose&, const std::opt
 /// Called about once a second.
 using FeedListener = std::function<void(const FeedProgress&)>;
 
+/// A simulation that goes on for so long without the motion that is sent has not heard it.
+inline constexpr std::chrono::milliseconds kUnheardTime{2000};
+
 /// Feeds one head or several, each by a connection of its own, with the same samples. Runs until the plan's
-/// duration is over, `stop` is set or a connection ends (an error).
-Result<FeedProgress> feed(std::span<const std::unique_ptr<ViewerClient>> heads, const FeedPlan& plan,
+/// duration is over or `stop` is set. A connection that is lost comes back; meanwhile the motion waits,
+/// unless it is live. The error is one that trying again does not mend.
+Result<FeedProgress> feed(std::span<const std::unique_ptr<SteadyClient>> heads, const FeedPlan& plan,
                           const std::atomic<bool>& stop, const FeedListener& listener);
 
 /// Likewise in real time to who says nothing back.

@@ -48,12 +48,26 @@ class TimeLimit {
  public:
   explicit TimeLimit(const std::optional<double>& limit_s) : limit_s_(limit_s) {}
   bool is_over() const { return limit_s_ && elapsed_s() >= *limit_s_; }
+  double limit_s() const { return limit_s_.value_or(0.0); }
   double elapsed_s() const { return static_cast<double>(now_ns() - begin_ns_) * 1e-9; }
 
  private:
   const std::optional<double> limit_s_;
   const int64_t begin_ns_ = now_ns();
 };
+
+/// Connects, however long it takes, within the limit and until a stop.
+Status await_session(LiveConnection& live, const TimeLimit& limit, const std::atomic<bool>& stop) {
+  while (!live.has_session()) {
+    if (live.final_error()) return *live.final_error();
+    if (stop) return make_error(ErrorCode::Unavailable, "stopped before the server had answered");
+    if (limit.is_over())
+      return make_error(ErrorCode::Timeout, "the server did not answer within {} s{}", limit.limit_s(),
+                        live.trouble().empty() ? std::string() : "; last problem: " + live.trouble());
+    live.pump(kPumpWait);
+  }
+  return {};
+}
 
 class Collector {
  public:
@@ -86,11 +100,11 @@ class Collector {
         seen_frames = decoded_frames();
         last_frame_ns = now_ns();
       }
+      // A server that is away comes back; and a run of so many seconds takes so many.
+      if (!live_.is_connected() || options_.seconds) last_frame_ns = now_ns();
       if (static_cast<double>(now_ns() - last_frame_ns) * 1e-9 > kStallTimeoutS)
-        return live_.is_connected()
-                   ? make_error(ErrorCode::Timeout, "no new frame for {} s (is the server paused?)",
-                                kStallTimeoutS)
-                   : make_error(ErrorCode::Unavailable, "{}", live_.trouble());
+        return make_error(ErrorCode::Timeout, "no new frame for {} s (is the server paused?)",
+                          kStallTimeoutS);
     }
     if (!collected_.screenshot_snapshot) take_screenshot(session().replay().newest());
     if (!collected_.screenshot_image && session().image()) collected_.screenshot_image = *session().image();
@@ -117,7 +131,9 @@ class Collector {
       earlier_frames_ += known_frames_;
       begin_session();
       // Pictures of one clip are drawn with one groom.
-      if (strands != session().welcome().strand_count || vertices != session().welcome().vertex_count)
+      const bool is_drawn = !options_.screenshot.empty() || !options_.clip.empty();
+      if (is_drawn &&
+          (strands != session().welcome().strand_count || vertices != session().welcome().vertex_count))
         return make_error(ErrorCode::Unavailable, "the server came back with another scene");
     }
     if (live_.final_error()) return *live_.final_error();
@@ -150,9 +166,10 @@ class Collector {
   }
 
   Status wait_for_first_picture() {
-    const int64_t begin_ns = now_ns();
+    int64_t begin_ns = now_ns();
     while (!stop_ && !has_pictures()) {
       RETURN_IF_ERROR(pump());
+      if (!live_.is_connected()) begin_ns = now_ns();
       if (has_pictures()) break;
       if (limit_.is_over() || static_cast<double>(now_ns() - begin_ns) * 1e-9 > kFirstPictureTimeoutS)
         return make_error(ErrorCode::Timeout, "the server sent nothing to show for {} s{}",
@@ -307,14 +324,15 @@ Status render_snapshots(const ViewOptions& options, const Drawn& scene, const Co
 
 /// Connections to the further heads of a server, whose strands are drawn beside the first's. None where one
 /// head was asked for, and where pictures were: they show all.
-Result<Connections> open_others(ClientConfig config, const Welcome& first) {
+Result<Connections> open_others(ClientConfig config, const Welcome& first, const TimeLimit& limit,
+                                const std::atomic<bool>& stop) {
   Connections others;
   if (!config.hello.head.empty() || config.hello.mode == StreamMode::Frames) return others;
   config.hello.mode = StreamMode::Strands;
   for (size_t i = 1; i < first.heads.size(); ++i) {
     config.hello.head = first.heads[i];
-    ASSIGN_OR_RETURN(auto other, LiveConnection::open(config));
-    others.push_back(std::move(other));
+    others.push_back(LiveConnection::begin(config));
+    RETURN_IF_ERROR(await_session(*others.back(), limit, stop));
   }
   return others;
 }
@@ -344,17 +362,18 @@ Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bo
   };
   const auto trace = std::make_shared<FrameTrace>();
   if (!options.trace.empty()) RETURN_IF_ERROR(trace->open(options.trace));
-  ASSIGN_OR_RETURN(auto live, LiveConnection::open(config));
+  auto live = LiveConnection::begin(config);
+  RETURN_IF_ERROR(await_session(*live, limit, stop));
   if (!options.trace.empty()) {
     trace->want_states(true);
     live->set_trace(trace);
   }
-  ASSIGN_OR_RETURN(Connections others, open_others(config, live->session().welcome()));
+  ASSIGN_OR_RETURN(Connections others, open_others(config, live->session().welcome(), limit, stop));
   ASSIGN_OR_RETURN(const Collected collected, Collector(options, *live, others, *trace, limit, stop).run());
   ViewerSession* session = &live->session();
 
   StageTimer render_timer;
-  ViewReport report = make_report(*session);
+  ViewReport report = make_report(*session, scope_of(*live));
   if (!own_reason.empty()) set_mode_reason(report, own_reason);
   const StreamMode mode = session->mode();  // a clip holds what came in the mode that the run ended in
   Drawn scene{device.get(),

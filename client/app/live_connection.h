@@ -2,14 +2,13 @@
 // beside the caller's thread, so a window stays alive meanwhile. One thread otherwise.
 #pragma once
 
-#include <atomic>
 #include <chrono>
-#include <future>
 #include <memory>
 #include <optional>
+#include <string>
 
+#include "client/app/attempts.h"
 #include "client/app/viewer_session.h"
-#include "common/client/reconnect_policy.h"
 
 namespace strandcast {
 
@@ -19,8 +18,6 @@ class LiveConnection {
   static Result<std::unique_ptr<LiveConnection>> open(const ClientConfig& config);
   /// Without a session yet: pump() connects.
   static std::unique_ptr<LiveConnection> begin(const ClientConfig& config);
-  /// Gives up an attempt that is under way.
-  ~LiveConnection();
   LiveConnection(const LiveConnection&) = delete;
   LiveConnection& operator=(const LiveConnection&) = delete;
 
@@ -37,7 +34,15 @@ class LiveConnection {
   /// The running session, or the last one: its snapshots stay readable while the server is away. There must
   /// have been one.
   ViewerSession& session() { return *session_; }
-  bool is_connected() const { return is_connected_; }
+  /// What the sessions before that one counted.
+  const SessionTotals& earlier() const { return earlier_; }
+  /// There is a session, and the server has said something in the last kSilentServer.
+  bool is_connected() const { return is_open_ && !is_silent(); }
+  /// How often the server was found again.
+  uint64_t reconnects() const { return attempts_.policy().reconnects(); }
+  /// Time without a connection since the first Welcome, and since that Welcome, s.
+  double outage_s() const;
+  double since_first_s() const { return attempts_.policy().since_first_s(now_ns()); }
   /// Why there is no connection; empty while connected and before the first attempt failed.
   std::string trouble() const;
   /// What can be done about it, for a person; empty when there is nothing but waiting.
@@ -45,29 +50,23 @@ class LiveConnection {
   /// What is being done about it; empty while connected and when trying again cannot help.
   std::string doing() const;
   /// The reason, when trying again cannot help.
-  const std::optional<Error>& final_error() const { return final_error_; }
+  const std::optional<Error>& final_error() const { return attempts_.final_error(); }
 
  private:
-  using Attempt = std::future<Result<std::unique_ptr<ViewerSession>>>;
-  using Clock = std::chrono::steady_clock;
+  explicit LiveConnection(const ClientConfig& config);
+  void take(std::unique_ptr<ViewerSession> session);
+  bool is_silent() const {
+    return is_open_ && strandcast::is_silent(session_->client().heard_ns(), now_ns());
+  }
+  void tell_silence();
 
-  LiveConnection(const ClientConfig& config, std::unique_ptr<ViewerSession> session);
-  void lose(const Error& error);
-  void start_attempt();
-
-  std::atomic<bool> is_leaving_{false};
-  std::atomic<ConnectStep> step_{ConnectStep::FindHost};  // of the attempt that runs, or ran last
-  ClientConfig config_;
   const std::shared_ptr<ModeControl> modes_;
   std::shared_ptr<FrameTrace> trace_;  // null: none
   std::unique_ptr<ViewerSession> session_;
-  ReconnectPolicy policy_;
-  bool is_connected_;
-  uint64_t attempts_ = 0;  // since there was a connection
-  std::optional<Error> last_error_;
-  std::optional<Error> final_error_;
-  Clock::time_point next_attempt_;
-  Attempt attempt_;  // last: its end waits for what is under way, which reads the others
+  SessionTotals earlier_;
+  bool is_open_ = false;
+  bool has_told_silence_ = false;
+  Attempts<ViewerSession> attempts_;
 };
 
 }  // namespace strandcast

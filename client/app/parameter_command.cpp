@@ -2,6 +2,7 @@
 
 #include <iostream>
 
+#include "client/app/attempts.h"
 #include "client/app/ctl_commands.h"
 #include "client/app/line_budget.h"
 #include "common/base/profile.h"
@@ -64,7 +65,7 @@ int run_params(const CtlTarget& target, const ParameterOptions& options, const s
   auto config = client_config_for(target, Role::Viewer);
   if (!config) return ctl_failure(config.error(), kBadInputExit);
   config->hello.gets_no_stream = true;
-  auto client = ViewerClient::connect(*config);
+  auto client = connect_patiently(*config);
   if (!client) return ctl_failure(client.error(), kBadInputExit);
   const auto listed = print_all(**client, options, stop);
   if (!listed) return ctl_failure(listed.error(), kRefusedExit);

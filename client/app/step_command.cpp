@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iostream>
 
+#include "client/app/attempts.h"
 #include "common/base/profile.h"
 #include "common/base/units.h"
 
@@ -73,7 +74,7 @@ int run_step(const CtlTarget& target, uint32_t count, const std::atomic<bool>& s
   auto config = client_config_for(target, Role::Controller);
   if (!config) return ctl_failure(config.error());
   config->hello.gets_no_stream = true;
-  auto client = ViewerClient::connect(*config);
+  auto client = connect_patiently(*config);
   if (!client) return ctl_failure(client.error());
   bool has_shown = false;
   int64_t next_ns = now_ns() + nanoseconds(kPortionTime).count();

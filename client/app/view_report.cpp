@@ -44,30 +44,32 @@ std::string find(const ViewReport& report, const std::string& key) {
 
 }  // namespace
 
-ViewReport make_report(ViewerSession& session) {
+ReportScope scope_of(const LiveConnection& live) {
+  return {live.earlier(), live.reconnects(), live.outage_s(), live.since_first_s()};
+}
+
+ViewReport make_report(ViewerSession& session, const ReportScope& scope) {
   constexpr double kP99 = 0.99;
   const Welcome& welcome = session.welcome();
-  const ReplayStats& strands = session.replay().stats();
-  const PictureStats& pictures = session.picture_stats();
-  const ConnectionCounters net = session.client().counters();
+  SessionTotals all = scope.earlier;
+  all += totals_of(session);
   const ClockOffset clock = session.client().clock();
   const ServerStatus& server = session.status();
   const bool is_frames = session.mode() == StreamMode::Frames;
-  const uint64_t received_frames = pictures.received_frames + strands.received_frames;
-  const auto received_bytes = static_cast<double>(pictures.received_bytes + strands.received_bytes);
+  const auto received_bytes = static_cast<double>(all.received_bytes);
   const StageTimer& decode = is_frames ? session.picture_decode_timer() : session.replay().decode_timer();
   const StageTimer& motion = session.motion_latency_timer();
-  const double seconds = session.connected_s();
+  const double seconds = scope.whole_s.value_or(session.connected_s());
 
   Builder out;
   out.word("mode", to_string(session.mode()));
   out.word("mode_reason", session.mode_reason());
-  out.count("mode_changes", session.mode_changes());
-  out.count("blank_pictures", session.blank_pictures());
+  out.count("mode_changes", all.mode_changes);
+  out.count("blank_pictures", all.blank_pictures);
   out.word("scene", welcome.scene_name);
   out.word("sim_device", welcome.sim_device.empty() ? "unknown" : welcome.sim_device);
   out.word("hair_color", session.look().look.hair_color);
-  out.count("look_changes", session.look_changes());
+  out.count("look_changes", all.look_changes);
   const FrameQuality quality = session.frame_quality().value_or(FrameQuality{});
   out.word("codec", is_frames ? to_string(quality.codec) : welcome.codec);
   out.word("codec_reason", is_frames ? quality.reason : welcome.codec_reason);
@@ -75,10 +77,12 @@ ViewReport make_report(ViewerSession& session) {
   out.count("vertices_per_strand", welcome.vertex_count);
   out.number("bound_mm", static_cast<double>(welcome.bound_m) * 1e3, 3);
   out.number("seconds", seconds, 2);
-  out.count("decoded_frames", session.decoded_frames());
-  out.number("frames_per_s", static_cast<double>(session.decoded_frames()) / seconds, 2);
-  out.number("bytes_per_frame", received_bytes / static_cast<double>(std::max<uint64_t>(received_frames, 1)),
-             0);
+  out.count("reconnects", scope.reconnects);
+  out.number("outage_s", scope.outage_s, 2);
+  out.count("decoded_frames", all.decoded_frames);
+  out.number("frames_per_s", static_cast<double>(all.decoded_frames) / seconds, 2);
+  out.number("bytes_per_frame",
+             received_bytes / static_cast<double>(std::max<uint64_t>(all.received_frames, 1)), 0);
   out.number("mbit_per_s", received_bytes * kBitsPerByte * 1e-6 / seconds, 3);
   out.number("decode_ms_median", decode.median_ms(), 3);
   out.number("decode_ms_p99", decode.quantile_ms(kP99), 3);
@@ -89,24 +93,24 @@ ViewReport make_report(ViewerSession& session) {
   out.count("cubic_pictures", 0);
   out.number("motion_to_decoded_ms_median", motion.median_ms(), 3);
   out.number("motion_to_decoded_ms_p99", motion.quantile_ms(kP99), 3);
-  out.count("motion_samples_seen", motion.count());
+  out.count("motion_samples_seen", all.motion_samples);
   out.number("clock_error_ms", clock.has_value() ? static_cast<double>(clock.error_ns()) * 1e-6 : 0.0, 3);
-  out.count("keyframes", strands.keyframes);
-  out.count("gaps", strands.gaps);
-  out.count("missed_frames", pictures.missed_frames + strands.missed_frames);
-  out.count("rejected_frames", pictures.rejected_frames + strands.rejected_frames);
-  out.count("keyframe_requests", strands.keyframe_requests);
-  out.count("dropped_by_client", net.dropped_frames);
-  out.count("dropped_by_server", server.dropped_frames);
+  out.count("keyframes", all.keyframes);
+  out.count("gaps", all.gaps);
+  out.count("missed_frames", all.missed_frames);
+  out.count("rejected_frames", all.rejected_frames);
+  out.count("keyframe_requests", all.keyframe_requests);
+  out.count("dropped_by_client", all.dropped_by_client);
+  out.count("dropped_by_server", all.dropped_by_server);
   out.number("strand_share", session.quality().strand_share, 3);
   out.count("rate_divisor", session.quality().rate_divisor);
   out.number("quality_bound_mm", static_cast<double>(session.quality().bound_m) * 1e3, 3);
-  out.count("quality_changes", session.quality_changes());
+  out.count("quality_changes", all.quality_changes);
   out.count("picture_width", quality.width);
   out.count("picture_height", quality.height);
   out.count("picture_quality", quality.quality);
   out.number("picture_rate_hz", quality.rate_hz, 2);
-  out.count("whole_pictures", pictures.whole_frames);
+  out.count("whole_pictures", all.whole_pictures);
   out.number("queue_delay_ms", server.queue_delay_ms, 1);
   out.number("server_sim_ms", server.sim_ms, 3);
   out.number("server_encode_ms", server.encode_ms, 3);
@@ -174,6 +178,11 @@ std::string to_summary(const ViewReport& report) {
   const std::string dropped = fmt::format("{} by the server, {} missed, {} by this viewer",
                                           v("dropped_by_server"), v("missed_frames"), v("dropped_by_client"));
   const std::string slow = v("server_slow_motion");
+  const bool was_away = v("reconnects") != "0" || v("outage_s") != "0.00";
+  const std::string outage = was_away
+                                 ? fmt::format("  connection      found again {} times, {} s without one\n",
+                                               v("reconnects"), v("outage_s"))
+                                 : std::string();
   return fmt::format(
       "scene {} ({} strands x {}), {} by {}\n"
       "  mode            {}\n"
@@ -182,12 +191,12 @@ std::string to_summary(const ViewReport& report) {
       "  render          {} ms ({} frames)\n"
       "  motion->decoded {} ms median, {} ms p99 ({} samples, clock +-{} ms)\n"
       "  dropped         {}\n"
-      "  server          {} ms per step, realtime factor {}\n{}",
+      "  server          {} ms per step, realtime factor {}\n{}{}",
       v("scene"), v("strands"), v("vertices_per_strand"), v("mode"), v("codec"), v("mode_reason"),
       v("decoded_frames"), v("seconds"), v("frames_per_s"), v("bytes_per_frame"), v("mbit_per_s"),
       v("decode_ms_median"), v("decode_ms_p99"), v("render_ms_median"), v("rendered_pictures"),
       v("motion_to_decoded_ms_median"), v("motion_to_decoded_ms_p99"), v("motion_samples_seen"),
-      v("clock_error_ms"), dropped, v("server_sim_ms"), v("server_realtime_factor"),
+      v("clock_error_ms"), dropped, v("server_sim_ms"), v("server_realtime_factor"), outage,
       slow == "none" || slow == "?" ? std::string() : fmt::format("  {}\n", slow));
 }
 

@@ -3,10 +3,11 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "client/app/viewer_session.h"
+#include "client/app/live_connection.h"
 
 namespace strandcast {
 
@@ -18,8 +19,17 @@ struct ReportEntry {
 };
 using ViewReport = std::vector<ReportEntry>;
 
-/// Reports everything that a session measured, except render times.
-ViewReport make_report(ViewerSession& session);
+/// What a report covers besides its session.
+struct ReportScope {
+  SessionTotals earlier;          // of the sessions before
+  uint64_t reconnects = 0;        // how often the server was found again
+  double outage_s = 0.0;          // without a connection
+  std::optional<double> whole_s;  // from the first Welcome on; none: as long as the session
+};
+ReportScope scope_of(const LiveConnection& live);
+
+/// Reports everything that was measured, except render times: counts of all sessions, medians of the last.
+ViewReport make_report(ViewerSession& session, const ReportScope& scope = {});
 /// Replaces the reason of the mode, which by default is the server's.
 void set_mode_reason(ViewReport& report, const std::string& reason);
 /// Adds the render times to a report.

@@ -21,6 +21,41 @@ bool is_blank(const Image& image) {
 
 }  // namespace
 
+SessionTotals& SessionTotals::operator+=(const SessionTotals& other) {
+  using Totals = SessionTotals;
+  for (const auto field :
+       {&Totals::decoded_frames, &Totals::received_frames, &Totals::received_bytes, &Totals::keyframes,
+        &Totals::gaps, &Totals::missed_frames, &Totals::rejected_frames, &Totals::keyframe_requests,
+        &Totals::dropped_by_client, &Totals::dropped_by_server, &Totals::blank_pictures,
+        &Totals::whole_pictures, &Totals::mode_changes, &Totals::look_changes, &Totals::quality_changes,
+        &Totals::motion_samples})
+    this->*field += other.*field;
+  return *this;
+}
+
+SessionTotals totals_of(ViewerSession& session) {
+  const ReplayStats& strands = session.replay().stats();
+  const PictureStats& pictures = session.picture_stats();
+  SessionTotals totals;
+  totals.decoded_frames = session.decoded_frames();
+  totals.received_frames = pictures.received_frames + strands.received_frames;
+  totals.received_bytes = pictures.received_bytes + strands.received_bytes;
+  totals.keyframes = strands.keyframes;
+  totals.gaps = strands.gaps;
+  totals.missed_frames = pictures.missed_frames + strands.missed_frames;
+  totals.rejected_frames = pictures.rejected_frames + strands.rejected_frames;
+  totals.keyframe_requests = strands.keyframe_requests;
+  totals.dropped_by_client = session.client().counters().dropped_frames;
+  totals.dropped_by_server = session.status().dropped_frames;
+  totals.blank_pictures = session.blank_pictures();
+  totals.whole_pictures = pictures.whole_frames;
+  totals.mode_changes = session.mode_changes();
+  totals.look_changes = session.look_changes();
+  totals.quality_changes = session.quality_changes();
+  totals.motion_samples = session.motion_latency_timer().count();
+  return totals;
+}
+
 Result<std::unique_ptr<ViewerSession>> ViewerSession::open(const ClientConfig& config) {
   ClientConfig acknowledging = config;
   acknowledging.hello.acknowledges = true;
@@ -32,7 +67,9 @@ Result<std::unique_ptr<ViewerSession>> ViewerSession::open(const ClientConfig& c
   const Welcome& welcome = session->welcome();
   auto replay = StrandReplay::make(welcome.codec, {welcome.strand_count, welcome.vertex_count},
                                    [requester] { requester->request_keyframe(); });
-  if (!replay) return at(config.address.to_string(), replay.error());
+  // Of a later version: it will say the same again.
+  if (!replay)
+    return at(config.address.to_string(), Error(ErrorCode::Unsupported, replay.error().to_string()));
   session->replay_ = std::move(replay).value();
   log_info("replay", "strands by {}", codec_text(welcome));
   session->opened_ns_ = now_ns();

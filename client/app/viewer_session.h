@@ -40,6 +40,31 @@ struct PictureStats {  // frames mode
   uint64_t whole_frames = 0;  // that needed no other
 };
 
+/// What sessions have counted, added up.
+struct SessionTotals {
+  uint64_t decoded_frames = 0;
+  uint64_t received_frames = 0;  // strands and pictures
+  uint64_t received_bytes = 0;   // of those
+  uint64_t keyframes = 0;
+  uint64_t gaps = 0;
+  uint64_t missed_frames = 0;
+  uint64_t rejected_frames = 0;
+  uint64_t keyframe_requests = 0;
+  uint64_t dropped_by_client = 0;
+  uint64_t dropped_by_server = 0;
+  uint64_t blank_pictures = 0;
+  uint64_t whole_pictures = 0;
+  uint64_t mode_changes = 0;
+  uint64_t look_changes = 0;
+  uint64_t quality_changes = 0;
+  uint64_t motion_samples = 0;
+
+  SessionTotals& operator+=(const SessionTotals& other);
+};
+
+class ViewerSession;
+SessionTotals totals_of(ViewerSession& session);
+
 class ViewerSession {
  public:
   /// Connects and prepares to decode. Returns the errors of ViewerClient::connect, and an error for an

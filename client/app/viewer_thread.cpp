@@ -150,7 +150,7 @@ void ViewerThread::request_mode(StreamMode mode) {
 std::optional<ViewReport> ViewerThread::stop_and_report() {
   stop();
   if (!live_->has_session()) return std::nullopt;
-  return make_report(live_->session());
+  return make_report(live_->session(), scope_of(*live_));
 }
 
 }  // namespace strandcast

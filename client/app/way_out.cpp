@@ -7,6 +7,7 @@ namespace {
 
 std::string of_upgrade(const Error& error, const Address& address) {
   if (error.code == ErrorCode::Unavailable) return {};  // busy: it says so itself
+  if (error.code == ErrorCode::NotFound && !address.session.empty()) return "look at the name of the session";
   if (error.code == ErrorCode::Unauthorized)
     return "when it is no strandcast-server that says so, look at the port";
   return address.is_tls ? "something else than strandcast-server answers there: look at the port"
@@ -20,12 +21,14 @@ std::string of_welcome(const Error& error) {
     case ErrorCode::Unauthorized:
       return "--token-file FILE or the variable STRANDCAST_TOKEN gives the server's token";
     case ErrorCode::BadInput:
-      return is_refusal(error) ? "--view-only asks for a viewer's role, which most tokens are good for"
-                               : "use the viewer and the server of one version";
+      return "use the viewer and the server of one version";
     case ErrorCode::LimitExceeded:
       return "close another viewer, or raise the server's limit of sessions";
     case ErrorCode::Unsupported:
-      return "use the viewer and the server of one version";
+      return is_refusal(error) ? "--view-only asks for a viewer's role, which most tokens are good for"
+                               : "use the viewer and the server of one version";
+    case ErrorCode::NotFound:
+      return "look at the name of the head";
     default:
       return {};
   }

@@ -15,11 +15,12 @@ ErrorCode code_for(unsigned http_status) {
       return ErrorCode::Unauthorized;
     case 426:
       return ErrorCode::Unsupported;
+    case 404:  // to a proxy: of a session that there is not, or not yet
+      return ErrorCode::NotFound;
     case 429:  // too many connections just now
-    case 503:
       return ErrorCode::Unavailable;
     default:
-      return ErrorCode::BadInput;
+      return http_status >= 500 ? ErrorCode::Unavailable : ErrorCode::BadInput;
   }
 }
 

@@ -13,7 +13,7 @@ namespace strandcast {
 std::string one_line(std::string_view text);
 
 /// Unauthorized when the certificate is not to be trusted, Unsupported when the other side speaks no TLS of
-/// ours: neither goes away by trying again. Unavailable when the connection broke.
+/// ours: both are final (reconnect_policy.h). Unavailable when the connection broke.
 Error error_from_tls(const net::NetStream& stream, const net::NetStream::error_code& failure);
 
 /// Reading HTTP ended because the other side sent more than may be read.

@@ -1,8 +1,10 @@
 #include "common/client/reconnect_policy.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "common/base/hash.h"
+#include "common/base/units.h"
 #include "common/wire/close_code.h"
 
 namespace strandcast {
@@ -13,8 +15,12 @@ ErrorCode code_for(uint16_t close_code) {
     case CloseCode::Unauthorized:
     case CloseCode::Kicked:
       return ErrorCode::Unauthorized;
+    case CloseCode::Refused:
+      return ErrorCode::Unsupported;
     case CloseCode::Full:
       return ErrorCode::LimitExceeded;
+    case CloseCode::NotFound:
+      return ErrorCode::NotFound;
     case CloseCode::BadData:
     case CloseCode::Policy:
     case CloseCode::TooBig:
@@ -38,20 +44,65 @@ Error error_from_close(uint16_t close_code, const std::string& reason) {
                     reason.empty() ? fmt::format("no reason given (code {})", close_code) : reason);
 }
 
-std::optional<std::chrono::milliseconds> ReconnectPolicy::next_delay(
-    const Error& error, std::chrono::milliseconds connected_for) {
-  const bool may_recover = error.code == ErrorCode::Unavailable || error.code == ErrorCode::Timeout;
-  if (!may_recover) return std::nullopt;
-  if (connected_for >= kStableConnection) attempts_ = 0;
+bool is_final(const Error& error, Standing standing) {
+  switch (error.code) {
+    case ErrorCode::Unauthorized:
+    case ErrorCode::Unsupported:
+      return true;
+    case ErrorCode::NotFound:
+      return standing == Standing::Newcomer;
+    case ErrorCode::BadInput:
+    case ErrorCode::LimitExceeded:
+    case ErrorCode::Unavailable:
+    case ErrorCode::Timeout:
+    case ErrorCode::Internal:
+      return false;
+  }
+  return false;
+}
 
+bool is_silent(int64_t heard_ns, int64_t time_ns) {
+  return time_ns - heard_ns >= std::chrono::nanoseconds(kSilentServer).count();
+}
+
+std::string silence_text(const std::string& server, int64_t heard_ns, int64_t time_ns) {
+  return fmt::format("{}: not connected: nothing has come for {:.0f} s", server,
+                     static_cast<double>(time_ns - heard_ns) / kNsPerS);
+}
+
+void ReconnectPolicy::on_welcome(int64_t time_ns) {
+  if (lost_ns_ != 0) outage_ns_ += time_ns - std::exchange(lost_ns_, 0);
+  if (welcomes_++ == 0) first_ns_ = time_ns;
+  welcome_ns_ = time_ns;
+  attempts_ = 0;
+}
+
+std::optional<std::chrono::milliseconds> ReconnectPolicy::on_lost(const Error& error, int64_t time_ns,
+                                                                  int64_t heard_ns) {
+  if (welcome_ns_ != 0) {
+    lost_ns_ = heard_ns == 0 ? time_ns : std::clamp(heard_ns, welcome_ns_, time_ns);
+    const int64_t lived_ns = time_ns - std::exchange(welcome_ns_, 0);
+    if (lived_ns >= std::chrono::nanoseconds(kStableConnection).count()) doublings_ = 0;
+  }
+  if (is_final(error, standing())) return std::nullopt;
   constexpr uint32_t kMaxDoublings = 16;
   const double doubled = static_cast<double>(kFirstReconnectDelay.count()) *
-                         static_cast<double>(1u << std::min(attempts_, kMaxDoublings));
+                         static_cast<double>(1u << std::min(doublings_, kMaxDoublings));
+  ++doublings_;
   ++attempts_;
-  random_ = mix_u32(random_ + attempts_);
+  random_ = mix_u32(random_ + doublings_);
   const double jitter = 1.0 + kReconnectJitter * (2.0 * static_cast<double>(unit_float(random_)) - 1.0);
-  const double delay_ms = std::min(doubled, static_cast<double>(kLongestReconnectDelay.count())) * jitter;
+  const double delay_ms = std::min(doubled, static_cast<double>(longest_.count())) * jitter;
   return std::chrono::milliseconds(static_cast<int64_t>(delay_ms));
+}
+
+double ReconnectPolicy::outage_s(int64_t time_ns) const {
+  const int64_t running_ns = lost_ns_ != 0 ? std::max<int64_t>(time_ns - lost_ns_, 0) : 0;
+  return static_cast<double>(outage_ns_ + running_ns) / kNsPerS;
+}
+
+double ReconnectPolicy::since_first_s(int64_t time_ns) const {
+  return welcomes_ > 0 ? static_cast<double>(time_ns - first_ns_) / kNsPerS : 0.0;
 }
 
 }  // namespace strandcast

@@ -1,5 +1,6 @@
-// ReconnectPolicy: when to try a lost server again, and when trying again cannot help. Pure logic, no clock,
-// no I/O.
+// ReconnectPolicy: the one table of coming back, for the window, the headless viewer, relays, feeders and
+// strandcast-ctl: what is final, how long to wait, when a silent server counts as away, and how long it was
+// away. The page has the same numbers (client/web/page/reconnect.ts). Pure logic on given times, no I/O.
 #pragma once
 
 #include <chrono>
@@ -12,36 +13,71 @@
 
 namespace strandcast {
 
+/// Between two attempts, growing from the first to the longest.
+inline constexpr std::chrono::milliseconds kFirstReconnectDelay{250};
+inline constexpr std::chrono::milliseconds kLongestReconnectDelay{5000};
+/// Of a relay, and of the commands of strandcast-ctl: others wait for them.
+inline constexpr std::chrono::milliseconds kLongestUrgentDelay{1000};
+inline constexpr double kReconnectJitter = 0.25;  // relative, +-
+/// A connection that lived this long: start from the first delay.
+inline constexpr std::chrono::milliseconds kStableConnection{10'000};
+/// Nothing heard for so long: "not connected" is shown. The connection itself waits for idle_timeout.
+inline constexpr std::chrono::milliseconds kSilentServer{3000};
+/// A command of strandcast-ctl tries to connect for so long.
+inline constexpr std::chrono::milliseconds kCommandPatience{5000};
+
+/// Whether somebody has ever been let in there. To a newcomer a name that does not exist is a typing error;
+/// who was in it knows that it did exist.
+enum class Standing { Newcomer, Member };
+
+/// Whether trying again cannot help: a wrong token (Unauthorized); a role that is too low, a ring of relays
+/// or a version that cannot be spoken (Unsupported); and to a newcomer what does not exist (NotFound).
+bool is_final(const Error& error, Standing standing);
+
 /// Turns a server's farewell, close code and Goodbye sentence, into an error whose code says whether another
-/// attempt makes sense: Unauthorized (token), LimitExceeded (server full) and BadInput (it understood us
-/// wrongly, or we it) will not go away by themselves, Unavailable and Timeout may. Close code 0: the
-/// connection broke without one.
+/// attempt makes sense (is_final). Close code 0: the connection broke without one.
 Error error_from_close(uint16_t close_code, const std::string& reason);
 
 /// How its sentence begins: the server said this, and it is no trouble of our own with what it sent.
 inline constexpr std::string_view kClosedByServer = "the server closed the connection: ";
 
+/// Whether a connection on which something came last at `heard_ns` is to be shown as none; by now_ns().
+bool is_silent(int64_t heard_ns, int64_t time_ns);
+/// For a person.
+std::string silence_text(const std::string& server, int64_t heard_ns, int64_t time_ns);
+
 class ReconnectPolicy {
  public:
   /// `seed` spreads the attempts of many viewers that lost the same server at the same moment.
-  explicit ReconnectPolicy(uint32_t seed) : random_(seed) {}
+  explicit ReconnectPolicy(uint32_t seed, std::chrono::milliseconds longest = kLongestReconnectDelay)
+      : random_(seed), longest_(longest) {}
 
-  /// Delay before the next attempt, or nothing when the reason will not go away by itself. `connected_for` is
-  /// how long the connection had lived: a short-lived one does not reset the growing delay.
-  std::optional<std::chrono::milliseconds> next_delay(const Error& error,
-                                                      std::chrono::milliseconds connected_for);
+  /// The server has said Welcome.
+  void on_welcome(int64_t time_ns);
+  /// An attempt failed, or the connection ended whose last byte came at `heard_ns` (0: now). Delay before the
+  /// next attempt, or nothing when the error is final.
+  std::optional<std::chrono::milliseconds> on_lost(const Error& error, int64_t time_ns, int64_t heard_ns = 0);
 
+  Standing standing() const { return welcomes_ > 0 ? Standing::Member : Standing::Newcomer; }
+  /// Since the last Welcome.
   uint32_t attempts() const { return attempts_; }
+  /// Welcomes after the first.
+  uint64_t reconnects() const { return welcomes_ > 0 ? welcomes_ - 1 : 0; }
+  /// Time without a connection since the first Welcome, s, a last silence included.
+  double outage_s(int64_t time_ns) const;
+  /// Time since the first Welcome, s; 0 before it.
+  double since_first_s(int64_t time_ns) const;
 
  private:
   uint32_t random_;
+  const std::chrono::milliseconds longest_;
   uint32_t attempts_ = 0;
+  uint32_t doublings_ = 0;
+  uint64_t welcomes_ = 0;
+  int64_t first_ns_ = 0;    // the first Welcome
+  int64_t welcome_ns_ = 0;  // of the running connection; 0: there is none
+  int64_t lost_ns_ = 0;     // begin of the running outage
+  int64_t outage_ns_ = 0;   // those that are over
 };
-
-inline constexpr std::chrono::milliseconds kFirstReconnectDelay{250};
-inline constexpr std::chrono::milliseconds kLongestReconnectDelay{5000};
-inline constexpr std::chrono::milliseconds kStableConnection{
-    10'000};                                      // lived this long: start from the first delay
-inline constexpr double kReconnectJitter = 0.25;  // relative, +-
 
 }  // namespace strandcast

@@ -32,14 +32,16 @@ const char* to_string(ConnectStep step) {
 Result<std::unique_ptr<ViewerClient>> ViewerClient::connect(const ClientConfig& config) {
   TlsContextPtr tls;
   if (config.address.is_tls) {
-    ASSIGN_OR_RETURN(tls, make_client_tls(config.tls_authorities));
+    auto made = make_client_tls(config.tls_authorities);
+    // A file of ours is no trouble of the server's, which could go away.
+    if (!made) return Error{ErrorCode::Unsupported, made.error().message, made.error().place};
+    tls = std::move(made).value();
   }
   auto connection = std::make_unique<Connection>(config, std::move(tls));
   RETURN_IF_ERROR(connection->open());
   // A server that knows no names has one head.
   if (!config.hello.head.empty() && connection->welcome().scene_name != config.hello.head)
-    return make_error(ErrorCode::Unsupported, "the server has one head and none called '{}'",
-                      config.hello.head);
+    return make_error(ErrorCode::NotFound, "the server has one head and none called '{}'", config.hello.head);
   return std::unique_ptr<ViewerClient>(new ViewerClient(std::move(connection)));
 }
 
@@ -69,6 +71,9 @@ size_t ViewerClient::queued_messages() const {
 }
 ClockOffset ViewerClient::clock() const {
   return connection_->clock();
+}
+int64_t ViewerClient::heard_ns() const {
+  return connection_->heard_ns();
 }
 ConnectionCounters ViewerClient::counters() const {
   return connection_->counters();

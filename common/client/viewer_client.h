@@ -64,7 +64,7 @@ inline constexpr std::chrono::milliseconds kKeyframeRequestInterval{
 struct ConnectionCounters {
   uint64_t received_bytes = 0;  // payload of WebSocket messages
   uint64_t received_messages = 0;
-  uint64_t unknown_messages = 0;  // of a kind that a later version may know; ignored
+  uint64_t unknown_messages = 0;  // of a kind or opcode that a later version may know; ignored
   uint64_t sent_messages = 0;
   uint64_t dropped_frames = 0;  // the application was too slow
 };
@@ -72,9 +72,10 @@ struct ConnectionCounters {
 class ViewerClient {
  public:
   /// Blocks until the server has sent its Welcome. Unavailable: nobody listens or the connection broke;
-  /// Timeout; Unauthorized: the server refused, or its certificate is not to be
-  /// trusted; LimitExceeded, Unsupported: the server refused; BadInput: it does not speak this
-  /// protocol; or what config.cancel says.
+  /// Timeout; Unauthorized: the server refused token or role, or its certificate is not to be trusted;
+  /// Unsupported: another version, no TLS, a ring of relays; NotFound: no such session or head;
+  /// LimitExceeded: the server is full; BadInput: what came is no answer of this protocol; or what
+  /// config.cancel says. is_final() tells those that trying again does not mend.
   static Result<std::unique_ptr<ViewerClient>> connect(const ClientConfig& config);
   /// Says goodbye to the server (waiting a fraction of a second at most) and ends the network thread.
   ~ViewerClient();
@@ -101,6 +102,9 @@ class ViewerClient {
   /// Copy of the clock estimate; has no value until the first probe returned. Any thread.
   ClockOffset clock() const;
   ConnectionCounters counters() const;
+  /// When something came from the server last, by now_ns(); in the middle of a long message within
+  /// kPingInterval. Any thread.
+  int64_t heard_ns() const;
 
  private:
   class Connection;

@@ -34,6 +34,13 @@ bool may_come_first(const ServerMessage& message) {
          std::holds_alternative<Pong>(message);
 }
 
+/// What came is no HTTP, or no answer to the request; else the connection broke.
+bool is_garbage(const boost::system::error_code& failure) {
+  if (failure == http::error::end_of_stream || failure == http::error::partial_message) return false;
+  return failure.category() == boost::system::error_code(http::error::bad_version).category() ||
+         failure.category() == boost::system::error_code(websocket::error::no_connection).category();
+}
+
 websocket::close_code close_code_for(const Error& error) {
   return error.code == ErrorCode::BadInput || error.code == ErrorCode::LimitExceeded
              ? websocket::close_code::protocol_error
@@ -218,7 +225,8 @@ void ViewerClient::Connection::upgrade() {
     if (failure == websocket::error::upgrade_declined)
       return finish(error_from_http(response_.result_int(), view(response_.reason()), response_.body()));
     if (failure)
-      return finish(make_error(ErrorCode::BadInput, "the WebSocket handshake failed: {}", failure.message()));
+      return finish(make_error(is_garbage(failure) ? ErrorCode::BadInput : ErrorCode::Unavailable,
+                               "the WebSocket handshake failed: {}", failure.message()));
     greet();
   });
 }
@@ -279,6 +287,7 @@ Error ViewerClient::Connection::error_from_stream(const error_code& failure) {
 }
 
 Status ViewerClient::Connection::handle(std::span<const std::byte> bytes) {
+  heard_ns_ = now_ns();
   {
     const std::lock_guard lock(mutex_);
     counters_.received_bytes += bytes.size();
@@ -289,20 +298,24 @@ Status ViewerClient::Connection::handle(std::span<const std::byte> bytes) {
   if (static_cast<Opcode>(bytes[0]) == Opcode::Control) {
     Result<ServerMessage> message = decode_server_message(bytes);
     // Of a kind that came with a later version: what we know goes on without it.
-    if (!message && message.error().code == ErrorCode::Unsupported) {
-      const std::lock_guard lock(mutex_);
-      ++counters_.unknown_messages;
-      return {};
-    }
+    if (!message && message.error().code == ErrorCode::Unsupported) return leave_out();
     if (!message) return message.error();
     if (!is_welcome_ && !may_come_first(*message))
       return make_error(ErrorCode::BadInput, "the server sent something else before its Welcome");
     return std::visit([this](auto& part) { return handle_control(part); }, *message);
   }
-  ASSIGN_OR_RETURN(const FrameHeader header, unpack_frame_header(bytes));
+  const Result<FrameHeader> header = unpack_frame_header(bytes);
+  if (!header && header.error().code == ErrorCode::Unsupported && is_welcome_) return leave_out();
+  if (!header) return header.error();
   if (!is_welcome_) return make_error(ErrorCode::BadInput, "the server sent media before its Welcome");
-  MediaEvent event{header, {bytes.begin(), bytes.end()}, now_ns()};
+  MediaEvent event{*header, {bytes.begin(), bytes.end()}, now_ns()};
   if (mailbox_.push(std::move(event)) == Mailbox::Outcome::KeyframeNeeded) request_keyframe();
+  return {};
+}
+
+Status ViewerClient::Connection::leave_out() {
+  const std::lock_guard lock(mutex_);
+  ++counters_.unknown_messages;
   return {};
 }
 
@@ -375,6 +388,9 @@ void ViewerClient::Connection::write_next() {
 void ViewerClient::Connection::ping_next() {
   if (is_finished_) return;
   const int64_t time_ns = now_ns();
+  // A long message is heard before it is whole.
+  if (const auto since = ws_.next_layer().since_received(); since < kSilentServer)
+    heard_ns_ = std::max<int64_t>(heard_ns_, time_ns - std::chrono::nanoseconds(since).count());
   outstanding_pings_.push_back(time_ns);
   if (outstanding_pings_.size() > kMaxOutstandingPings) outstanding_pings_.pop_front();
   // A probe that does not fit is lost like one on the network; the next one follows soon.

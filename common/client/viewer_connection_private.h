@@ -3,6 +3,7 @@
 // own network thread.
 #pragma once
 
+#include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -38,6 +39,7 @@ class ViewerClient::Connection {
   size_t queued_messages() const { return outbox_.message_count(); }
   ClockOffset clock() const;
   ConnectionCounters counters() const;
+  int64_t heard_ns() const { return heard_ns_; }
   Mailbox& mailbox() { return mailbox_; }
   const Welcome& welcome() const { return welcome_; }
 
@@ -58,6 +60,7 @@ class ViewerClient::Connection {
   void read_next();
   Error error_from_stream(const error_code& failure);
   Status handle(std::span<const std::byte> bytes);
+  Status leave_out();
   Status handle_control(Welcome& welcome);
   Status handle_control(Goodbye& goodbye);
   Status handle_control(Pong& pong);
@@ -83,7 +86,8 @@ class ViewerClient::Connection {
   boost::beast::flat_buffer buffer_{kMaxMessageBytes};
   std::deque<int64_t> outstanding_pings_;
   int ping_count_ = 0;
-  bool is_open_ = false;  // the WebSocket handshake is done
+  std::atomic<int64_t> heard_ns_{0};  // when something came last
+  bool is_open_ = false;              // the WebSocket handshake is done
   bool is_welcome_ = false;
   bool is_writing_ = false;
   bool is_finished_ = false;

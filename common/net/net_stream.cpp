@@ -1,4 +1,5 @@
 #include <linux/sockios.h>
+#include <netinet/tcp.h>
 #include <openssl/ssl.h>
 #include <openssl/x509v3.h>
 #include <sys/ioctl.h>
@@ -57,6 +58,12 @@ bool NetStream::is_tls() const {
 size_t NetStream::untaken_bytes() {
   int bytes = 0;
   return ioctl(state_->socket.native_handle(), SIOCOUTQ, &bytes) == 0 ? static_cast<size_t>(bytes) : 0;
+}
+std::chrono::milliseconds NetStream::since_received() {
+  tcp_info info{};
+  socklen_t size = sizeof(info);
+  const bool is_told = getsockopt(state_->socket.native_handle(), IPPROTO_TCP, TCP_INFO, &info, &size) == 0;
+  return is_told ? std::chrono::milliseconds(info.tcpi_last_data_recv) : std::chrono::milliseconds::max();
 }
 void NetStream::close() {
   error_code ignored;

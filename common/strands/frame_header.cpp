@@ -13,6 +13,10 @@ constexpr std::array kMediaOpcodes = {Opcode::Asset,     Opcode::StrandKeyframe,
                                       Opcode::JpegFrame, Opcode::JpegTiles,      Opcode::Vp8Frame,
                                       Opcode::H264Frame};
 
+bool is_known(Opcode opcode) {
+  return std::find(kMediaOpcodes.begin(), kMediaOpcodes.end(), opcode) != kMediaOpcodes.end();
+}
+
 std::string known_opcodes() {
   std::string list;
   for (const Opcode opcode : kMediaOpcodes)
@@ -41,13 +45,16 @@ std::array<std::byte, kFrameHeaderBytes> pack(const FrameHeader& header) {
 }
 
 Result<FrameHeader> unpack_frame_header(std::span<const std::byte> message) {
+  // A later version may have more of them.
+  if (!message.empty() && !is_known(static_cast<Opcode>(message[0])))
+    return make_error(ErrorCode::Unsupported, "unknown media opcode 0x{:02x} (known: {})",
+                      static_cast<unsigned>(message[0]), known_opcodes());
   if (message.size() < kFrameHeaderBytes)
     return make_error(ErrorCode::BadInput, "media message has {} bytes, its header alone has {}",
                       message.size(), kFrameHeaderBytes);
   ByteReader reader(message);
   FrameHeader header;
-  const auto opcode = reader.take<uint8_t>();
-  header.opcode = static_cast<Opcode>(opcode);
+  header.opcode = static_cast<Opcode>(reader.take<uint8_t>());
   header.flags = reader.take<uint8_t>();
   header.stream_id = reader.take<uint16_t>();
   header.sequence = reader.take<uint32_t>();
@@ -55,9 +62,6 @@ Result<FrameHeader> unpack_frame_header(std::span<const std::byte> message) {
   header.payload_bytes = reader.take<uint32_t>();
   header.sim_time_ns = reader.take<int64_t>();
   header.send_time_ns = reader.take<int64_t>();
-  if (std::find(kMediaOpcodes.begin(), kMediaOpcodes.end(), header.opcode) == kMediaOpcodes.end())
-    return make_error(ErrorCode::BadInput, "unknown media opcode 0x{:02x} (known: {})", opcode,
-                      known_opcodes());
   if (header.payload_bytes > kMaxMediaPayloadBytes)
     return make_error(ErrorCode::LimitExceeded, "media payload of {} bytes, the limit is {}",
                       header.payload_bytes, kMaxMediaPayloadBytes);

@@ -96,7 +96,7 @@ void SessionDesk::connect(NetServer& net) {
 Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hello) {
   if (hello.mode == StreamMode::Frames && !visitor.subscription.is_empty())
     if (const std::optional<Error> error = parts_.hub.picture_failure())
-      return make_error(ErrorCode::Unsupported, "no frames can be drawn here: {}", error->to_string());
+      return make_error(ErrorCode::Unavailable, "no frames can be drawn here: {}", error->to_string());
   const bool is_controller = hello.role == Role::Controller || hello.role == Role::Admin;
   const bool is_relay = !hello.relay_id.empty();
   if (is_relay && hello.strand_class >= parts_.hub.strand_classes().size())
@@ -382,6 +382,12 @@ void SessionDesk::on_mode(SessionId session) {
 Status SessionDesk::readiness() {
   if (const std::optional<Error> error = parts_.source.failure()) return *error;
   const SimStats stats = parts_.source.stats();
+  // One step or command that takes long keeps everybody waiting, also while it is paused.
+  const double busy_s = static_cast<double>(stats.busy_ns) * 1e-9;
+  if (stats.is_paused && busy_s >= kMaxReadyStepAgeS)
+    return make_error(ErrorCode::Unavailable,
+                      "The simulation has been busy with one step or command for {:.1f} s (limit {} s).",
+                      busy_s, kMaxReadyStepAgeS);
   if (stats.is_paused) return {};
   if (stats.last_step_ns == 0)
     return make_error(ErrorCode::Unavailable, "The simulation has not stepped yet.");
@@ -392,6 +398,7 @@ Status SessionDesk::readiness() {
 }
 
 void SessionDesk::on_left(SessionId session) {
+  parts_.source.leave(viewers_.describe(session));
   whole_viewers_.erase(session);
   control_budget_.remove(session);
   parameter_budget_.remove(session);

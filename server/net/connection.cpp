@@ -275,10 +275,10 @@ void Connection::redirect(const std::string& target) {
 void Connection::answer_metrics(const Request& request) {
   constexpr std::string_view kScheme = "Bearer ";
   const std::string_view given = view(request[http::field::authorization]);
-  if (!peer_.is_trusted && !given.empty() && context_.guard.is_blocked(peer_.key, now_ns()))
-    return refuse(Refusal::Blocked, http::status::too_many_requests, kBlockedSentence);
   if (!peer_.is_trusted &&
       (!given.starts_with(kScheme) || !find_grant(context_.tokens, given.substr(kScheme.size())))) {
+    if (!given.empty() && context_.guard.is_blocked(peer_.key, now_ns()))
+      return refuse(Refusal::Blocked, http::status::too_many_requests, kBlockedSentence);
     if (!given.empty()) context_.guard.on_wrong_token(peer_.key, now_ns());
     response_.set(http::field::www_authenticate, "Bearer");
     return refuse(given.empty() ? Refusal::Path : Refusal::Token, http::status::unauthorized,

@@ -45,6 +45,8 @@ inline constexpr size_t kMaxHttpReadBytes = kMaxHttpHeaderBytes + 1;
 
 /// A message of the largest size and the buffer's own steps.
 inline constexpr size_t kMaxSessionReadBytes = kMaxControlBytes + (4u << 10);
+/// On the wire, from one message to the next: a message of single bytes, each a fragment of its own, fits.
+inline constexpr size_t kMaxBytesOfMessage = 16 * kMaxControlBytes;
 /// Enough to keep a long fast link busy; the kernel takes twice as much for its own.
 inline constexpr size_t kSendBufferBytes = 1u << 20;
 /// OpenSSL's records both ways, and Asio's.

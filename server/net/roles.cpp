@@ -88,7 +88,7 @@ std::optional<Grant> find_grant(const std::vector<AccessToken>& tokens, std::str
 Status check_role(const std::vector<AccessToken>& tokens, const Hello& hello, int64_t unix_s) {
   if (tokens.empty()) {
     if (hello.role != Role::Admin) return {};
-    return make_error(ErrorCode::BadInput,
+    return make_error(ErrorCode::Unsupported,
                       "An admin needs an admin's token, and this server has none (--token-file).");
   }
   const AccessToken* token = find_token(tokens, hello.token);
@@ -96,7 +96,7 @@ Status check_role(const std::vector<AccessToken>& tokens, const Hello& hello, in
   if (has_expired(*token, unix_s))
     return make_error(ErrorCode::Unauthorized, "This token has expired: ask for a new one.");
   if (!may_be(token->grant, hello.role))
-    return make_error(ErrorCode::BadInput, "This token is good for {}, not for {} {}.",
+    return make_error(ErrorCode::Unsupported, "This token is good for {}, not for {} {}.",
                       to_string(token->grant), article_of(hello.role), to_string(hello.role));
   return {};
 }
@@ -109,7 +109,7 @@ Status check_stay(const std::vector<AccessToken>& tokens, const Hello& hello, in
   if (has_expired(*token, unix_s))
     return make_error(ErrorCode::Unauthorized, "This session's token has expired: ask for a new one.");
   if (!may_be(token->grant, hello.role))
-    return make_error(ErrorCode::BadInput, "This session's token is good for {} now, no longer for {} {}.",
+    return make_error(ErrorCode::Unsupported, "This session's token is good for {} now, no longer for {} {}.",
                       to_string(token->grant), article_of(hello.role), to_string(hello.role));
   return {};
 }

@@ -49,6 +49,8 @@ void Session::start(http::request<http::empty_body> request, bool has_room) {
   socket_.read_message_max(kMaxControlBytes);
   socket_.auto_fragment(false);
   socket_.binary(true);
+  socket_.control_callback(
+      [this](websocket::frame_type kind, beast::string_view) { on_control_frame(kind); });
   socket_.async_accept(request_, [self = shared_from_this(), has_room](const beast::error_code& error) {
     if (error) return self->finish();
     self->guarded([&] { self->on_open(has_room); });
@@ -72,9 +74,15 @@ void Session::close_as_full() {
 }
 
 void Session::read() {
+  // Control frames and empty fragments do not make a message; they count for its bytes.
+  socket_.next_layer().limit_reading(kMaxBytesOfMessage);
   socket_.async_read(read_buffer_, [self = shared_from_this()](const beast::error_code& error, size_t) {
     self->guarded([&] { self->on_read(error); });
   });
+}
+
+std::string Session::rate_sentence() const {
+  return fmt::format("More than {:.0f} messages per second.", context_.config.limits.messages_per_s);
 }
 
 /// Not while many answers wait: who floods is heard as fast as it reads.
@@ -88,8 +96,10 @@ void Session::on_read(const beast::error_code& error) {
   if (state_ == State::Closed) return;
   if (error) {
     // Beast has answered an oversized or malformed frame with the fitting close code already.
-    if (error == websocket::error::message_too_big || error == websocket::error::buffer_overflow ||
-        error == websocket::condition::protocol_violation)
+    if (error == asio::error::message_size)
+      context_.refuse(Refusal::Message, peer_, "control frames and empty fragments without end");
+    else if (error == websocket::error::message_too_big || error == websocket::error::buffer_overflow ||
+             error == websocket::condition::protocol_violation)
       context_.count(&NetCounters::bad_messages);
     if (error != websocket::error::closed) log_debug("net", "session {}: {}", id_, error.message());
     return finish();
@@ -97,9 +107,7 @@ void Session::on_read(const beast::error_code& error) {
   if (state_ == State::Closing) return;  // the close under way drains the rest
   const auto data = read_buffer_.cdata();
   const int64_t arrival_ns = now_ns();
-  if (!rate_.take(arrival_ns))
-    return reject(CloseCode::Policy, fmt::format("More than {:.0f} messages per second.",
-                                                 context_.config.limits.messages_per_s));
+  if (!rate_.take(arrival_ns)) return reject(CloseCode::Policy, rate_sentence());
   context_.count(&NetCounters::messages_received);
   received_ns_ = arrival_ns;
   on_message({static_cast<const std::byte*>(data.data()), data.size()}, arrival_ns);
@@ -138,6 +146,11 @@ void Session::probe(int64_t time_ns) {
 
 void Session::on_control_frame(websocket::frame_type kind) {
   received_ns_ = now_ns();
+  // They cost as much as messages. Beast is in the middle of a read here.
+  if (!rate_.take(received_ns_) && !std::exchange(is_flooding_, true))
+    asio::post(socket_.get_executor(), [self = shared_from_this()] {
+      self->guarded([&] { self->reject(CloseCode::Policy, self->rate_sentence()); });
+    });
   if (kind == websocket::frame_type::pong && std::exchange(is_probe_under_way_, false))
     flow_.on_round_trip(received_ns_ - probe_sent_ns_, received_ns_);
 }

@@ -21,8 +21,6 @@ void Session::begin_media(const Hello& hello, const EncodedFramePtr& asset) {
   }
   if (hello.acknowledges) flow_.expect_acks();
   flow_.remember_capacity_for(context_.config.limits.link_memory_ms * kMsInNs);
-  socket_.control_callback(
-      [this](websocket::frame_type kind, beast::string_view) { on_control_frame(kind); });
   probe(now_ns());
 }
 

@@ -20,6 +20,10 @@ CloseCode close_code_for(const Error& error) {
       return CloseCode::TryLater;
     case ErrorCode::Unauthorized:
       return CloseCode::Unauthorized;
+    case ErrorCode::Unsupported:
+      return CloseCode::Refused;
+    case ErrorCode::NotFound:
+      return CloseCode::NotFound;
     default:
       return CloseCode::Policy;
   }
@@ -65,17 +69,18 @@ bool Session::check_token(const Hello& hello) {
     close(CloseCode::Policy, "An admin has banned this address for a time.");
     return false;
   }
-  const bool is_guessing = !peer_.is_trusted && !context_.tokens.empty();
-  // Not even a right one, or it would show that the others were wrong.
-  if (is_guessing && context_.guard.is_blocked(peer_.key, now_ns())) {
+  // None at all is no guess: a page that was opened without its token.
+  const bool is_guessing = !peer_.is_trusted && !context_.tokens.empty() && !hello.token.empty();
+  const Status allowed = check_role(context_.tokens, hello);
+  if (allowed) return true;
+  const bool is_wrong = allowed.error().code == ErrorCode::Unauthorized;
+  // A right one passes a block: others at this address may have mistyped theirs.
+  if (is_guessing && is_wrong && context_.guard.is_blocked(peer_.key, now_ns())) {
     context_.refuse(Refusal::Blocked, peer_, "tries a token too soon after too many wrong ones");
     close(CloseCode::TryLater, kBlockedSentence);
     return false;
   }
-  const Status allowed = check_role(context_.tokens, hello);
-  if (allowed) return true;
   const std::string sentence = allowed.error().to_string();
-  const bool is_wrong = allowed.error().code == ErrorCode::Unauthorized;
   if (is_guessing && is_wrong) context_.guard.on_wrong_token(peer_.key, now_ns());
   context_.refuse(is_wrong ? Refusal::Token : Refusal::Role, peer_, sentence);
   close(close_code_for(allowed.error()), sentence);
@@ -96,7 +101,7 @@ void Session::join(const Hello& hello) {
   if (!check_token(hello)) return;
   if (!context_.has_room(peer_.key)) return close_as_full();
   const Result<size_t> found = context_.find_head(hello.head);
-  if (!found) return close(CloseCode::Policy, found.error().message);
+  if (!found) return close(close_code_for(found.error()), found.error().message);
   head_ = *found;
   subscription_.begin(hello);
   Result<Admission> admission =

@@ -63,6 +63,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void on_open(bool has_room);
   void read();
   void read_on();
+  std::string rate_sentence() const;
   void on_read(const beast::error_code& error);
   void on_message(std::span<const std::byte> bytes, int64_t arrival_ns);
   bool check_token(const Hello& hello);
@@ -130,6 +131,7 @@ class Session : public std::enable_shared_from_this<Session> {
   bool is_reading_held_ = false;
   bool is_writing_ = false;
   bool is_close_started_ = false;
+  bool is_flooding_ = false;
   CloseCode close_code_ = CloseCode::Normal;
   int64_t state_since_ns_ = 0;
   int64_t progress_ns_ = 0;   // of the write under way

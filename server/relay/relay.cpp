@@ -8,7 +8,7 @@
 
 namespace strandcast {
 
-Relay::Relay(const RelayConfig& config) : voices_(config.upstream) {
+Relay::Relay(const RelayConfig& config) : voices_(config.upstream, config.idle_voice_ns) {
   const bool has_all_heads = config.upstream.head.empty();
   const RelayDeskParts parts{make_start_id(), has_all_heads, voices_, [this] { return counters(); }};
   for (size_t i = 0; i < (has_all_heads ? kMaxHeads : 1); ++i)

@@ -15,6 +15,7 @@ namespace strandcast {
 struct RelayConfig {
   NetConfig net;
   UpstreamConfig upstream;
+  int64_t idle_voice_ns = kIdleVoiceNs;
 };
 
 class Relay {

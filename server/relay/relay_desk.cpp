@@ -47,7 +47,7 @@ void RelayDesk::move_views(const CameraChange& camera) {
 Status RelayDesk::check(const Hello& hello, const Relayed& relayed) const {
   const auto& relays = relayed.welcome.relays;
   if (!hello.relay_id.empty() && std::find(relays.begin(), relays.end(), hello.relay_id) != relays.end())
-    return make_error(ErrorCode::BadInput,
+    return make_error(ErrorCode::Unsupported,
                       "This relay stands behind yours: relays must not stand in a ring.");
   if (!hello.relay_id.empty() && hello.strand_class >= relayed.streams.classes.size())
     return make_error(ErrorCode::Unavailable, "There is no class {} of strands now.", hello.strand_class);
@@ -55,7 +55,7 @@ Status RelayDesk::check(const Hello& hello, const Relayed& relayed) const {
   if (hello.head.empty() || hello.head == relayed.welcome.scene_name) return {};
   if (parts_.has_all_heads && std::find(heads.begin(), heads.end(), hello.head) != heads.end())
     return make_error(ErrorCode::Unavailable, "Head '{}' has not come here yet: try again.", hello.head);
-  return make_error(ErrorCode::BadInput, "There is no head called '{}' here: this relay passes on '{}'.",
+  return make_error(ErrorCode::NotFound, "There is no head called '{}' here: this relay passes on '{}'.",
                     hello.head, relayed.welcome.scene_name);
 }
 
@@ -67,7 +67,7 @@ SimulatedModel RelayDesk::model(const Relayed& relayed) const {
 
 Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello) {
   if (hello.relay_id == parts_.id)
-    return make_error(ErrorCode::BadInput,
+    return make_error(ErrorCode::Unsupported,
                       "This relay stands behind itself: its --upstream must be another server.");
   RETURN_IF_ERROR(upstream_.connected());
   const RelayedPtr relayed = this->relayed();
@@ -99,7 +99,7 @@ Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello
     if (hello.frame_width > 0) welcome.frame_width = hello.frame_width;
     if (hello.frame_height > 0) welcome.frame_height = hello.frame_height;
     welcome.mode_reason = "frames were asked for, and come through a relay";
-    parts_.voices.open_pictures(visitor.session, viewer, number_);
+    parts_.voices.open_pictures({visitor.session, viewer, visitor.peer}, number_);
   } else {
     admission.asset = relayed->asset;
   }
@@ -107,7 +107,7 @@ Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello
     subscription.strands.strand_class = hello.strand_class;
     teller_.add(visitor.session);
   }
-  leaves_[visitor.session] = {viewer, &subscription, {}, false};
+  leaves_[visitor.session] = {viewer, visitor.peer, &subscription, {}, false};
   follow_demand();
   if (!hello.keeps_camera && subscription.gets(StreamMode::Strands)) {
     const std::lock_guard lock(mutex_);
@@ -118,7 +118,8 @@ Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello
 
 void RelayDesk::say(SessionId session, const ClientMessage& message) {
   const auto found = leaves_.find(session);
-  if (found != leaves_.end()) parts_.voices.say(session, found->second.hello, message);
+  if (found != leaves_.end())
+    parts_.voices.say({session, found->second.hello, found->second.address}, message);
 }
 
 /// Of viewers of pictures; the others draw by themselves.

@@ -76,6 +76,7 @@ class RelayDesk : public NetHandler {
  private:
   struct Leaf {
     Hello hello;
+    std::string address;  // what counts as one
     const Subscription* subscription = nullptr;
     ViewerReport report;
     bool is_answer_due = false;  // to a ModeRequest

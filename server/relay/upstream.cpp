@@ -165,13 +165,16 @@ void Upstream::follow_clock() {
   net_->set_clock_offset(clock_offset_ns_);
 }
 
-/// An older server takes the relay for a viewer.
+/// An older server takes the relay for a viewer; one that stands still may send it the next time.
 void Upstream::look_for_list(int64_t time_ns) {
-  if (welcome_ns_ == 0 || !next_.streams.codecs.empty() || time_ns - welcome_ns_ < kListNs || failure_)
-    return;
-  failure_ = at(server(), make_error(ErrorCode::Unsupported,
-                                     "this server (version {}) does not know relays: it needs a newer one",
-                                     next_.welcome.server_version));
+  if (welcome_ns_ == 0 || !next_.streams.codecs.empty() || time_ns - welcome_ns_ < kListNs) return;
+  welcome_ns_ = 0;
+  const auto first = streams_.find(kFirstStream);
+  if (first == streams_.end()) return;
+  first->second.link->lose(at(
+      server(), make_error(ErrorCode::Timeout,
+                           "no list of streams came within {} s: does this server (version {}) know relays?",
+                           kListNs / 1'000'000'000, next_.welcome.server_version)));
 }
 
 // ---- streams of strands ----
@@ -196,6 +199,7 @@ void Upstream::open_stream(uint16_t stream_id) {
   hooks.on_welcome = [this, key](const Welcome& welcome) { return on_welcome(key, welcome); };
   hooks.on_event = [this, key](ClientEvent event) { on_event(key, std::move(event)); };
   hooks.on_lost = [this, key](const Error& error) { return on_lost(key, error); };
+  hooks.on_silence = [this, key](bool is_silent) { on_silence(key, is_silent); };
   stream.link =
       std::make_unique<UpstreamLink>(client_config_for(config_, hello_for(stream_id)), std::move(hooks));
 }
@@ -210,11 +214,11 @@ Upstream::Stream* Upstream::find(const StreamKey& key) {
 Status Upstream::check_way(const Welcome& welcome) const {
   const auto& relays = welcome.relays;
   if (welcome.session_id == id_ || std::find(relays.begin(), relays.end(), id_) != relays.end())
-    return make_error(ErrorCode::BadInput,
+    return make_error(ErrorCode::Unsupported,
                       "this relay stands behind itself: --upstream must lead to the server that simulates");
   if (relays.size() >= kMaxRelays)
-    return make_error(ErrorCode::BadInput, "{} relays stand one behind another already: join one before that",
-                      kMaxRelays);
+    return make_error(ErrorCode::Unsupported,
+                      "{} relays stand one behind another already: join one before that", kMaxRelays);
   return {};
 }
 
@@ -242,17 +246,40 @@ bool Upstream::on_lost(const StreamKey& key, const Error& error) {
   welcome_ns_ = 0;
   trouble_ = error;
   const bool was_connected = std::exchange(is_connected_, false);
-  if (is_final(error)) {
+  // A relay serves others: what a person could have mistyped may also come up later.
+  if (is_final(error, Standing::Member)) {
     failure_ = error;
     return false;
   }
   // All heads have one server.
   log_line(number_ == 0 ? LogLevel::Warn : LogLevel::Debug, "relay", error.to_string() + "; trying again");
-  if (was_connected && !std::exchange(was_away_, true))
-    net_->broadcast(
-        Notice{true, fmt::format("The server is away; this relay tries again: {}", error.to_string())},
-        number_);
+  if (was_connected) tell_away(error);
   return true;
+}
+
+/// To the viewers, once.
+void Upstream::tell_away(const Error& error) {
+  if (std::exchange(was_away_, true)) return;
+  net_->broadcast(
+      Notice{true, fmt::format("The server is away; this relay tries again: {}", error.to_string())},
+      number_);
+}
+
+/// What is still open may come to life again; those who watch are told meanwhile.
+void Upstream::on_silence(const StreamKey& key, bool is_silent) {
+  const std::lock_guard lock(mutex_);
+  if (find(key) == nullptr || key.stream_id != kFirstStream || !is_connected_) return;
+  if (!is_silent) {
+    trouble_.reset();
+    if (std::exchange(was_away_, false)) net_->broadcast(Notice{false, "The server is back."}, number_);
+    return;
+  }
+  const Error error =
+      make_error(ErrorCode::Timeout, "not connected: nothing has come from {} for {} s", server(),
+                 std::chrono::duration_cast<std::chrono::seconds>(kSilentServer).count());
+  log_line(number_ == 0 ? LogLevel::Warn : LogLevel::Debug, "relay", error.to_string());
+  trouble_ = error;
+  tell_away(error);
 }
 
 void Upstream::on_event(const StreamKey& key, ClientEvent event) {
@@ -419,6 +446,7 @@ Status Upstream::readiness() const {
     return make_error(ErrorCode::Unavailable, "This relay has no connection to its server: {}",
                       trouble_->to_string());
   if (!status) return status;
+  if (trouble_) return *trouble_;
   const double age_s = static_cast<double>(now_ns() - newest_frame_ns_) * 1e-9;
   if (status_.is_paused || age_s < kMaxFrameAgeS) return {};
   return make_error(ErrorCode::Unavailable, "No frame has come from {} for {:.1f} s (limit {} s).", server(),

@@ -114,6 +114,8 @@ class Upstream {
   void on_event(const StreamKey& key, ClientEvent event);
   void on_frame(Stream& stream, MediaEvent media);
   bool on_lost(const StreamKey& key, const Error& error);
+  void on_silence(const StreamKey& key, bool is_silent);
+  void tell_away(const Error& error);
   void on_first_event(ClientEvent event);
   void take_list(const StreamList& list);
   void begin_if_complete();

@@ -5,7 +5,6 @@
 
 #include "common/base/profile.h"
 #include "common/base/thread_name.h"
-#include "common/client/reconnect_policy.h"
 #include "common/log/log.h"
 
 namespace strandcast {
@@ -22,11 +21,6 @@ ClientConfig client_config_for(const UpstreamConfig& config, const Hello& hello)
   client.tls_authorities = config.tls_authorities;
   client.hello = hello;
   return client;
-}
-
-bool is_final(const Error& error) {
-  return error.code == ErrorCode::Unauthorized || error.code == ErrorCode::BadInput ||
-         error.code == ErrorCode::Unsupported;
 }
 
 EncodedFramePtr frame_of(MediaEvent media) {
@@ -81,28 +75,27 @@ uint64_t UpstreamLink::received_bytes() const {
 
 void UpstreamLink::run() {
   name_thread("upstream");
-  ReconnectPolicy policy(static_cast<uint32_t>(now_ns()));
+  ReconnectPolicy policy(static_cast<uint32_t>(now_ns()), kLongestUrgentDelay);
   while (!is_stopping_) {
-    const auto begin = std::chrono::steady_clock::now();
-    const Error error = serve();
+    const Error error = serve(policy);
     if (is_stopping_ || !hooks_.on_lost(error)) return;
-    const auto lived = std::chrono::steady_clock::now() - begin;
-    const auto delay = policy.next_delay(error, std::chrono::duration_cast<std::chrono::milliseconds>(lived));
+    const auto delay = policy.on_lost(error, now_ns());
     std::unique_lock lock(mutex_);
-    stopped_.wait_for(lock, std::min(delay.value_or(kLongestReconnectDelay), kLongestRelayDelay),
-                      [this] { return is_stopping_.load(); });
+    stopped_.wait_for(lock, delay.value_or(kLongestUrgentDelay), [this] { return is_stopping_.load(); });
   }
 }
 
 /// One session, from the connection to its end.
-Error UpstreamLink::serve() {
+Error UpstreamLink::serve(ReconnectPolicy& policy) {
   const auto client = ViewerClient::connect(config_);
   if (!client) return client.error();
+  policy.on_welcome(now_ns());
   if (const Status welcome = hooks_.on_welcome((*client)->welcome()); !welcome)
     return at(config_.address.to_string(), welcome.error());
   {
     const std::lock_guard lock(mutex_);
     client_ = client->get();
+    lost_for_.reset();
     for (const ClientMessage& message : std::exchange(waiting_, {})) (void)client_->send(message);
   }
   Error error = hear(**client);
@@ -112,9 +105,21 @@ Error UpstreamLink::serve() {
   return error;
 }
 
+void UpstreamLink::lose(Error error) {
+  const std::lock_guard lock(mutex_);
+  lost_for_ = std::move(error);
+}
+
 Error UpstreamLink::hear(ViewerClient& client) {
+  bool was_silent = false;
   while (!is_stopping_) {
     std::optional<ClientEvent> event = client.next(kLinkLookInterval);
+    const bool is_quiet = is_silent(client.heard_ns(), now_ns());
+    if (std::exchange(was_silent, is_quiet) != is_quiet && hooks_.on_silence) hooks_.on_silence(is_quiet);
+    {
+      const std::lock_guard lock(mutex_);
+      if (lost_for_) return *std::exchange(lost_for_, std::nullopt);
+    }
     if (!event) continue;
     if (const auto* closed = std::get_if<ClosedEvent>(&*event)) return closed->error;
     hooks_.on_event(std::move(*event));

@@ -9,10 +9,12 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 
 #include "common/base/result.h"
+#include "common/client/reconnect_policy.h"
 #include "common/client/viewer_client.h"
 
 namespace strandcast {
@@ -25,13 +27,9 @@ struct UpstreamConfig {
   std::string head;                       // the only one that is passed on; empty = all that are there
 };
 ClientConfig client_config_for(const UpstreamConfig& config, const Hello& hello);
-/// Whether the server will say the same whenever it is asked.
-bool is_final(const Error& error);
 /// As it came, with the time that it was sent.
 EncodedFramePtr frame_of(MediaEvent media);
 
-/// A server that is away is tried again at least this often: many viewers wait for it.
-inline constexpr std::chrono::milliseconds kLongestRelayDelay{1'000};
 /// Messages that wait for the Welcome; more are left out.
 inline constexpr size_t kMaxWaitingMessages = 256;
 
@@ -43,6 +41,7 @@ class UpstreamLink {
     std::function<void(ClientEvent)> on_event;         // but the last
     /// The session is over, or none could be had; whether to try again.
     std::function<bool(const Error&)> on_lost;
+    std::function<void(bool)> on_silence = {};  // nothing has come for kSilentServer, or something again
   };
   UpstreamLink(ClientConfig config, Hooks hooks);
   /// Waits for the thread, a fraction of a second.
@@ -55,6 +54,8 @@ class UpstreamLink {
   void begin_stop();
   void send(const ClientMessage& message);
   void request_keyframe();
+  /// Ends the present session as if it were lost for this reason.
+  void lose(Error error);
   /// Of the present session.
   ClockOffset clock() const;
   /// Payload of all sessions.
@@ -62,7 +63,7 @@ class UpstreamLink {
 
  private:
   void run();
-  Error serve();
+  Error serve(ReconnectPolicy& policy);
   Error hear(ViewerClient& client);
 
   ClientConfig config_;
@@ -72,6 +73,7 @@ class UpstreamLink {
   std::condition_variable stopped_;
   ViewerClient* client_ = nullptr;  // of the thread, while it has said Welcome
   std::deque<ClientMessage> waiting_;
+  std::optional<Error> lost_for_;  // by lose()
   uint64_t earlier_bytes_ = 0;
   std::thread thread_;  // last: starts when everything else is there
 };

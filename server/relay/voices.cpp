@@ -13,8 +13,12 @@ namespace {
 
 CloseCode close_code_for(const Error& error) {
   if (error.code == ErrorCode::Unauthorized) return CloseCode::Unauthorized;
-  return is_final(error) ? CloseCode::Policy : CloseCode::TryLater;
+  if (error.code == ErrorCode::NotFound) return CloseCode::NotFound;
+  return is_final(error, Standing::Newcomer) ? CloseCode::Refused : CloseCode::TryLater;
 }
+
+/// How often idle ones are looked for.
+constexpr std::chrono::seconds kIdleLook{1};
 
 /// Answers, and what was asked for; what everybody is told comes from elsewhere.
 template <class Message>
@@ -35,22 +39,37 @@ void Voices::stop() {
     is_stopping_ = true;
     for (auto& [session, voice] : voices_) end(voice);
     voices_.clear();
+    for (auto& [head, enquiry] : enquiries_) {
+      if (enquiry.link == nullptr) continue;
+      enquiry.link->begin_stop();
+      ended_.push_back(std::move(enquiry.link));
+    }
+    enquiries_.clear();
   }
   changed_.notify_all();
   if (thread_.joinable()) thread_.join();
 }
 
-/// Waits for those that end.
+/// Waits for those that end, and ends those that are idle.
 void Voices::run() {
   name_thread("voices");
   std::unique_lock lock(mutex_);
   while (true) {
-    changed_.wait(lock, [this] { return is_stopping_ || !ended_.empty(); });
+    changed_.wait_for(lock, kIdleLook, [this] { return is_stopping_ || !ended_.empty(); });
+    end_idle(now_ns());
     auto ended = std::exchange(ended_, {});
-    if (ended.empty()) return;
+    if (ended.empty() && is_stopping_) return;
     lock.unlock();
     ended.clear();
     lock.lock();
+  }
+}
+
+void Voices::end_idle(int64_t time_ns) {
+  for (auto& [session, voice] : voices_) {
+    if (voice.link == nullptr || voice.is_kept || time_ns - voice.said_ns < idle_ns_) continue;
+    end(voice);
+    voice.ended_ns = 0;
   }
 }
 
@@ -62,23 +81,49 @@ void Voices::end(Voice& voice) {
   changed_.notify_all();
 }
 
+template <class IsOne>
+size_t Voices::count_open(IsOne is_one) const {
+  return static_cast<size_t>(std::count_if(voices_.begin(), voices_.end(), [&](const auto& entry) {
+    return entry.second.link != nullptr && is_one(entry.second);
+  }));
+}
+
+/// Those who only watch leave places to others, and one address leaves some to other addresses.
+std::optional<Error> Voices::why_full(const Speaker& speaker) const {
+  const bool is_full = count_open([](const Voice&) { return true; }) >= kMaxVoices ||
+                       (speaker.hello.role == Role::Viewer &&
+                        count_open([](const Voice& one) { return one.is_watcher; }) >= kMaxWatchersVoices);
+  if (is_full)
+    return make_error(ErrorCode::Unavailable,
+                      "{} of this relay say something or get pictures already: try again later",
+                      speaker.hello.role == Role::Viewer ? fmt::format("{} viewers", kMaxWatchersVoices)
+                                                         : fmt::format("{} sessions", kMaxVoices));
+  const bool is_watcher = speaker.hello.role == Role::Viewer;
+  const size_t of_address = count_open(
+      [&](const Voice& one) { return one.address == speaker.address && one.is_watcher == is_watcher; });
+  if (of_address < kMaxVoicesPerAddress) return std::nullopt;
+  return make_error(ErrorCode::Unavailable,
+                    "{} sessions of this address say something or get pictures already: try again later",
+                    kMaxVoicesPerAddress);
+}
+
 /// Null while it is not tried again.
-UpstreamLink* Voices::find_or_open(SessionId session, const Hello& hello, size_t head) {
+UpstreamLink* Voices::find_or_open(const Speaker& speaker, const Hello& hello, size_t head) {
   if (is_stopping_) return nullptr;
-  const auto [found, is_new] = voices_.try_emplace(session);
-  Voice& voice = found->second;
+  const SessionId session = speaker.session;
+  Voice& voice = voices_.try_emplace(session).first->second;
+  voice.said_ns = now_ns();
   if (voice.link != nullptr) return voice.link.get();
-  if (!is_new && now_ns() - voice.ended_ns < kSpeakAgainNs) return nullptr;
+  if (voice.ended_ns != 0 && now_ns() - voice.ended_ns < kSpeakAgainNs) return nullptr;
   const bool has_pictures = !hello.gets_no_stream;
-  if (count_open() >= kMaxVoices) {
+  if (const std::optional<Error> error = why_full(speaker)) {
     voice.ended_ns = now_ns();
-    tell(session,
-         make_error(ErrorCode::Unavailable,
-                    "{} viewers of this relay say something or get pictures already: try again later",
-                    kMaxVoices),
-         has_pictures);
+    tell(session, *error, has_pictures);
     return nullptr;
   }
+  voice.address = speaker.address;
+  voice.is_watcher = speaker.hello.role == Role::Viewer;
+  voice.is_kept = has_pictures;
   UpstreamLink::Hooks hooks;
   hooks.on_welcome = [](const Welcome&) { return Status(); };
   hooks.on_event = [this, session, head, has_pictures](ClientEvent event) {
@@ -94,7 +139,10 @@ UpstreamLink* Voices::find_or_open(SessionId session, const Hello& hello, size_t
   return voice.link.get();
 }
 
-void Voices::say(SessionId session, const Hello& viewer, const ClientMessage& message) {
+void Voices::say(const Speaker& speaker, const ClientMessage& message) {
+  const auto* request = std::get_if<ParameterRequest>(&message);
+  if (request != nullptr && !request->is_watching) return ask(speaker, *request);
+  const Hello& viewer = speaker.hello;
   Hello hello;
   hello.role = viewer.role;
   hello.name = viewer.name;
@@ -102,15 +150,82 @@ void Voices::say(SessionId session, const Hello& viewer, const ClientMessage& me
   hello.head = viewer.head;
   hello.gets_no_stream = true;
   const std::lock_guard lock(mutex_);
-  if (UpstreamLink* link = find_or_open(session, hello, 0)) link->send(message);
+  UpstreamLink* link = find_or_open(speaker, hello, 0);
+  if (link == nullptr) return;
+  link->send(message);
+  // What is watched comes without another word.
+  if (request != nullptr || std::holds_alternative<StateTimesRequest>(message))
+    voices_[speaker.session].is_kept = true;
 }
 
-void Voices::open_pictures(SessionId session, const Hello& viewer, size_t head) {
-  Hello hello = viewer;
+void Voices::open_pictures(const Speaker& speaker, size_t head) {
+  Hello hello = speaker.hello;
   hello.acknowledges = false;
   const std::lock_guard lock(mutex_);
-  (void)find_or_open(session, hello, head);
+  (void)find_or_open(speaker, hello, head);
 }
+
+// ---- questions ----
+
+/// Anybody whom the relay lets in may ask: the relay asks in its own name, and answers come in order.
+void Voices::ask(const Speaker& speaker, const ParameterRequest& request) {
+  const std::lock_guard lock(mutex_);
+  if (is_stopping_) return;
+  Enquiry& enquiry = enquiries_[speaker.hello.head];
+  const auto waiting = std::count(enquiry.asked_by.begin(), enquiry.asked_by.end(), speaker.session);
+  if (static_cast<size_t>(waiting) >= kMaxQuestionsOfOne)
+    return net_->send(speaker.session,
+                      Notice{true, "Too many requests for parameters: this one was left out."});
+  enquiry.asked_by.push_back(speaker.session);
+  open_enquiry(speaker.hello.head, enquiry).send(request);
+}
+
+UpstreamLink& Voices::open_enquiry(const std::string& head, Enquiry& enquiry) {
+  if (enquiry.link != nullptr) return *enquiry.link;
+  Hello hello;
+  hello.name = "relay";
+  hello.token = config_.token;
+  hello.head = head;
+  hello.gets_no_stream = true;
+  UpstreamLink::Hooks hooks;
+  hooks.on_welcome = [](const Welcome&) { return Status(); };
+  hooks.on_event = [this, head](ClientEvent event) { on_answer(head, std::move(event)); };
+  hooks.on_lost = [this, head](const Error& error) { return on_enquiry_lost(head, error); };
+  enquiry.link = std::make_unique<UpstreamLink>(client_config_for(config_, hello), std::move(hooks));
+  return *enquiry.link;
+}
+
+/// A list, or an error instead of it; what everybody is told comes from elsewhere.
+void Voices::on_answer(const std::string& head, ClientEvent event) {
+  auto* list = std::get_if<ParameterList>(&event);
+  auto* notice = std::get_if<Notice>(&event);
+  if (list == nullptr && (notice == nullptr || !notice->is_error)) return;
+  const std::lock_guard lock(mutex_);
+  std::deque<SessionId>& asked_by = enquiries_[head].asked_by;
+  if (asked_by.empty()) return;
+  const SessionId session = asked_by.front();
+  asked_by.pop_front();
+  if (list != nullptr)
+    net_->send(session, std::move(*list));
+  else
+    net_->send(session, std::move(*notice));
+}
+
+/// The next question opens it again.
+bool Voices::on_enquiry_lost(const std::string& head, const Error& error) {
+  const std::lock_guard lock(mutex_);
+  Enquiry& enquiry = enquiries_[head];
+  if (enquiry.link != nullptr) {
+    enquiry.link->begin_stop();
+    ended_.push_back(std::move(enquiry.link));
+  }
+  changed_.notify_all();
+  for (const SessionId session : std::exchange(enquiry.asked_by, {}))
+    net_->send(session, Notice{true, error.to_string()});
+  return false;
+}
+
+// ---- how they end ----
 
 void Voices::request_picture(SessionId session) {
   const std::lock_guard lock(mutex_);
@@ -128,12 +243,9 @@ void Voices::leave(SessionId session) {
 
 size_t Voices::count() const {
   const std::lock_guard lock(mutex_);
-  return count_open();
-}
-
-size_t Voices::count_open() const {
-  return static_cast<size_t>(std::count_if(voices_.begin(), voices_.end(),
-                                           [](const auto& entry) { return entry.second.link != nullptr; }));
+  const auto enquiries = std::count_if(enquiries_.begin(), enquiries_.end(),
+                                       [](const auto& entry) { return entry.second.link != nullptr; });
+  return count_open([](const Voice&) { return true; }) + static_cast<size_t>(enquiries);
 }
 
 /// Who came for pictures has nothing else to stay for.

@@ -1,11 +1,15 @@
 // Voices: viewers of a relay that say something, or get pictures, each by a session of its own at the server
-// above, with its own role and token: that server judges. Any thread; nothing waits for the network.
+// above, with its own role and token: that server judges. What only asks for parameters goes by one session
+// for all. Any thread; nothing waits for the network.
 #pragma once
 
 #include <condition_variable>
+#include <deque>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -16,12 +20,29 @@ namespace strandcast {
 
 /// At once: of the sessions that a server has for one address the relay's streams need some, too.
 inline constexpr size_t kMaxVoices = 40;
+/// Of those who only watch: the others are kept for controllers, sources and admins.
+inline constexpr size_t kMaxWatchersVoices = 24;
+/// Of one address, of those who only watch, and as many of the others.
+inline constexpr size_t kMaxVoicesPerAddress = 12;
+/// One by which nothing was said for so long ends, unless it brings pictures or what is watched. Longer than
+/// the steps of a command take (kLongestStepsNs).
+inline constexpr int64_t kIdleVoiceNs = 90'000'000'000;
+/// Questions of one viewer that wait for their answer; more are refused.
+inline constexpr size_t kMaxQuestionsOfOne = 4;
 /// After a refusal the next try for the same viewer comes no sooner.
 inline constexpr int64_t kSpeakAgainNs = 2'000'000'000;
 
+/// Who says something at a relay.
+struct Speaker {
+  SessionId session = 0;
+  const Hello& hello;
+  std::string address;  // what counts as one
+};
+
 class Voices {
  public:
-  explicit Voices(UpstreamConfig config) : config_(std::move(config)) {}
+  explicit Voices(UpstreamConfig config, int64_t idle_ns = kIdleVoiceNs)
+      : config_(std::move(config)), idle_ns_(idle_ns) {}
   /// stop(), if it was not called.
   ~Voices() { stop(); }
   Voices(const Voices&) = delete;
@@ -33,32 +54,50 @@ class Voices {
   void stop();
 
   /// What is answered goes to this viewer alone.
-  void say(SessionId session, const Hello& viewer, const ClientMessage& message);
+  void say(const Speaker& speaker, const ClientMessage& message);
   /// Pictures for this viewer, in the class that has its number; `head`: the number of the one it has joined.
-  void open_pictures(SessionId session, const Hello& viewer, size_t head);
+  void open_pictures(const Speaker& speaker, size_t head);
   void request_picture(SessionId session);
   void leave(SessionId session);
   size_t count() const;
 
  private:
   struct Voice {
-    std::unique_ptr<UpstreamLink> link;  // null: it was refused, or lost
-    int64_t ended_ns = 0;
+    std::unique_ptr<UpstreamLink> link;  // null: it was refused, or lost, or idle
+    int64_t ended_ns = 0;                // 0: it may be opened at once
+    std::string address;
+    bool is_watcher = false;  // its role is that of a viewer
+    bool is_kept = false;     // it brings something by itself
+    int64_t said_ns = 0;
   };
-  UpstreamLink* find_or_open(SessionId session, const Hello& hello, size_t head);
+  /// For all who ask about one head.
+  struct Enquiry {
+    std::unique_ptr<UpstreamLink> link;  // null: none was needed, or it was lost
+    std::deque<SessionId> asked_by;      // those whose answers are to come, in order
+  };
+  UpstreamLink* find_or_open(const Speaker& speaker, const Hello& hello, size_t head);
+  std::optional<Error> why_full(const Speaker& speaker) const;
+  void ask(const Speaker& speaker, const ParameterRequest& request);
+  UpstreamLink& open_enquiry(const std::string& head, Enquiry& enquiry);
+  void on_answer(const std::string& head, ClientEvent event);
+  bool on_enquiry_lost(const std::string& head, const Error& error);
+  void end_idle(int64_t time_ns);
+  template <class IsOne>
+  size_t count_open(IsOne is_one) const;
   void on_event(SessionId session, size_t head, ClientEvent event);
   bool on_lost(SessionId session, const Error& error, bool has_pictures);
   void end(Voice& voice);
-  size_t count_open() const;
   void tell(SessionId session, const Error& error, bool has_pictures);
   void run();
 
   const UpstreamConfig config_;
+  const int64_t idle_ns_;
   NetServer* net_ = nullptr;
   mutable std::mutex mutex_;  // guards all below; never held while a link ends
   std::condition_variable changed_;
   bool is_stopping_ = false;
   std::map<SessionId, Voice> voices_;
+  std::map<std::string, Enquiry> enquiries_;          // by head
   std::vector<std::unique_ptr<UpstreamLink>> ended_;  // to be waited for
   std::thread thread_;
 };

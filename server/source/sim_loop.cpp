@@ -5,6 +5,8 @@
 #include <cmath>
 #include <exception>
 #include <future>
+#include <set>
+#include <string_view>
 #include <utility>
 
 #include "common/base/thread_name.h"
@@ -122,6 +124,9 @@ void SimLoop::loop() {
     const auto time_ns = clock_->take_step(now_ns());
     if (time_ns) step(next_step_ns(*time_ns));
     if (is_counting() && !clock_->has_single_steps() && !is_stopping_) finish_steps();
+    if (is_counting() && now_ns() - steps_begin_ns_ >= config_.longest_steps_ns)
+      break_steps(fmt::format("a command has {:.0f} s, ask for the rest by another",
+                              static_cast<double>(config_.longest_steps_ns) / kNsPerS));
     const bool is_old = now_ns() - stats_ns_ >= kStatsNs;
     const bool is_single = clock_->is_paused() && !clock_->has_single_steps();
     const bool has_news = time_ns && (is_single || tick_ % kStatsInterval == 0 || is_old);
@@ -153,7 +158,7 @@ std::deque<SimLoop::Job> SimLoop::wait_for_jobs() {
   std::unique_lock lock(mutex_);
   const auto is_awake = [this] {
     const auto is_at_once = [](const Job& job) { return !job.is_command(); };
-    const bool has_turn = !jobs_.empty() && !is_preparing_ && !is_counting() && now_ns() >= jobs_rest_ns_;
+    const bool has_turn = next_command() != jobs_.end();
     return is_stopping_ || has_turn || clock_->has_single_steps() ||
            std::any_of(jobs_.begin(), jobs_.end(), is_at_once);
   };
@@ -172,19 +177,69 @@ std::deque<SimLoop::Job> SimLoop::wait_for_jobs() {
   return take_jobs();
 }
 
+/// While steps are counted, commands of who asked for them wait, and so do steps of others; all else of
+/// others comes between two steps. mutex_ is held.
+bool SimLoop::may_go_now(const Job& job) const {
+  if (!is_counting()) return true;
+  const auto* control = std::get_if<ControlCommand>(&job.what);
+  return job.who != steps_who_ && (control == nullptr || control->command != Command::StepOnce);
+}
+
+/// Of the first commands of all sessions that of the one whose turn was longest ago. mutex_ is held.
+std::deque<SimLoop::Job>::iterator SimLoop::next_command() {
+  if (is_preparing_ || now_ns() < jobs_rest_ns_) return jobs_.end();
+  auto next = jobs_.end();
+  uint64_t next_turn = 0;
+  std::set<std::string_view> seen;
+  for (auto job = jobs_.begin(); job != jobs_.end(); ++job) {
+    if (!job->is_command()) continue;
+    if (job->is_prepared) return job;  // it had its turn
+    if (!seen.insert(job->who).second || !may_go_now(*job)) continue;
+    const auto found = turn_of_.find(job->who);
+    const uint64_t turn = found == turn_of_.end() ? 0 : found->second;
+    if (next != jobs_.end() && turn >= next_turn) continue;
+    next = job;
+    next_turn = turn;
+  }
+  return next;
+}
+
 /// All news of viewers, and the next command when it has its turn. mutex_ is held.
 std::deque<SimLoop::Job> SimLoop::take_jobs() {
   std::deque<Job> taken;
-  bool has_command = is_preparing_ || is_counting() || now_ns() < jobs_rest_ns_;
+  if (const auto next = next_command(); next != jobs_.end()) {
+    turn_of_[next->who] = ++turns_;
+    taken.push_back(std::move(*next));
+    jobs_.erase(next);
+  }
   for (auto job = jobs_.begin(); job != jobs_.end();) {
-    if (job->is_command() && std::exchange(has_command, true)) {
+    if (job->is_command()) {
       ++job;
       continue;
     }
     taken.push_back(std::move(*job));
     job = jobs_.erase(job);
   }
+  // Whoever waits for nothing has no turn to remember.
+  std::erase_if(turn_of_, [&](const auto& entry) {
+    return entry.second + kMaxPendingJobs < turns_ &&
+           std::none_of(jobs_.begin(), jobs_.end(), [&](const Job& job) { return job.who == entry.first; });
+  });
   return taken;
+}
+
+/// The newest command of the session that has most waiting, if it has more than one above `who`; else none.
+/// mutex_ is held.
+std::deque<SimLoop::Job>::iterator SimLoop::least_worthy(const std::string& who) {
+  std::map<std::string_view, size_t> count_of;
+  for (const Job& job : jobs_)
+    if (job.is_command()) ++count_of[job.who];
+  const auto most = std::max_element(count_of.begin(), count_of.end(),
+                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (most == count_of.end() || most->second <= count_of[who] + 1) return jobs_.end();
+  for (auto job = jobs_.end(); job != jobs_.begin();)
+    if (--job; job->is_command() && !job->is_prepared && job->who == most->first) return job;
+  return jobs_.end();
 }
 
 /// After a command others wait, the longer the more it took.
@@ -248,6 +303,7 @@ void SimLoop::push(Job job) {
   const bool is_demand = std::holds_alternative<SourceDemand>(job.what);
   bool is_full = false;
   std::optional<Job> older;
+  std::optional<Job> left_out;
   {
     const std::lock_guard lock(mutex_);
     if (is_newer_value(job)) {
@@ -258,9 +314,18 @@ void SimLoop::push(Job job) {
     if (is_demand)
       std::erase_if(jobs_, [](const Job& old) { return std::holds_alternative<SourceDemand>(old.what); });
     is_full = job.is_command() && jobs_.size() >= kMaxPendingJobs;
+    if (is_full) {
+      if (const auto place = least_worthy(job.who); place != jobs_.end()) {
+        left_out = std::move(*place);
+        jobs_.erase(place);
+        is_full = false;
+      }
+    }
     if (!is_full) jobs_.push_back(std::move(job));
   }
   if (older && older->reply) older->reply({false, "Left out: a newer value came before its turn."});
+  if (left_out && left_out->reply)
+    left_out->reply({true, "Left out: your commands filled the queue, and somebody else has some, too."});
   if (!is_full)
     changed_.notify_all();
   else if (job.reply)
@@ -275,6 +340,17 @@ void SimLoop::post(const SetParameter& parameter, Reply reply, const std::string
 }
 void SimLoop::set_demand(const SourceDemand& demand) {
   push({demand, {}, {}});
+}
+void SimLoop::leave(const std::string& who) {
+  {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(jobs_, [&](const Job& job) {
+      const auto* control = std::get_if<ControlCommand>(&job.what);
+      return control != nullptr && control->step_count > 0 && job.who == who;
+    });
+    if (who != steps_who_) return;
+  }
+  push({Leaving{}, {}, who});
 }
 void SimLoop::set_tap(StepTap* tap, StateSource::OnTapped on_tapped) {
   push({TapChange{tap, std::move(on_tapped)}, {}, {}});

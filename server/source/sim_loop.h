@@ -9,6 +9,7 @@
 #include <deque>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -42,6 +43,9 @@ namespace strandcast {
 /// Observer of every published state, for tests and recordings. Must return quickly.
 using SnapshotObserver = std::function<void(const std::shared_ptr<const Snapshot>&)>;
 
+/// Longest time that the steps of one command may take; for more steps a client sends another command.
+inline constexpr int64_t kLongestStepsNs = 60'000'000'000;
+
 struct SimLoopConfig {
   SceneDesc scene;
   std::shared_ptr<const SceneContent> content;
@@ -51,9 +55,11 @@ struct SimLoopConfig {
   StepTap* tap = nullptr;  // from the first step on; the loop puts set_tap()'s in its place
   StepScript* script = nullptr;
   bool is_lockstep = false;  // simulated time goes on by commands only
+  int64_t longest_steps_ns = kLongestStepsNs;
 };
 
-/// Largest number of commands that may wait for the simulation thread; each can require a new solver.
+/// Largest number of commands that may wait for the simulation thread; each can require a new solver. Sessions
+/// take turns. If it is reached, the session with most commands gives up one for a session with fewer.
 inline constexpr size_t kMaxPendingJobs = 32;
 /// Largest share of the time that commands may take, so that many changes of solver do not stop the hair.
 inline constexpr double kJobShare = 0.25;
@@ -87,6 +93,8 @@ class SimLoop {
   void post(const SetParameter& parameter, Reply reply, const std::string& who = {});
   /// Sets what the readers demand; the loop itself determines has_wind_stream.
   void set_demand(const SourceDemand& demand);
+  /// Does what StateSource::leave() does.
+  void leave(const std::string& who);
   /// Does what StateSource::set_tap() does; `tap` must exist until the loop ends or on_tapped is called for
   /// the next tap.
   void set_tap(StepTap* tap, StateSource::OnTapped on_tapped);
@@ -105,8 +113,9 @@ class SimLoop {
     StepTap* tap = nullptr;
     StateSource::OnTapped on_tapped;
   };
+  struct Leaving {};  // who asked is gone
   struct Job {
-    std::variant<ControlCommand, SetParameter, SourceDemand, TapChange> what;
+    std::variant<ControlCommand, SetParameter, SourceDemand, TapChange, Leaving> what;
     Reply reply;
     std::string who = {};                              // asked for it
     bool is_prepared = false;                          // what takes long of it is done
@@ -128,12 +137,16 @@ class SimLoop {
   bool is_newer_value(const Job& job) const;
   std::deque<Job> wait_for_jobs();
   std::deque<Job> take_jobs();
+  bool may_go_now(const Job& job) const;
+  std::deque<Job>::iterator next_command();
+  std::deque<Job>::iterator least_worthy(const std::string& who);
   void carry_out_in_turn(const Job& job);
   bool starts_to_prepare(const Job& job);
   void carry_out(const Job& job);
   /// Carries out a command; an empty result means that the answer comes later.
-  std::optional<Notice> command(const ControlCommand& command, const Reply& reply);
+  std::optional<Notice> command(const ControlCommand& command, const Job& job);
   void finish_steps();
+  void break_steps(const std::string& reason);
   Notice change(const std::string& assignment, std::shared_ptr<const SceneContent> content);
   Status reshape(const SceneDesc& scene, const SceneFeatures& features,
                  std::shared_ptr<const SceneContent> content);
@@ -217,8 +230,10 @@ class SimLoop {
   int64_t look_changed_ns_ = 0;    // 0 = never
   int64_t head_seen_ns_ = 0;       // when hair that is carried went along with it last
   int64_t jobs_rest_ns_ = 0;       // no command is carried out before
-  Reply steps_reply_;              // of the steps under way; no command is carried out before they are done
-  uint32_t counted_steps_ = 0;     // as they were asked for
+  Reply steps_reply_;              // of the steps under way; who asked for them waits till they are done
+  int64_t steps_begin_ns_ = 0;
+  uint64_t steps_begin_tick_ = 0;
+  uint32_t counted_steps_ = 0;                     // as they were asked for
   std::shared_ptr<const Snapshot> counted_state_;  // published last while steps are counted
   std::atomic<int64_t> last_step_ns_{0};
   std::atomic<int64_t> built_ns_{0};       // the newest solver, but for the first
@@ -227,6 +242,9 @@ class SimLoop {
   mutable std::mutex mutex_;  // guards the block below
   std::condition_variable changed_;
   std::deque<Job> jobs_;
+  std::string steps_who_;                    // asked for the steps under way, or for the last ones
+  std::map<std::string, uint64_t> turn_of_;  // of those who wait, when they had their last turn
+  uint64_t turns_ = 0;
   bool is_preparing_ = false;  // no command is carried out before the one that is being prepared
   std::atomic<bool> is_stopping_{false};
   SimStats stats_;

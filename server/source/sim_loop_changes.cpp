@@ -50,6 +50,10 @@ Status prepare_guides(const SceneDesc& scene, const Groom& groom, const glm::dve
 void SimLoop::carry_out(const Job& job) {
   if (const auto* demand = std::get_if<SourceDemand>(&job.what)) return apply_demand(*demand);
   if (const auto* tap = std::get_if<TapChange>(&job.what)) return apply_tap(*tap);
+  if (std::holds_alternative<Leaving>(job.what)) {
+    if (is_counting() && job.who == steps_who_) break_steps("the session that asked for them has ended");
+    return;
+  }
   const auto* control = std::get_if<ControlCommand>(&job.what);
   const auto* parameter = std::get_if<SetParameter>(&job.what);
   PostedChange posted{tick_, {}, job.who};
@@ -59,13 +63,16 @@ void SimLoop::carry_out(const Job& job) {
     posted.what = *parameter;
   if (config_.tap != nullptr) config_.tap->on_change(posted);
   const std::optional<Notice> notice =
-      control != nullptr ? command(*control, job.reply) : change(parameter->assignment, job.content);
+      control != nullptr ? command(*control, job) : change(parameter->assignment, job.content);
   if (config_.tap != nullptr) config_.tap->on_answer(notice.value_or(Notice{false, "Steps follow."}));
   update_stats();  // whoever reads the answer may count on it
   if (job.reply && notice) job.reply(*notice);
 }
 
-std::optional<Notice> SimLoop::command(const ControlCommand& command, const Reply& reply) {
+std::optional<Notice> SimLoop::command(const ControlCommand& command, const Job& job) {
+  // Of somebody else: it does not wait for the rest.
+  const bool is_refused = command.command == Command::Resume && config_.is_lockstep;
+  if (is_counting() && !is_refused) break_steps("somebody else paused, resumed or reset");
   switch (command.command) {
     case Command::Pause:
       clock_->pause();
@@ -81,7 +88,13 @@ std::optional<Notice> SimLoop::command(const ControlCommand& command, const Repl
         return Notice{true, "StepOnce needs a paused simulation: send Pause first."};
       if (command.step_count == 0) return Notice{false, fmt::format("Step {} follows.", tick_ + 1)};
       counted_steps_ = command.step_count;
-      steps_reply_ = reply ? reply : [](const Notice&) {};
+      steps_reply_ = job.reply ? job.reply : [](const Notice&) {};
+      {
+        const std::lock_guard lock(mutex_);
+        steps_who_ = job.who;
+      }
+      steps_begin_ns_ = now_ns();
+      steps_begin_tick_ = tick_;
       return std::nullopt;
     case Command::Reset:
       if (const Status status = solver_->load(config_.content->groom, builder_->world_from_head().rotation);

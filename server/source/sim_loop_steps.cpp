@@ -28,6 +28,15 @@ void SimLoop::finish_steps() {
   std::exchange(steps_reply_, nullptr)(notice);
 }
 
+/// Those that are left of a command are not taken.
+void SimLoop::break_steps(const std::string& reason) {
+  clock_->pause();
+  counted_state_ = nullptr;
+  std::exchange(steps_reply_,
+                nullptr)(Notice{true, fmt::format("{} of {} steps done, at step {}: {}.",
+                                                  tick_ - steps_begin_tick_, counted_steps_, tick_, reason)});
+}
+
 /// Nobody reads: time and inputs go on, and nothing else. Whoever comes is served at once.
 void SimLoop::sleep_through() {
   const int64_t time_ns = now_ns();

@@ -39,6 +39,9 @@ class SimulationSource : public StateSource {
   void post(const SetParameter& parameter, Reply reply, const std::string& who) override {
     loop_->post(parameter, std::move(reply), who);
   }
+  void leave(const std::string& who) override {
+    if (loop_ != nullptr) loop_->leave(who);
+  }
   void set_tap(StepTap* tap, OnTapped on_tapped) override { loop_->set_tap(tap, std::move(on_tapped)); }
   SimStats stats() const override { return loop_ != nullptr ? loop_->stats() : SimStats{}; }
   std::optional<SceneDesc> scene() const override {

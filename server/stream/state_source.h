@@ -90,6 +90,8 @@ class StateSource {
   // `who` asked for it, for people who look at a recording.
   virtual void post(const ControlCommand& command, Reply reply, const std::string& who) = 0;
   virtual void post(const SetParameter& parameter, Reply reply, const std::string& who) = 0;
+  /// Ends the counted steps of a session that left, and drops its commands that still wait.
+  virtual void leave(const std::string& /*who*/) {}
   /// Replaces the tap that hears of every step (null: none). `on_tapped` is called on any thread, but never
   /// after the source has stopped or failed. A source without steps only calls `on_tapped`.
   virtual void set_tap(StepTap* /*tap*/, OnTapped on_tapped) { on_tapped(stats().tick); }

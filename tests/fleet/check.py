@@ -94,6 +94,7 @@ def main():
     (work / "slurm/down").unlink()
     (work / "haproxy.cfg").write_text(fleet("proxy-config"))
     proxy = begin_proxy()
+    assert get("/s/early/")[0] == 503, "a proxy that knows no session yet cannot say that there is none"
     assert "run strandcast-ctl fleet tend" in fleet("start", "early", *SMALL, expect=2)
     fleet("stop", "early")
     tender = begin([sys.executable, "-B", source / "deploy/fleet/strandcast-fleet", "tend"], "tend.log")
@@ -116,7 +117,8 @@ def main():
     assert "there is no session called two" in fleet("stop", "two", expect=2)
     said = fleet("start", "wrong", "--", "--set", "nonsense=1", expect=2)
     assert "wrong failed: strandcast-server: --set nonsense=1: a scene has no field" in said, said
-    assert "failed:" in row("wrong") and get("/s/wrong/")[0] == 404
+    assert "failed:" in row("wrong")
+    until(lambda: get("/s/wrong/")[0] == 404, "nobody waits for it")
     fleet("stop", "wrong")
 
     # The third waits for a GPU and gets it.

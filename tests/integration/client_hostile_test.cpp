@@ -418,15 +418,16 @@ TEST(HostileServer, NothingOfItsHealthSteersATerminal) {
 
 TEST(HostileServer, MonitorPrintsSoManyLinesASecondAndNoMore) {
   constexpr uint32_t kNotices = 20'000;
+  std::atomic<bool> stop{false};
   const FakeServer server([&](FakePeer& peer) {
     peer.welcome(make_welcome(20, 8));
     for (uint32_t i = 0; i < kNotices; ++i)
       if (!peer.send(Notice{false, "look at me"})) return;
-    peer.close(1000, "");
+    stop = true;
+    peer.read_to_end();
   });
   CtlTarget target;
   target.connect = fmt::format("127.0.0.1:{}", server.port());
-  const std::atomic<bool> stop{false};
   testing::internal::CaptureStdout();
   run_monitor(target, 60.0, stop);
   const std::string printed = testing::internal::GetCapturedStdout();

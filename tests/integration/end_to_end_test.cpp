@@ -128,11 +128,12 @@ class EndToEnd : public test::ServerFixture {
   /// The built-in head motion, over the network, until the test ends.
   void start_feeding() {
     feeder_ = std::thread([this] {
-      auto client = ViewerClient::connect(client_config(StreamMode::Strands, Role::Source));
-      ASSERT_TRUE(client) << client.error().to_string();
+      auto client = std::make_unique<SteadyClient>(client_config(StreamMode::Strands, Role::Source));
+      const Status joined = client->await_welcome(stop_feeding_);
+      ASSERT_TRUE(joined) << joined.error().to_string();
       FeedPlan plan;
       plan.motion = built_in_motion;
-      const auto fed = feed({&*client, 1}, plan, stop_feeding_, {});
+      const auto fed = feed({&client, 1}, plan, stop_feeding_, {});
       EXPECT_TRUE(fed) << fed.error().to_string();
     });
   }

@@ -42,6 +42,14 @@ struct Fed {
   FeedProgress progress;
 };
 
+std::unique_ptr<SteadyClient> joined(const ClientConfig& config) {
+  auto client = std::make_unique<SteadyClient>(config);
+  const std::atomic<bool> never{false};
+  const Status status = client->await_welcome(never);
+  EXPECT_TRUE(status) << status.error().to_string();
+  return status ? std::move(client) : nullptr;
+}
+
 /// Feeds a server that says this of itself after each sample.
 Fed feed_to(const ServerStatus& status, const FeedPlan& plan) {
   std::promise<std::vector<MotionSamples>> heard;
@@ -62,13 +70,12 @@ Fed feed_to(const ServerStatus& status, const FeedPlan& plan) {
   ClientConfig config = config_for(server.port());
   config.hello.role = Role::Source;
   Fed fed;
-  auto client = ViewerClient::connect(config);
-  EXPECT_TRUE(client) << client.error().to_string();
-  if (!client) return fed;
-  const auto done = feed({&*client, 1}, plan, stop, {});
+  std::unique_ptr<SteadyClient> client = joined(config);
+  if (client == nullptr) return fed;
+  const auto done = feed({&client, 1}, plan, stop, {});
   EXPECT_TRUE(done) << done.error().to_string();
   if (done) fed.progress = *done;
-  (*client).reset();
+  client.reset();
   fed.heard = heard.get_future().get();
   return fed;
 }
@@ -137,15 +144,15 @@ TEST(Feed, AFileEndsWithItsMotionHoweverSlowlyItIsPlayed) {
   });
   ClientConfig config = config_for(server.port());
   config.hello.role = Role::Source;
-  auto client = ViewerClient::connect(config);
-  ASSERT_TRUE(client) << client.error().to_string();
+  std::unique_ptr<SteadyClient> client = joined(config);
+  ASSERT_NE(client, nullptr);
   const std::atomic<bool> stop = false;
-  const auto done = feed({&*client, 1}, plan, stop, {});
+  const auto done = feed({&client, 1}, plan, stop, {});
   ASSERT_TRUE(done) << done.error().to_string();
   EXPECT_GE(done->motion_s, 0.05);
   EXPECT_LT(done->motion_s, 0.05 + 2.0 / plan.rate_hz);
   EXPECT_GT(done->elapsed_s, 0.06);
-  (*client).reset();
+  client.reset();
   EXPECT_GT(heard.get_future().get(), 10u);
 }
 

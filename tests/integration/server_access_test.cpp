@@ -50,7 +50,7 @@ TEST_F(ServerAccess, EveryTokenAndRole) {
         continue;
       }
       const RawClient::End end = client.read_end();
-      EXPECT_EQ(end.close_code, code(CloseCode::Policy))
+      EXPECT_EQ(end.close_code, code(CloseCode::Refused))
           << to_string(token.grant) << " as " << to_string(role);
       EXPECT_NE(end.reason.find(to_string(role)), std::string::npos) << end.reason;
     }
@@ -98,7 +98,7 @@ TEST_F(ServerAccess, WithoutTokensNobodyIsAdmin) {
   RawClient client(server_->port());
   ASSERT_TRUE(client.handshake());
   client.send(hello(Role::Admin));
-  EXPECT_EQ(client.read_end().close_code, code(CloseCode::Policy));
+  EXPECT_EQ(client.read_end().close_code, code(CloseCode::Refused));
   for (const Role role : {Role::Viewer, Role::Controller, Role::Source})
     EXPECT_NE(join(hello(role)), nullptr);
 }
@@ -180,7 +180,7 @@ TEST_F(ServerAccess, SessionsGoWithTheirTokens) {
   EXPECT_EQ(gone.close_code, code(CloseCode::Unauthorized));
   EXPECT_EQ(gone.reason, "This session's token was taken back: ask for a new one.");
   const RawClient::End lowered = controller->read_end();
-  EXPECT_EQ(lowered.close_code, code(CloseCode::Policy));
+  EXPECT_EQ(lowered.close_code, code(CloseCode::Refused));
   EXPECT_EQ(lowered.reason, "This session's token is good for viewer now, no longer for a controller.");
   const RawClient::End expired = source->read_end();
   EXPECT_EQ(expired.close_code, code(CloseCode::Unauthorized));

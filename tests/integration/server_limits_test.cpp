@@ -248,10 +248,56 @@ TEST_F(ServerLimits, WrongTokensOfOneAddress) {
   EXPECT_EQ(close_code_with(port(), kToken), code(CloseCode::Normal)) << "at the limit";
   EXPECT_EQ(server_->counters().refused_rate, 0u);
   EXPECT_EQ(close_code_with(port(), "wrong"), code(CloseCode::Unauthorized));
-  EXPECT_EQ(close_code_with(port(), kToken), code(CloseCode::TryLater)) << "one over: not even looked at";
+  EXPECT_EQ(close_code_with(port(), "wrong"), code(CloseCode::TryLater)) << "one over";
+  EXPECT_EQ(close_code_with(port(), kToken), code(CloseCode::Normal)) << "a right one passes";
   EXPECT_EQ(server_->counters().refused_rate, 1u);
   EXPECT_NE(test::http_get(port(), "/healthz").find("200 OK"), std::string::npos) << "that is no guess";
   EXPECT_EQ(server_->counters().refused_token, config.limits.wrong_tokens + 1);
+}
+
+// A page that was opened without its token, again and again.
+TEST_F(ServerLimits, NoTokenIsNoGuess) {
+  NetConfig config = strict_config();
+  config.limits.wrong_tokens = 0;
+  config.limits.wrong_token_block_ms = 3'600'000;
+  start(config);
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(close_code_with(port(), ""), code(CloseCode::Unauthorized));
+  EXPECT_EQ(close_code_with(port(), "wrong"), code(CloseCode::Unauthorized)) << "not blocked yet";
+  EXPECT_EQ(close_code_with(port(), "wrong"), code(CloseCode::TryLater));
+}
+
+constexpr size_t kMostFlood = 64u << 20;
+
+/// So many bytes of this are taken before the connection ends, or kMostFlood.
+size_t flood(RawClient& client, const std::string& piece) {
+  std::string many;
+  while (many.size() < 64'000) many += piece;
+  size_t sent = 0;
+  while (sent < kMostFlood && client.send_raw(many)) sent += many.size();
+  return sent;
+}
+
+// What makes no message is counted, too: neither comes to Session::on_message().
+TEST_F(ServerLimits, ControlFramesAndEmptyFragmentsAreCounted) {
+  const std::string mask(4, '\0');
+  const std::string pong = "\x8a\x80" + mask;  // nobody asked for it, and nothing answers it
+  const std::string begin = "\x02\x80" + mask;
+  const std::string empty("\x00\x80\x00\x00\x00\x00", 6);
+  start();
+  for (const bool has_joined : {false, true}) {
+    for (const std::string& piece : {pong, empty}) {
+      auto client = has_joined ? join() : std::make_unique<RawClient>(port());
+      ASSERT_NE(client, nullptr);
+      if (!has_joined) {
+        ASSERT_TRUE(client->handshake());
+      }
+      if (piece == empty) {
+        ASSERT_TRUE(client->send_raw(begin));
+      }
+      EXPECT_LT(flood(*client, piece), kMostFlood / 2) << has_joined << (piece == pong ? " pong" : " empty");
+    }
+  }
+  EXPECT_NE(join(), nullptr) << "all others are served";
 }
 
 TEST_F(ServerLimits, WrongTokensForMetricsCountToo) {
@@ -267,7 +313,10 @@ TEST_F(ServerLimits, WrongTokensForMetricsCountToo) {
   RawClient again(port());
   again.send_raw("GET /metrics HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer " + std::string(kToken) +
                  "\r\n\r\n");
-  EXPECT_NE(again.read_raw_to_end().find(" 429 "), std::string::npos);
+  EXPECT_NE(again.read_raw_to_end().find("200 OK"), std::string::npos) << "a right one passes";
+  RawClient more(port());
+  more.send_raw("GET /metrics HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer wrong\r\n\r\n");
+  EXPECT_NE(more.read_raw_to_end().find(" 429 "), std::string::npos);
   EXPECT_NE(test::http_get(port(), "/healthz").find("200 OK"), std::string::npos);
 }
 
@@ -277,7 +326,8 @@ TEST_F(ServerLimits, ABlockEnds) {
   config.limits.wrong_token_block_ms = 50;
   start(config);
   EXPECT_EQ(close_code_with(port(), "wrong"), code(CloseCode::Unauthorized));
-  EXPECT_TRUE(eventually([&] { return close_code_with(port(), kToken) == code(CloseCode::Normal); }));
+  EXPECT_TRUE(eventually([&] { return close_code_with(port(), "wrong") == code(CloseCode::Unauthorized); }))
+      << "it is looked at again";
 }
 
 TEST_F(ServerLimits, WrongTokensOnTrustedLoopbackDoNotBlock) {

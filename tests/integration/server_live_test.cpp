@@ -319,6 +319,141 @@ TEST(SimLoopJobs, NewSolversLeaveTimeForStepsBetweenThem) {
   EXPECT_GT(step_of(answers.back()), step_of(answers.front())) << answers.front() << " " << answers.back();
 }
 
+/// Answers, as they come, behind a word of whose they are.
+class Answers {
+ public:
+  SimLoop::Reply of(const std::string& who) {
+    return [this, who](const Notice& notice) {
+      const std::lock_guard lock(mutex_);
+      all_.emplace_back(who, notice);
+    };
+  }
+  std::vector<std::pair<std::string, Notice>> all() const {
+    const std::lock_guard lock(mutex_);
+    return all_;
+  }
+  /// The first of these; waits for it.
+  Notice first_of(const std::string& who) const {
+    std::optional<Notice> found;
+    EXPECT_TRUE(eventually([&] {
+      for (const auto& [whose, notice] : all())
+        if (whose == who && !found) found = notice;
+      return found.has_value();
+    })) << who;
+    return found.value_or(Notice{});
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<std::pair<std::string, Notice>> all_;
+};
+
+constexpr uint32_t kManySteps = kMaxStepCount;
+const ControlCommand kStepMany{Command::StepOnce, kManySteps};
+
+SimLoopConfig stepped_config() {
+  SimLoopConfig config;
+  config.scene = test::small_scene(kStrands, kVertices);
+  config.is_lockstep = true;
+  return config;
+}
+
+// A controller asks for hours of steps, and goes.
+TEST(SimLoopJobs, StepsEndWithTheSessionThatAskedForThem) {
+  Answers answers;
+  const Loop loop(stepped_config());
+  if (!loop && test::lacks_gl(loop.trouble())) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+  ASSERT_TRUE(loop) << loop.trouble();
+  loop->post(kStepMany, answers.of("steps"), "gone");
+  loop->post(kStepMany, answers.of("more"), "gone");
+  ASSERT_TRUE(eventually([&] { return loop->stats().tick > 0; }));
+  loop->leave("somebody else");
+  give_time_to_misbehave();
+  EXPECT_TRUE(answers.all().empty());
+  loop->leave("gone");
+  const Notice end = answers.first_of("steps");
+  EXPECT_TRUE(end.is_error);
+  EXPECT_THAT(end.text, HasSubstr("has ended"));
+  loop->post(ControlCommand{Command::Pause}, answers.of("pause"), "other");
+  answers.first_of("pause");
+  const uint64_t tick = loop->stats().tick;
+  EXPECT_LT(tick, kManySteps);
+  give_time_to_misbehave();
+  EXPECT_EQ(loop->stats().tick, tick) << "those that waited are left out, too";
+  EXPECT_EQ(answers.all().size(), 2u);
+}
+
+TEST(SimLoopJobs, StepsYieldToOthersAndKeepTheOrderOfTheirOwn) {
+  for (const Command command : {Command::Pause, Command::Reset}) {
+    Answers answers;
+    const Loop loop(stepped_config());
+    if (!loop && test::lacks_gl(loop.trouble())) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+    ASSERT_TRUE(loop) << loop.trouble();
+    loop->post(kStepMany, answers.of("steps"), "one");
+    loop->post(SetParameter{"gravity_mps2={ x: 1 y: 0 }"}, answers.of("own"), "one");
+    ASSERT_TRUE(eventually([&] { return loop->stats().tick > 0; }));
+    loop->post(SetParameter{"gravity_mps2={ x: 2 y: 0 }"}, answers.of("set"), "other");
+    EXPECT_FALSE(answers.first_of("set").is_error) << "between two steps";
+    EXPECT_EQ(answers.all().size(), 1u) << "the steps go on, and what follows them waits";
+    loop->post(ControlCommand{command}, answers.of("command"), "other");
+    EXPECT_FALSE(answers.first_of("command").is_error);
+    EXPECT_THAT(answers.first_of("steps").text, HasSubstr("somebody else"));
+    EXPECT_FALSE(answers.first_of("own").is_error);
+    EXPECT_LT(loop->stats().tick, kManySteps);
+  }
+}
+
+TEST(SimLoopJobs, StepsOfOneCommandHaveABoundInTime) {
+  Answers answers;
+  SimLoopConfig config = stepped_config();
+  config.longest_steps_ns = 1;
+  const Loop loop(std::move(config));
+  if (!loop && test::lacks_gl(loop.trouble())) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+  ASSERT_TRUE(loop) << loop.trouble();
+  loop->post(kStepMany, answers.of("steps"), "one");
+  const Notice end = answers.first_of("steps");
+  EXPECT_TRUE(end.is_error);
+  EXPECT_THAT(end.text, HasSubstr(fmt::format("of {} steps done", kManySteps)));
+  EXPECT_LT(loop->stats().tick, 10u);
+}
+
+// Three controllers at their allowed rate, and an honest one.
+TEST(SimLoopJobs, SessionsHaveTheirTurnsOneAfterTheOther) {
+  std::promise<void> go, held;
+  const std::shared_future<void> let_go = go.get_future().share();
+  std::atomic<int> published = 0;
+  SimLoopConfig config;
+  config.scene = test::small_scene(kStrands, kVertices);
+  config.on_publish = [&](const std::shared_ptr<const Snapshot>&) {
+    if (++published != 2) return;
+    held.set_value();
+    let_go.wait();
+  };
+  const Loop loop(std::move(config));
+  if (!loop && test::lacks_gl(loop.trouble())) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+  ASSERT_TRUE(loop) << loop.trouble();
+  held.get_future().wait();
+  Answers answers;
+  const std::vector<std::string> greedy = {"a", "b", "c"};
+  for (size_t i = 0; i < 4 * kMaxPendingJobs; ++i)
+    loop->post(SetParameter{"solver.name=pbd"}, answers.of(greedy[i % 3]), greedy[i % 3]);
+  loop->post(ControlCommand{Command::Pause}, answers.of("honest"), "honest");
+  size_t refused = 0;
+  for (const auto& [who, notice] : answers.all()) {
+    EXPECT_NE(who, "honest");
+    refused += notice.is_error ? 1 : 0;
+  }
+  EXPECT_EQ(refused, 3 * kMaxPendingJobs + 1) << "one gave its place";
+  go.set_value();
+  EXPECT_FALSE(answers.first_of("honest").is_error);
+  size_t before = 0;
+  for (const auto& [who, notice] : answers.all()) {
+    if (who == "honest") break;
+    before += notice.is_error ? 0 : 1;
+  }
+  EXPECT_LE(before, 4u) << "one of each before it, and the one under way";
+}
+
 // One step of it takes seconds, and whoever ends the server waits for none of them.
 TEST(SimLoopJobs, StopDoesNotWaitForTheRestOfTheSubsteps) {
   SimLoopConfig config;
@@ -345,7 +480,8 @@ TEST_F(LiveServer, AControllerThatFloodsIsRefusedInOneSentence) {
     refused += controller.next_notice().text.find("commands a second") != std::string::npos ? 1 : 0;
   EXPECT_GT(refused, 0);
   StrandClient other = join(Role::Controller);
-  EXPECT_FALSE(other.ask(SetParameter{"wind.mean_mps.x=2"}).is_error) << "the budget of another is its own";
+  EXPECT_FALSE(other.ask(SetParameter{"gravity_mps2={ x: 2 y: 0 }"}).is_error)
+      << "the budget of another is its own";
 }
 
 TEST_F(LiveServer, LateJoinerHasTheSameStatesBitForBit) {

@@ -115,8 +115,7 @@ class Tls : public test::ServerNet {
   static void expect_final(const Error& error, ErrorCode code, const char* part) {
     EXPECT_EQ(error.code, code) << error.to_string();
     EXPECT_THAT(error.to_string(), HasSubstr(part));
-    EXPECT_EQ(ReconnectPolicy(1).next_delay(error, std::chrono::milliseconds(0)), std::nullopt)
-        << "trying again cannot help";
+    EXPECT_EQ(ReconnectPolicy(1).on_lost(error, 1), std::nullopt) << "trying again cannot help";
   }
 
   TemporaryFolder folder_;
@@ -184,7 +183,7 @@ TEST_F(Tls, CertificatesOfNobodyKnownAreRefused) {
   config.tls_authorities = folder_.path() / "none";
   client = ViewerClient::connect(config);
   ASSERT_FALSE(client.ok());
-  expect_final(client.error(), ErrorCode::BadInput, "none");
+  expect_final(client.error(), ErrorCode::Unsupported, "none");
   EXPECT_EQ(app_.joined_count(), 0u);
 }
 

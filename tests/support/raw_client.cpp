@@ -94,8 +94,8 @@ void RawClient::send_text(const std::string& text) {
   state_->socket.binary(true);
 }
 
-void RawClient::send_raw(const std::string& bytes) {
-  state_->wait(
+bool RawClient::send_raw(const std::string& bytes) {
+  return !state_->wait(
       [&](auto handler) { asio::async_write(state_->socket.next_layer(), asio::buffer(bytes), handler); });
 }
 

@@ -46,8 +46,8 @@ class RawClient {
   void send(const ClientMessage& message);
   void send_bytes(std::span<const std::byte> bytes);
   void send_text(const std::string& text);
-  /// Bytes below WebSocket.
-  void send_raw(const std::string& bytes);
+  /// Bytes below WebSocket; false when the connection has ended.
+  bool send_raw(const std::string& bytes);
   /// So many bytes below WebSocket; false when the connection ends before.
   bool read_raw(size_t byte_count);
   /// One answer to a GET, by its Content-Length: header and body; less when the connection ends before.

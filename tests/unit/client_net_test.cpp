@@ -210,33 +210,99 @@ TEST(Mailbox, WaitWakesForAnEventAndGivesUpAfterTheTimeout) {
   sender.join();
 }
 
+constexpr int64_t kMsNs = 1'000'000;
+
 TEST(ReconnectPolicy, DoublesFromAQuarterSecondToFiveSecondsWithJitter) {
   ReconnectPolicy policy(1);
   const Error lost = make_error(ErrorCode::Unavailable, "connection lost");
   double nominal_ms = 250.0;
   for (int i = 0; i < 12; ++i) {
-    const auto delay = policy.next_delay(lost, milliseconds(0));
+    const auto delay = policy.on_lost(lost, i * kMsNs);
     ASSERT_TRUE(delay);
     EXPECT_GE(delay->count(), nominal_ms * (1.0 - kReconnectJitter) - 1.0) << "attempt " << i;
     EXPECT_LE(delay->count(), nominal_ms * (1.0 + kReconnectJitter)) << "attempt " << i;
     nominal_ms = std::min(nominal_ms * 2.0, 5000.0);
   }
+  ReconnectPolicy urgent(1, kLongestUrgentDelay);
+  for (int i = 0; i < 12; ++i) EXPECT_LE(urgent.on_lost(lost, i * kMsNs)->count(), 1250) << "others wait";
 }
 
 TEST(ReconnectPolicy, StartsOverOnlyAfterAConnectionThatLasted) {
   ReconnectPolicy policy(2);
   const Error lost = make_error(ErrorCode::Timeout, "nothing received");
-  for (int i = 0; i < 6; ++i) (void)policy.next_delay(lost, milliseconds(100));
-  EXPECT_GT(policy.next_delay(lost, milliseconds(100))->count(), 3000);
-  EXPECT_LT(policy.next_delay(lost, kStableConnection)->count(), 400);
+  int64_t time_ns = kMsNs;
+  const auto delay_after = [&](int64_t lived_ms) {
+    policy.on_welcome(time_ns);
+    time_ns += lived_ms * kMsNs;
+    return policy.on_lost(lost, time_ns)->count();
+  };
+  for (int i = 0; i < 6; ++i) (void)delay_after(100);
+  EXPECT_GT(delay_after(100), 3000);
+  EXPECT_LT(delay_after(kStableConnection.count()), 400);
 }
 
 TEST(ReconnectPolicy, SpreadsManyViewers) {
   std::set<int64_t> delays;
   const Error lost = make_error(ErrorCode::Unavailable, "connection lost");
   for (uint32_t seed = 0; seed < 50; ++seed)
-    delays.insert(ReconnectPolicy(seed).next_delay(lost, milliseconds(0))->count());
+    delays.insert(ReconnectPolicy(seed).on_lost(lost, kMsNs)->count());
   EXPECT_GT(delays.size(), 25u);
+}
+
+TEST(ReconnectPolicy, AddsUpHowLongTheServerWasAway) {
+  ReconnectPolicy policy(1);
+  const Error lost = make_error(ErrorCode::Timeout, "nothing received");
+  (void)policy.on_lost(lost, 500 * kMsNs);
+  EXPECT_EQ(policy.outage_s(900 * kMsNs), 0.0) << "nobody has been there yet";
+  policy.on_welcome(1'000 * kMsNs);
+  EXPECT_EQ(policy.reconnects(), 0u);
+  (void)policy.on_lost(lost, 20'000 * kMsNs, 5'000 * kMsNs);  // silent for 15 s
+  EXPECT_NEAR(policy.outage_s(21'000 * kMsNs), 16.0, 1e-9) << "it goes on";
+  (void)policy.on_lost(lost, 21'000 * kMsNs);
+  policy.on_welcome(22'000 * kMsNs);
+  EXPECT_NEAR(policy.outage_s(30'000 * kMsNs), 17.0, 1e-9);
+  (void)policy.on_lost(lost, 30'000 * kMsNs);
+  policy.on_welcome(31'000 * kMsNs);
+  EXPECT_NEAR(policy.outage_s(40'000 * kMsNs), 18.0, 1e-9);
+  EXPECT_EQ(policy.reconnects(), 2u);
+  EXPECT_NEAR(policy.since_first_s(40'000 * kMsNs), 39.0, 1e-9);
+}
+
+TEST(ReconnectPolicy, ThreeSecondsWithoutAWordAreNoConnection) {
+  EXPECT_FALSE(is_silent(1'000 * kMsNs, 3'999 * kMsNs));
+  EXPECT_TRUE(is_silent(1'000 * kMsNs, 4'000 * kMsNs));
+  EXPECT_THAT(silence_text("hair:1", 0, 4'000 * kMsNs), testing::HasSubstr("not connected"));
+}
+
+/// The page has the same numbers: `name = 250` in its source, where underscores may stand in a number.
+TEST(ReconnectPolicy, ThePageHasTheSameNumbers) {
+  const auto text =
+      load_text(std::filesystem::path(STRANDCAST_SOURCE_DIR) / "client/web/page/reconnect.ts", 1u << 20);
+  ASSERT_TRUE(text) << text.error().to_string();
+  const auto number = [&](const std::string& name) {
+    const size_t begin = text->find("const " + name + " = ");
+    EXPECT_NE(begin, std::string::npos) << name;
+    if (begin == std::string::npos) return 0.0;
+    const size_t first = begin + name.size() + 9;
+    std::string digits = text->substr(first, text->find(';', first) - first);
+    std::erase(digits, '_');
+    return std::stod(digits);
+  };
+  const auto ms = [](milliseconds duration) { return static_cast<double>(duration.count()); };
+  EXPECT_EQ(number("FIRST_MS"), ms(kFirstReconnectDelay));
+  EXPECT_EQ(number("LONGEST_MS"), ms(kLongestReconnectDelay));
+  EXPECT_EQ(number("JITTER"), kReconnectJitter);
+  EXPECT_EQ(number("STABLE_MS"), ms(kStableConnection));
+  EXPECT_EQ(number("SILENT_MS"), ms(kSilentServer));
+  const ClientConfig config;
+  EXPECT_EQ(number("IDLE_MS"), ms(config.idle_timeout));
+  EXPECT_EQ(number("WELCOME_MS"), ms(config.connect_timeout + config.welcome_timeout));
+  const size_t begin = text->find("FINAL_CODES = [") + 15;
+  std::istringstream codes(text->substr(begin, text->find(']', begin) - begin));
+  std::set<uint16_t> of_page;
+  for (int code = 0; codes >> code; codes.ignore(1)) of_page.insert(static_cast<uint16_t>(code));
+  for (uint16_t code = 1000; code < 5000; ++code)
+    EXPECT_EQ(of_page.contains(code), is_final(error_from_close(code, ""), Standing::Member)) << code;
 }
 
 enum class Fate { TryAgain, Stop };
@@ -248,21 +314,24 @@ Fate fate_of(CloseCode code) {
     case CloseCode::GoingAway:
     case CloseCode::Internal:
     case CloseCode::TryLater:
-      return Fate::TryAgain;
     case CloseCode::BadData:
     case CloseCode::Policy:
     case CloseCode::TooBig:
+    case CloseCode::Full:
+      return Fate::TryAgain;
     case CloseCode::Unauthorized:
     case CloseCode::Kicked:
-    case CloseCode::Full:
+    case CloseCode::Refused:
+    case CloseCode::NotFound:  // of a newcomer
       return Fate::Stop;
   }
   return Fate::Stop;
 }
 
-constexpr std::array kCloseCodes = {
-    CloseCode::Normal,   CloseCode::GoingAway, CloseCode::BadData,      CloseCode::Policy, CloseCode::TooBig,
-    CloseCode::Internal, CloseCode::TryLater,  CloseCode::Unauthorized, CloseCode::Kicked, CloseCode::Full};
+constexpr std::array kCloseCodes = {CloseCode::Normal,   CloseCode::GoingAway,    CloseCode::BadData,
+                                    CloseCode::Policy,   CloseCode::TooBig,       CloseCode::Internal,
+                                    CloseCode::TryLater, CloseCode::Unauthorized, CloseCode::Kicked,
+                                    CloseCode::Full,     CloseCode::Refused,      CloseCode::NotFound};
 
 TEST(ReconnectPolicy, DoesWithEveryCloseCodeWhatTheProtocolSays) {
   for (const CloseCode code : kCloseCodes) {
@@ -270,7 +339,7 @@ TEST(ReconnectPolicy, DoesWithEveryCloseCodeWhatTheProtocolSays) {
     ReconnectPolicy policy(3);
     std::vector<int64_t> delays_ms;
     for (int attempt = 0; attempt < 4; ++attempt)
-      if (const auto delay = policy.next_delay(error, milliseconds(0))) delays_ms.push_back(delay->count());
+      if (const auto delay = policy.on_lost(error, kMsNs)) delays_ms.push_back(delay->count());
     EXPECT_THAT(error.message, testing::HasSubstr("The reason."));
     if (fate_of(code) == Fate::Stop) {
       EXPECT_TRUE(delays_ms.empty()) << static_cast<int>(code);
@@ -303,12 +372,22 @@ TEST(ReconnectPolicy, AgreesWithTheDocument) {
 }
 
 TEST(ReconnectPolicy, TakesWhatItDoesNotKnowForPassing) {
-  for (const uint16_t code : {0, 1006, 1012, 4999})
-    EXPECT_TRUE(ReconnectPolicy(3).next_delay(error_from_close(code, ""), milliseconds(0))) << code;
-  for (const uint16_t code : {1002, 1003})
-    EXPECT_FALSE(ReconnectPolicy(3).next_delay(error_from_close(code, ""), milliseconds(0))) << code;
-  for (const ErrorCode code : {ErrorCode::BadInput, ErrorCode::Unsupported, ErrorCode::Internal})
-    EXPECT_FALSE(ReconnectPolicy(3).next_delay(make_error(code, "no"), milliseconds(0)));
+  for (const uint16_t code : {0, 1002, 1003, 1006, 1012, 4999})
+    EXPECT_TRUE(ReconnectPolicy(3).on_lost(error_from_close(code, ""), kMsNs)) << code;
+  for (const ErrorCode code : {ErrorCode::BadInput, ErrorCode::LimitExceeded, ErrorCode::Unavailable,
+                               ErrorCode::Timeout, ErrorCode::Internal})
+    EXPECT_TRUE(ReconnectPolicy(3).on_lost(make_error(code, "no"), kMsNs));
+  for (const ErrorCode code : {ErrorCode::Unauthorized, ErrorCode::Unsupported})
+    EXPECT_FALSE(ReconnectPolicy(3).on_lost(make_error(code, "no"), kMsNs));
+}
+
+TEST(ReconnectPolicy, WhatDoesNotExistIsFinalToANewcomerAlone) {
+  const Error gone = make_error(ErrorCode::NotFound, "HTTP 404");
+  ReconnectPolicy policy(3);
+  EXPECT_FALSE(policy.on_lost(gone, kMsNs));
+  policy.on_welcome(2 * kMsNs);
+  EXPECT_TRUE(policy.on_lost(gone, 3 * kMsNs)) << "it did exist";
+  EXPECT_TRUE(policy.on_lost(gone, 4 * kMsNs));
 }
 
 TEST(Address, ReadsWhatPeopleType) {

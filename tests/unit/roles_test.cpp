@@ -81,7 +81,7 @@ TEST(Roles, RefusalsSayWhatIsMissingAndNoToken) {
   hello.role = Role::Controller;
   const Status beyond = check_role(tokens, hello);
   ASSERT_FALSE(beyond);
-  EXPECT_EQ(beyond.error().code, ErrorCode::BadInput) << "the token as such is right";
+  EXPECT_EQ(beyond.error().code, ErrorCode::Unsupported) << "the token as such is right";
   EXPECT_NE(beyond.error().message.find("good for viewer, not for a controller"), std::string::npos);
   for (const Status& status : {wrong, beyond})
     EXPECT_EQ(status.error().to_string().find("0123"), std::string::npos);
@@ -126,7 +126,7 @@ TEST(Roles, ASessionStaysAsLongAsItsTokenGivesItsRole) {
                       std::string("This session's token was taken back: ask for a new one.")));
   EXPECT_EQ(
       why({{tokens[0].secret, Grant::Viewer}}, 0),
-      std::pair(ErrorCode::BadInput,
+      std::pair(ErrorCode::Unsupported,
                 std::string("This session's token is good for viewer now, no longer for a controller.")));
   EXPECT_TRUE(check_stay({{tokens[0].secret, Grant::Admin}}, hello, 0)) << "more than it needs";
 }

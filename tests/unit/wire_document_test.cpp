@@ -143,6 +143,8 @@ bool is_sent(CloseCode code) {
     case CloseCode::Unauthorized:
     case CloseCode::Kicked:
     case CloseCode::Full:
+    case CloseCode::Refused:
+    case CloseCode::NotFound:
       return true;
   }
   return false;

@@ -231,8 +231,28 @@ check('reconnections wait longer and longer', () => {
   assert.deepEqual(waits, [250, 500, 1000, 2000, 4000, 5000, 5000]);
   assert.equal(policy.nextDelayMs(20_000), 250);
   // proto/WIRE.md, section 9.
-  for (const code of [1001, 1006, 1011, 1013]) assert.ok(page.mayComeBack(code), String(code));
-  for (const code of [1002, 1007, 1008, 1009, 4001, 4002, 4003]) assert.ok(!page.mayComeBack(code), String(code));
+  for (const code of [1001, 1002, 1006, 1007, 1008, 1009, 1011, 1013, 4000, 4003]) assert.ok(page.mayComeBack(code, false), String(code));
+  for (const code of [4001, 4002, 4004]) assert.ok(!page.mayComeBack(code, true), String(code));
+  // What has never been there is a typing error.
+  assert.ok(page.mayComeBack(4005, true) && !page.mayComeBack(4005, false));
+});
+
+check('a dead link is left at once, without the closing handshake', () => {
+  const asked = [];
+  const port = { postMessage: (wish) => asked.push(wish) };
+  const socket = new page.DistantSocket(port, 'ws://hair', 'strandcast.v1');
+  const ends = [];
+  socket.onclose = (code, reason) => ends.push([code, reason]);
+  const tell = (message) => port.onmessage({ data: { number: asked[0].number, ...message } });
+  tell({ kind: 'open' });
+  socket.drop(4000, 'nothing came');
+  assert.deepEqual(ends, [[4000, 'nothing came']]);
+  assert.equal(asked.at(-1).kind, 'close');
+  // A minute later, when another connection is there.
+  tell({ kind: 'message', data: new ArrayBuffer(1), receivedNs: 0 });
+  tell({ kind: 'closed', code: 1006, reason: '' });
+  assert.equal(ends.length, 1);
+  assert.ok(!socket.isOpen);
 });
 
 check('the clock believes the shortest round trip', () => {

@@ -10,3 +10,4 @@ export * from '../../client/web/page/scene_text';
 export { rgbaOfTile } from '../../client/web/page/tile_planes';
 export { orbit, pan, zoom } from '../../client/web/page/ui/orbit';
 export * from '../../client/web/page/wire';
+export * from '../../client/web/page/socket';

@@ -53,7 +53,9 @@ Result<FeedPlan> plan_of(const ScenarioFeed& feed) {
 }
 
 Result<std::unique_ptr<LiveFeed>> LiveFeed::start(FeedPlan plan, const ClientConfig& config) {
-  ASSIGN_OR_RETURN(auto client, ViewerClient::connect(config));
+  auto client = std::make_unique<SteadyClient>(config);
+  const std::atomic<bool> never{false};
+  RETURN_IF_ERROR(client->await_welcome(never, kCommandPatience));
   std::unique_ptr<LiveFeed> live(new LiveFeed(std::move(plan), std::move(client)));
   live->thread_ = std::thread([self = live.get()] {
     name_thread("feed");

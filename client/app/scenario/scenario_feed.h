@@ -19,7 +19,7 @@ Result<FeedPlan> plan_of(const ScenarioFeed& feed);
 /// Returns a pose of a head shaken along x with this peak acceleration; the first period builds it up.
 Pose shake_motion(double t_s, double peak_mps2, double rate_hz);
 
-/// Feeds in real time until it is destroyed or the connection ends.
+/// Feeds in real time until it is destroyed; a connection that is lost comes back.
 class LiveFeed {
  public:
   static Result<std::unique_ptr<LiveFeed>> start(FeedPlan plan, const ClientConfig& config);
@@ -31,11 +31,11 @@ class LiveFeed {
   FeedProgress progress() const;
 
  private:
-  LiveFeed(FeedPlan plan, std::unique_ptr<ViewerClient> client)
+  LiveFeed(FeedPlan plan, std::unique_ptr<SteadyClient> client)
       : plan_(std::move(plan)), client_(std::move(client)) {}
 
   const FeedPlan plan_;
-  const std::unique_ptr<ViewerClient> client_;
+  const std::unique_ptr<SteadyClient> client_;
   std::atomic<bool> stop_{false};
   mutable std::mutex mutex_;  // guards the one below
   FeedProgress progress_;

@@ -259,7 +259,7 @@ class Viewer {
     this.panel.showLook(look);
   }
 
-  private connection(state: 'connecting' | 'open' | 'waiting' | 'ended', reason: string, retryMs: number): void {
+  private connection(state: 'connecting' | 'open' | 'silent' | 'waiting' | 'ended', reason: string, retryMs: number): void {
     this.isConnected = state === 'open';
     document.body.dataset.connection = state;
     const box = at('trouble');
@@ -267,7 +267,7 @@ class Viewer {
     const wasAway = !box.hidden;
     this.lostAtMs = state === 'open' ? 0 : this.lostAtMs || performance.now();
     box.hidden = state === 'open' || (state !== 'ended' && box.hidden && this.isQuiet());
-    at('trouble-title').textContent = state === 'ended' ? `No connection to ${location.host}`
+    at('trouble-title').textContent = state === 'silent' ? 'Not connected' : state === 'ended' ? `No connection to ${location.host}`
       : this.welcome ? `Connection to ${location.host} lost` : `Connecting to ${location.host}`;
     if (reason || state === 'open') at('trouble-why').textContent = sentence(reason);
     this.retryAtMs = state === 'waiting' ? performance.now() + retryMs : 0;

@@ -60,7 +60,7 @@ export interface NetFigures {
 
 export type FromNet =
   | { kind: 'welcome'; welcome: WelcomeMessage }
-  | { kind: 'state'; state: 'connecting' | 'open' | 'waiting' | 'ended'; reason: string; retryMs: number }
+  | { kind: 'state'; state: 'connecting' | 'open' | 'silent' | 'waiting' | 'ended'; reason: string; retryMs: number }
   | { kind: 'asset' }
   | { kind: 'shown'; mode: number; reason: string }
   | { kind: 'modeReason'; reason: string }

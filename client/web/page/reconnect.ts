@@ -1,9 +1,21 @@
-// When to come back after a connection ended, as common/client/reconnect_policy.h, and what close codes mean
-// (proto/WIRE.md, section 9).
+// When to come back after a connection ended: the numbers and rules of common/client/reconnect_policy.h, whose test
+// (tests/unit/client_net_test.cpp) compares them with these, and what close codes mean (proto/WIRE.md, section 9).
 const FIRST_MS = 250;
 const LONGEST_MS = 5000;
-const JITTER = 0.2;
+const JITTER = 0.25;
 const STABLE_MS = 10_000;
+/** Nothing heard for so long: "not connected" is shown. */
+export const SILENT_MS = 3000;
+/** Nothing heard for so long: the connection is dead, as ClientConfig has it. */
+export const IDLE_MS = 15_000;
+/** From the first attempt to the Welcome, as connecting and Welcome of ClientConfig together. */
+export const WELCOME_MS = 10_000;
+/** Token refused, ended by an admin, role too low. */
+const FINAL_CODES = [4001, 4002, 4004];
+/** No head of this name: a typing error of who has never been in. */
+const UNKNOWN_CODE = 4005;
+/** The page's own: the connection was given up. */
+export const GIVEN_UP_CODE = 4000;
 
 /** What a person reads where the server said nothing. */
 export function wordsFor(code: number, wasOpen: boolean): string {
@@ -17,12 +29,14 @@ export function wordsFor(code: number, wasOpen: boolean): string {
     case 4001: return 'the token was refused';
     case 4002: return 'an administrator ended this session';
     case 4003: return 'the server is full';
+    case 4004: return 'the token is not good for this role';
+    case 4005: return 'there is no such head';
     default: return wasOpen ? 'the connection was lost' : 'no server answers here';
   }
 }
 
-export function mayComeBack(code: number): boolean {
-  return ![1002, 1003, 1007, 1008, 1009, 4001, 4002, 4003].includes(code);
+export function mayComeBack(code: number, wasIn: boolean): boolean {
+  return !FINAL_CODES.includes(code) && (wasIn || code !== UNKNOWN_CODE);
 }
 
 export class ReconnectPolicy {

@@ -4,7 +4,7 @@ import { ClockOffset, nowNs, Recent } from './clock';
 import { compileCore, Core, StrandDecoder } from './core';
 import type { Asked, Camera, FromNet, NetFigures, State, ToNet } from './messages';
 import { decodablePictures, PictureDecoder, type Decoded } from './pictures';
-import { mayComeBack, ReconnectPolicy, wordsFor } from './reconnect';
+import { GIVEN_UP_CODE, IDLE_MS, mayComeBack, ReconnectPolicy, SILENT_MS, WELCOME_MS, wordsFor } from './reconnect';
 import { DistantSocket } from './socket';
 import {
   ClientMessage, decodeServerMessage, encodeClientMessage, FrameHeader, kControl, kFrameHeaderBytes, Mode, Opcode,
@@ -17,7 +17,6 @@ const QUICK_PING_MS = 20;
 const PING_MS = 1000;
 const KEYFRAME_REQUEST_MS = 1000;
 const CAMERA_MS = 33;
-const IDLE_MS = 15_000;
 const REPORT_MS = 1000;
 const MOST_WAITING = 256; // messages for the core, which has not come yet
 const PICTURE_BITS: { [wish: string]: number } = {
@@ -52,6 +51,7 @@ class Net {
   private readonly policy = new ReconnectPolicy();
   private retry = 0;
   private openedMs = 0;
+  private wasIn = false; // somebody said Welcome
   drawn = { drawMs: 0, shownHz: 0, device: 0 };
   private wantsState = false;
   private waitingAsset?: ArrayBuffer;
@@ -123,7 +123,7 @@ class Net {
     clearTimeout(this.retry);
     if (this.socket) {
       this.socket.onclose = undefined;
-      this.socket.close(1000);
+      this.socket.drop(1000, '');
       this.connection?.end();
       this.connection = undefined; // whoever asks it for a state meanwhile gets none
     }
@@ -135,6 +135,9 @@ class Net {
     const socket = new DistantSocket(this.sockets, this.asked.url, PROTOCOL);
     this.socket = socket;
     let wasOpen = false;
+    const patience = self.setTimeout(() => {
+      if (!this.connection?.hasWelcome) socket.drop(GIVEN_UP_CODE, 'the server does not answer');
+    }, WELCOME_MS);
     socket.onopen = () => {
       wasOpen = true;
       this.openedMs = performance.now();
@@ -143,16 +146,18 @@ class Net {
     };
     socket.onmessage = (data, receivedNs) => this.connection?.receive(data, receivedNs);
     socket.onclose = (code, said) => {
+      clearTimeout(patience);
       const reason = this.connection?.goodbye || said || wordsFor(code, wasOpen);
       const hadWelcome = this.connection?.hasWelcome ?? false;
       this.connection?.end();
       this.connection = undefined;
-      // A token may be good for watching only.
-      if (code === 1008 && !hadWelcome && this.asked.role === Role.controller) {
+      this.wasIn ||= hadWelcome;
+      // A token may be good for watching only; servers of before say so by 1008.
+      if ((code === 4004 || code === 1008) && !hadWelcome && this.asked.role === Role.controller) {
         this.asked = { ...this.asked, role: Role.viewer };
         return this.connect();
       }
-      if (!mayComeBack(code)) return post({ kind: 'state', state: 'ended', reason, retryMs: 0 });
+      if (!mayComeBack(code, this.wasIn)) return post({ kind: 'state', state: 'ended', reason, retryMs: 0 });
       const retryMs = this.policy.nextDelayMs(wasOpen ? performance.now() - this.openedMs : 0);
       post({ kind: 'state', state: 'waiting', reason, retryMs });
       this.retry = self.setTimeout(() => this.connect(), retryMs);
@@ -218,6 +223,7 @@ class Connection {
   private pingCount = 0;
   private readonly timers: number[] = [];
   private lastReceivedMs = performance.now();
+  private isSilent = false;
   private now?: StrandDecoder;
   private next?: StrandDecoder;
   private assetPayload?: Uint8Array;
@@ -309,7 +315,7 @@ class Connection {
       take();
     } catch (error) {
       this.goodbye ||= `the server sent what cannot be read: ${(error as Error).message}`;
-      this.socket.close(4000);
+      this.socket.drop(GIVEN_UP_CODE, this.goodbye);
     }
   }
 
@@ -355,12 +361,20 @@ class Connection {
     post({ kind: 'welcome', welcome });
     post({ kind: 'state', state: 'open', reason: '', retryMs: 0 });
     this.ping();
-    this.timers.push(self.setInterval(() => {
-      if (performance.now() - this.lastReceivedMs > IDLE_MS) {
-        this.goodbye ||= 'nothing came from the server for 15 s';
-        this.socket.close(4000);
-      }
-    }, 1000));
+    this.timers.push(self.setInterval(() => this.listen(), 500));
+  }
+
+  /** A silent server is shown as away, and after IDLE_MS it is looked for anew. */
+  private listen(): void {
+    const silentMs = performance.now() - this.lastReceivedMs;
+    if (silentMs > IDLE_MS) {
+      this.goodbye ||= `nothing came from the server for ${IDLE_MS / 1000} s`;
+      return this.socket.drop(GIVEN_UP_CODE, this.goodbye);
+    }
+    const isSilent = silentMs > SILENT_MS;
+    if (isSilent === this.isSilent) return;
+    this.isSilent = isSilent;
+    post({ kind: 'state', state: isSilent ? 'silent' : 'open', reason: isSilent ? `nothing has come for ${SILENT_MS / 1000} s` : '', retryMs: 0 });
   }
 
   // ---- clock
@@ -382,6 +396,7 @@ class Connection {
   // ---- media
 
   private media(message: Uint8Array, received: number): void {
+    if (!(Object.values(Opcode) as number[]).includes(message[0]!)) return; // of a later version
     const header = readFrameHeader(message);
     switch (header.opcode) {
       case Opcode.asset:

@@ -23,7 +23,7 @@ export function runSocket(): void {
         try {
           socket = new WebSocket(url, protocol);
         } catch (error) {
-          return post({ kind: 'closed', number, code: 1008, reason: (error as Error).message });
+          return post({ kind: 'closed', number, code: 4005, reason: (error as Error).message });
         }
         socket.binaryType = 'arraybuffer';
         socket.onopen = () => post({ kind: 'open', number });
@@ -44,13 +44,14 @@ let lastNumber = 0;
 
 export class DistantSocket {
   isOpen = false;
+  private isDropped = false;
   onopen?: () => void;
   onmessage?: (data: unknown, receivedNs: number) => void;
   onclose?: (code: number, reason: string) => void;
   private readonly number = ++lastNumber;
   constructor(private readonly port: MessagePort, url: string, protocol: string) {
     port.onmessage = ({ data: message }: MessageEvent<FromSocket>) => {
-      if (message.number !== this.number) return;
+      if (message.number !== this.number || this.isDropped) return;
       if (message.kind === 'message') return this.onmessage?.(message.data, message.receivedNs);
       this.isOpen = message.kind === 'open';
       if (message.kind === 'open') this.onopen?.();
@@ -63,6 +64,13 @@ export class DistantSocket {
   }
   send(bytes: Uint8Array): void {
     if (this.isOpen) this.post({ kind: 'send', number: this.number, bytes }, [bytes.buffer]);
+  }
+  /** Ends it here and now: over a link that is dead the browser's closing handshake takes a minute. */
+  drop(code: number, reason: string): void {
+    if (this.isDropped) return;
+    this.isDropped = true;
+    this.close(code);
+    this.onclose?.(code, reason);
   }
   close(code: number): void {
     this.isOpen = false;

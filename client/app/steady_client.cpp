@@ -1,0 +1,54 @@
+#include "client/app/steady_client.h"
+
+namespace strandcast {
+namespace {
+
+constexpr std::chrono::milliseconds kAwaitPump{20};
+
+}  // namespace
+
+Status SteadyClient::pump(std::chrono::milliseconds timeout, const OnEvent& on_event) {
+  if (client_ == nullptr) {
+    if (attempts_.final_error()) return *attempts_.final_error();
+    client_ = attempts_.pump(timeout);
+    if (client_ != nullptr) welcome_ = client_->welcome();
+    if (attempts_.final_error()) return *attempts_.final_error();
+    return {};
+  }
+  for (ClientEvent& event : client_->wait(timeout)) {
+    if (const auto* closed = std::get_if<ClosedEvent>(&event)) {
+      attempts_.lose(closed->error, client_->heard_ns());
+      client_.reset();
+      if (attempts_.final_error()) return *attempts_.final_error();
+      return {};
+    }
+    on_event(event);
+  }
+  tell_silence();
+  return {};
+}
+
+/// Once a silence.
+void SteadyClient::tell_silence() {
+  const bool is_quiet = !is_connected();
+  if (!std::exchange(has_told_silence_, is_quiet) && is_quiet)
+    log_warn("net", "{}",
+             silence_text(attempts_.config().address.to_string(), client_->heard_ns(), now_ns()));
+}
+
+Status SteadyClient::await_welcome(const std::atomic<bool>& stop, std::chrono::milliseconds limit) {
+  const auto begin = std::chrono::steady_clock::now();
+  while (client_ == nullptr) {
+    if (stop) return make_error(ErrorCode::Unavailable, "stopped before the server had answered");
+    // Its largest value is more nanoseconds than there are.
+    const auto waited = std::chrono::steady_clock::now() - begin;
+    if (std::chrono::duration_cast<std::chrono::milliseconds>(waited) >= limit)
+      return attempts_.last_error()
+                 ? *attempts_.last_error()
+                 : make_error(ErrorCode::Timeout, "the server did not answer within {} ms", limit.count());
+    RETURN_IF_ERROR(pump(kAwaitPump, {}));
+  }
+  return {};
+}
+
+}  // namespace strandcast
