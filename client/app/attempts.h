@@ -83,14 +83,14 @@ class Attempts {
     log_warn("net", "{}; next attempt in {} ms", error.to_string(), delay->count());
   }
 
-  /// What the next attempt says Hello with.
+  /// Returns the configuration of the next attempt.
   ClientConfig& config() { return config_; }
   const ClientConfig& config() const { return config_; }
   const ReconnectPolicy& policy() const { return policy_; }
-  /// Of the attempt that runs, or ran last.
+  /// Returns the step that the current or last attempt reached.
   ConnectStep step() const { return step_; }
   const std::optional<Error>& last_error() const { return last_error_; }
-  /// The reason, when trying again cannot help.
+  /// Returns the reason if another attempt cannot help; empty otherwise.
   const std::optional<Error>& final_error() const { return final_error_; }
   /// What is being done, for a person; empty when trying again cannot help.
   std::string doing() const {

@@ -28,9 +28,9 @@ class SteadyClient {
 
   /// Null while there is no connection.
   ViewerClient* client() { return client_.get(); }
-  /// There is one, and the server has said something in the last kSilentServer.
+  /// Returns whether there is a connection on which the server said something within kSilentServer.
   bool is_connected() const { return client_ != nullptr && !is_silent(client_->heard_ns(), now_ns()); }
-  /// Of the newest connection; there must have been one.
+  /// Returns the Welcome of the newest connection; there must have been one.
   const Welcome& welcome() const { return welcome_; }
   const ReconnectPolicy& policy() const { return attempts_.policy(); }
 

@@ -38,7 +38,7 @@ StepBlock make_step_block(const StepInput& input, const StrandParameters& parame
                                      parameters.s_damping, parameters.max_speed_mps));
   block.contact = glm::vec4(glm::dvec4(parameters.collider_friction, parameters.air_drag_per_s,
                                        1.0 - parameters.thrust_share, parameters.thickness_spread));
-  block.wind = pack(relative_wind, 0.0);
+  block.wind = pack(relative_wind, pull_ahead_s(h_s));
   block.step_index = head.step_index;
   block.follicle_cosine = static_cast<float>(std::cos(input.follicle_limit_rad));
   block.follicle_sine = static_cast<float>(std::sin(input.follicle_limit_rad));

@@ -1,6 +1,7 @@
 // StepBlock: the uniform block of shaders/sim/step.glsl (std140), filled once per substep. Plain data.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -13,6 +14,14 @@ namespace strandcast {
 /// Pull to the groomed shape from which on it carries the whole weight of a sag-free groom; a weaker pull
 /// carries its share, so a limp strand falls. At this pull a strand that sags would give way by half a metre.
 inline constexpr double kSupportStiffnessPerS2 = 20.0;
+
+/// Time by which the pull to the groomed shape looks ahead, s. Backward Euler looks a substep ahead and so
+/// brakes what swings by half of that per second. With this time substeps brake alike, as those of a 60th of
+/// a second do, up to twice as long; longer ones brake as much more as stays stable at any stiffness.
+inline double pull_ahead_s(double substep_s) {
+  constexpr double kBrakingS = 1.0 / 60.0;
+  return std::max(kBrakingS, 0.5 * substep_s);
+}
 
 struct StrandParameters {
   double s_damping = 0.0;               // share of the velocity correction, 0..1
@@ -48,7 +57,7 @@ struct StepBlock {
   float follicle_sine;
   uint32_t unused;
   std::array<glm::vec4, 3> previous_turn;
-  glm::vec4 wind;
+  glm::vec4 wind;  // w: pull_ahead_s()
   std::array<glm::vec4, shader::kMaxGustWaves> gust_amplitude;
   std::array<glm::vec4, shader::kMaxGustWaves> gust_wave;
   std::array<glm::vec4, shader::kMaxSphereColliders> collider;

@@ -383,11 +383,22 @@ void add_substeps(v1::Scene& message) {
   if (count > message.substeps()) message.set_substeps(static_cast<uint32_t>(count));
 }
 
+/// Those that full quality takes, where the scene has as many.
+void drop_substeps(v1::Scene& message) {
+  v1::Scene full = message;
+  full.clear_substeps();
+  add_substeps(full);
+  if (full.has_substeps() && full.substeps() == message.substeps()) message.clear_substeps();
+}
+
 /// Quality, then overrides: whoever chooses a model by hand gets what the scene itself says, and whoever
 /// changes what a quality stands for has one of his own. Rods that are chosen by hand act on each other, in
 /// air, unless told otherwise.
 Status apply_choices(v1::Scene& message, bool is_text, const std::vector<std::string>& overrides) {
   const bool names_solver = names_any(overrides, {"solver"});
+  // A scene that runs brings the substeps that its quality took.
+  const bool was_full = !is_text && message.solver().name() == kRodSolver &&
+                        (message.quality() == kFullQuality || message.quality() == kAutoQuality);
   for (const std::string& assignment : overrides)
     if (assignment.starts_with("quality=")) RETURN_IF_ERROR(apply_override(message, assignment));
   const bool names_quality = names_any(overrides, {"quality="});
@@ -399,6 +410,7 @@ Status apply_choices(v1::Scene& message, bool is_text, const std::vector<std::st
   const bool is_full =
       takes_quality && !names_any(overrides, {"substeps="}) && message.solver().name() == kRodSolver;
   const bool is_rod_before = message.solver().name() == kRodSolver;
+  if (was_full && takes_quality && !is_rod_before) drop_substeps(message);
   for (const std::string& assignment : overrides) RETURN_IF_ERROR(apply_override(message, assignment));
   if (names_solver || names_any(overrides, {"volume.", "air.", "head.collider"}))
     message.set_quality(kCustomQuality);

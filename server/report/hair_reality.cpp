@@ -61,6 +61,15 @@ double viscous_carried(const AirDesc& air, double hairs_per_m2, double wind_mps)
   return 1.0 - std::tanh(half) / half;
 }
 
+/// Mean over a way, of which `function` takes the share that lies behind.
+template <class Function>
+double mean_of_way(const Function& function) {
+  constexpr int kParts = 256;
+  double sum = 0.0;
+  for (int i = 0; i < kParts; ++i) sum += function((i + 0.5) / kParts);
+  return sum / kParts;
+}
+
 std::vector<BundleAir> measure_bundles(const HairRealityDesc& desc) {
   constexpr double kPerCm2 = 1e4;
   const AirDesc air;
@@ -70,11 +79,17 @@ std::vector<BundleAir> measure_bundles(const HairRealityDesc& desc) {
     const double wind_mps = desc.bundle_wind_mps;
     BundleAir bundle;
     bundle.hairs_per_cm2 = per_cm2;
-    bundle.ours = carried_air_share(air, hairs_per_m2, wind_mps);
+    const auto speed_mps = [&](double way_share) {
+      const double hairs_per_m = hairs_per_m2 * way_share * air.lock_width_m;
+      return wind_mps * arriving_wind_share(air, hairs_per_m, wind_mps) *
+             met_wind_share(carried_air_share(air, hairs_per_m2, wind_mps));
+    };
+    bundle.ours = 1.0 - mean_of_way(speed_mps) / wind_mps;
     bundle.screen = screen_carried(air, hairs_per_m2, wind_mps);
     bundle.viscous = viscous_carried(air, hairs_per_m2, wind_mps);
-    const double left_mps = (1.0 - bundle.ours) * wind_mps;
-    bundle.drag_share = left_mps * air_rate_per_s(air, left_mps) / (wind_mps * air_rate_per_s(air, wind_mps));
+    const auto pull = [&](double at_mps) { return at_mps * air_rate_per_s(air, at_mps); };
+    bundle.drag_share =
+        mean_of_way([&](double way_share) { return pull(speed_mps(way_share)); }) / pull(wind_mps);
     bundles.push_back(bundle);
   }
   return bundles;

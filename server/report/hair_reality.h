@@ -1,5 +1,5 @@
-// Compares simulated hair in air with known results: hairs and locks that lean in a steady wind, air carried
-// along by a bundle, and the sway of a ponytail under a head that moves up and down.
+// Compares simulated hair in air with known results: hairs and locks that lean in a steady wind, air held back
+// by a bundle, and the sway of a ponytail under a head that moves up and down.
 #pragma once
 
 #include <functional>
@@ -39,13 +39,13 @@ struct LockLean {
   double solid_rad = 0.0;   // of a solid cylinder as wide and as heavy
 };
 
-/// Share of the air in a bundle that moves with it.
+/// What a bundle of hairs at rest takes off the speed of a wind, of all of it, on the mean over the bundle.
 struct BundleAir {
   double hairs_per_cm2 = 0.0;
   double ours = 0.0;
   double screen = 0.0;      // air is blown through: Taylor's porous plate
   double viscous = 0.0;     // air seeps in: Brinkman's layer
-  double drag_share = 0.0;  // drag of one hair in it over that of a lone one, by ours
+  double drag_share = 0.0;  // mean drag of a hair in it over that of a lone one, by ours
 };
 
 struct HairReality {

@@ -84,18 +84,19 @@ void add_locks(HtmlPage& page, const HairReality& reality) {
 }
 
 void add_bundles(HtmlPage& page, const HairReality& reality) {
-  page.heading("Reality: air that a bundle carries along");
+  page.heading("Reality: air that a bundle holds back");
   page.paragraph(fmt::format(
-      "Share of the air inside a bundle of {:g} cm that moves with its hairs, at 1 m/s. Ours is a balance of "
-      "momentum. Taylor's porous plate (1944) lets air through against a loss of pressure. Brinkman's layer "
-      "(1949) lets momentum seep in by viscosity alone, from faces where the air moves. Drag is that of one "
-      "hair in the bundle over that of a lone one, by ours.",
+      "What a bundle of {:g} cm that stands still takes off the speed of a wind of 1 m/s, on the mean over "
+      "the bundle. By ours, hair upwind lets a part of the wind through, and some of it goes around. "
+      "Taylor's porous plate (1944) lets air through against a loss of pressure. Brinkman's layer (1949) "
+      "lets momentum seep in by viscosity alone, from faces where the air moves. Drag is the mean of the "
+      "bundle's hairs over that of a lone one, by ours.",
       100.0 * AirDesc().lock_width_m));
   HtmlTable table{"", {"hairs per cm2", "ours", "porous plate", "viscous layer", "drag of one hair"}, {}};
   PlotDesc plot;
-  plot.title = "Air that moves with a bundle of hairs";
+  plot.title = "Air that a bundle of hairs holds back";
   plot.x = {"hairs per cm2"};
-  plot.y = {"share of the air", PlotScale::Linear, 0.0, 1.0};
+  plot.y = {"share of the wind", PlotScale::Linear, 0.0, 1.0};
   plot.height = 360.0;
   PlotSeries ours{"ours", {}}, screen{"porous plate", {}}, viscous{"viscous layer", {}};
   for (const BundleAir& bundle : reality.bundles) {
@@ -108,7 +109,7 @@ void add_bundles(HtmlPage& page, const HairReality& reality) {
   }
   page.table(table);
   plot.series = {ours, screen, viscous};
-  page.figure(make_svg_plot(plot), "Share of the air that moves with the hairs against how many there are.");
+  page.figure(make_svg_plot(plot), "Share of the wind that is held back against how many hairs there are.");
 }
 
 void add_ponytails(HtmlPage& page, const HairReality& reality) {
@@ -157,7 +158,7 @@ std::string reality_text(const HairReality& reality) {
                     lean.wind_mps, glm::degrees(lean.ours_rad), glm::degrees(lean.single_rad),
                     glm::degrees(lean.solid_rad));
   for (const BundleAir& bundle : reality.bundles)
-    text += fmt::format("{:g} hairs/cm2: {} of the air goes along (porous plate {}, viscous layer {})\n",
+    text += fmt::format("{:g} hairs/cm2: {} of the wind is held back (porous plate {}, viscous layer {})\n",
                         bundle.hairs_per_cm2, share_text(bundle.ours), share_text(bundle.screen),
                         share_text(bundle.viscous));
   for (const Ponytail& tail : reality.ponytails)

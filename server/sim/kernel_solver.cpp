@@ -31,7 +31,10 @@ KernelSolver::KernelSolver(const SolverContext& context, const StrandParameters&
 Status KernelSolver::prepare_all() {
   prepare();
   // The program before stays until then: what is compiled is not compiled again.
-  ASSIGN_OR_RETURN(program_, executor_.make_program(kernel(), features_, layout()));
+  SceneFeatures of_model = features_;
+  // Gusts pull by the model's own drag alone.
+  of_model.has_turbulence = features_.has_turbulence && parameters_.air_drag_per_s > 0.0;
+  ASSIGN_OR_RETURN(program_, executor_.make_program(kernel(), of_model, layout()));
   if (features_.has_follicle_limit) {
     ASSIGN_OR_RETURN(follicle_limit_, FollicleLimit::make(executor_, features_, layout(), carried()));
   }

@@ -59,7 +59,7 @@ void ReferenceStrands::begin(ReferenceStrand& strand, std::span<const glm::dvec3
     strand.is_intact[i] = is_sound;
     if (!is_sound) forget(strand.index);
     strand.velocity_mps[i] = is_sound ? velocity_mps[i] - head_velocity_mps() : glm::dvec3(0.0);
-    const double rate = air_drag_per_s(strand) + h_s() * style_stiffness_per_s2(strand, i);
+    const double rate = air_drag_per_s(strand) + pull_ahead_s(h_s()) * style_stiffness_per_s2(strand, i);
     strand.inertia[i] = 1.0 + h_s() * rate;
     strand.target_m[i] = rotation() * rest;
     strand.old_m[i] = is_sane(position_m[i]) ? position_m[i] : strand.target_m[i];
@@ -74,6 +74,13 @@ glm::dvec3 ReferenceStrands::uncarried_gravity_mps2(const ReferenceStrand& stran
       parameters_.sag_free * std::min(1.0, style_stiffness_per_s2(strand, i) / kSupportStiffnessPerS2);
   const glm::dvec3 groom_gravity = limited(input().groom_gravity_in_head_mps2, kMaxGravityMps2);
   return limited(input().gravity_mps2, kMaxGravityMps2) - carried_share * (rotation() * groom_gravity);
+}
+
+glm::dvec3 ReferenceStrands::pulled_on_mps(const ReferenceStrand& strand, uint32_t i) const {
+  const double stiffness = style_stiffness_per_s2(strand, i);
+  const glm::dvec3 gravity = limited(input().gravity_mps2, kMaxGravityMps2);
+  const glm::dvec3 held = stiffness * strand.target_m[i] + (uncarried_gravity_mps2(strand, i) - gravity);
+  return (pull_ahead_s(h_s()) - h_s()) * (held - glm::conjugate(carry()) * held);
 }
 
 double ReferenceStrands::thickness(const ReferenceStrand& strand) const {
@@ -92,21 +99,24 @@ double ReferenceStrands::style_stiffness_per_s2(const ReferenceStrand& strand, u
          (tip_share + (1.0 - tip_share) * from_tip * from_tip);
 }
 
-// Backward Euler for the linear drag toward the air and the linear pull to the groomed shape, forward for the
-// rest, written for the velocity u relative to the head joint, which moves at V during the substep:
-//   (1 + h k + h^2 s_i) u = v - V + h (g - f_i R g_0 + k (w - V)) + h s_i (target - x),
+// Implicit for the linear drag toward the air and the linear pull to the groomed shape, forward for the rest,
+// written for the velocity u relative to the head joint, which moves at V during the substep:
+//   (1 + h k + h a s_i) u = v - V + h (g - f_i R g_0 + k (w - V)) + h s_i (target - x) + b,
 //   x_predicted = x + h u.
-// R turns the head; g_0 is the gravity that the groom was made under, in head space. The share f_i of it that
+// With a = h and b = 0 that is backward Euler: the pull is that at the end of the substep, which brakes a
+// swing at the rate h s_i / 2, less in shorter steps. So it is looked up a = pull_ahead_s(h) ahead, where the
+// target will have gone on: b = (a - h) / h times the change of h (s_i target - f_i R g_0) in the substep. R
+// turns the head; g_0 is the gravity that the groom was made under, in head space. The share f_i of it that
 // the pull carries is a pre-stress: it moves the target up by f_i R g_0 / s_i, just as far as g = R g_0 lets
 // it sag.
 glm::dvec3 ReferenceStrands::predict(const ReferenceStrand& strand, uint32_t i) const {
   const double stiffness = style_stiffness_per_s2(strand, i);
   const double drag = air_drag_per_s(strand);
   const glm::dvec3 relative_air = air_velocity_mps(input(), strand.old_m[i]) - head_velocity_mps();
-  const glm::dvec3 impulse = strand.velocity_mps[i] +
-                             h_s() * (uncarried_gravity_mps2(strand, i) + drag * relative_air) +
-                             h_s() * stiffness * (strand.target_m[i] - strand.old_m[i]);
-  const glm::dvec3 u = impulse / (1.0 + h_s() * drag + h_s() * h_s() * stiffness);
+  const glm::dvec3 impulse =
+      strand.velocity_mps[i] + h_s() * (uncarried_gravity_mps2(strand, i) + drag * relative_air) +
+      h_s() * stiffness * (strand.target_m[i] - strand.old_m[i]) + pulled_on_mps(strand, i);
+  const glm::dvec3 u = impulse / (1.0 + h_s() * drag + h_s() * pull_ahead_s(h_s()) * stiffness);
   return strand.old_m[i] + h_s() * shortened(u, parameters_.max_speed_mps);
 }
 

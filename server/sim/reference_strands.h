@@ -68,6 +68,8 @@ class ReferenceStrands : public ReferenceSolver {
   /// Pull to the groomed shape, 1/s^2, and the part of gravity that remains when the pull carries its share.
   double style_stiffness_per_s2(const ReferenceStrand& strand, uint32_t i) const;
   glm::dvec3 uncarried_gravity_mps2(const ReferenceStrand& strand, uint32_t i) const;
+  /// Velocity gained as the pull is that a little after the substep (pull_ahead_s), or before its end.
+  glm::dvec3 pulled_on_mps(const ReferenceStrand& strand, uint32_t i) const;
   bool is_pinned(uint32_t i) const { return i < layout().pinned_root_count || i >= layout().tail_begin(); }
 
  private:

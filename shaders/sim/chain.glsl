@@ -98,11 +98,6 @@ vec3 out_of(Frame frame, vec3 seen) {
 Frame turned_with_head(Frame frame) {
   return Frame(turned_with_head(frame.along), turned_with_head(frame.axis));
 }
-// Where a direction that goes with the head pointed before the substep.
-vec3 before_the_turn(vec3 direction) {
-  return vec3(dot(u_step.carry[0].xyz, direction), dot(u_step.carry[1].xyz, direction),
-              dot(u_step.carry[2].xyz, direction));
-}
 
 vec3 rest_at(uint at) { return texelFetch(u_rest, int(at)).xyz; }
 

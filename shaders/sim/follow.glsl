@@ -65,18 +65,33 @@ float style_stiffness(float arc) {
 // Velocity gained from what carries the groom's weight.
 vec3 support_of(float stiffness) { return min(1.0, stiffness * u_step.support.w) * u_step.support.xyz; }
 
-// Backward Euler in the drag and in the pull to the groomed shape, seen from the head joint (see predict() in
+// Velocity gained by the pull to the groomed shape at the end of the substep, and by what it is more, or carries
+// more of the weight, where it looks further ahead than that.
+vec3 pulled(Vertex vertex, float stiffness) {
+  const float pull = u_step.head_velocity.w * stiffness;
+  vec3 gained = pull * (vertex.target - vertex.old);
+  const uniform_float further = (u_step.wind.w - u_step.head_velocity.w) * u_step.push.w;
+  if (further != 0.0) {
+    const vec3 held = pull * vertex.target + support_of(stiffness);
+    gained += further * (held - before_the_turn(held));
+  }
+  return gained;
+}
+
+// How fast it brakes a strand's own motion, 1/s.
+float pull_rate(float stiffness) { return u_step.wind.w * stiffness; }
+
+// Implicit in the drag and in the pull to the groomed shape, seen from the head joint (see predict() in
 // server/sim/reference_strands.cpp for the equation).
 Vertex predicted_from(Vertex vertex) {
   const float h = u_step.head_velocity.w;
   const float drag = g_thickness.y * u_step.contact.y;
   const float stiffness = style_stiffness(vertex.arc);
-  const float pull = h * stiffness;
   const vec3 more_wind = (g_thickness.y - 1.0) * (h * u_step.contact.y) * u_step.wind.xyz;
   const vec3 push =
       u_step.push.xyz + support_of(stiffness) + (h * drag) * gust_velocity(vertex.old) + more_wind;
-  vertex.inertia = 1.0 + h * (drag + pull);
-  const vec3 moved = (vertex.velocity + push + pull * (vertex.target - vertex.old)) / vertex.inertia;
+  vertex.inertia = 1.0 + h * (drag + pull_rate(stiffness));
+  const vec3 moved = (vertex.velocity + push + pulled(vertex, stiffness)) / vertex.inertia;
   vertex.predicted = vertex.old + h * within_speed_limit(moved);
   return vertex;
 }

@@ -38,8 +38,7 @@ vec3 velocity_before(uint at, bool is_free) {
 // How hard a vertex holds to its prediction: inertia, drag and pull.
 float hold(float arc) {
   const float h = u_step.head_velocity.w;
-  const float from_tip = 1.0 - arc;
-  return 1.0 + h * (u_step.contact.y + h * u_step.style.x * mix(u_step.style.y, 1.0, from_tip * from_tip));
+  return 1.0 + h * (u_step.contact.y + pull_rate(style_stiffness(arc)));
 }
 
 // The vector's direction, or the other one where it has none.

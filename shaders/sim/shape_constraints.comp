@@ -75,13 +75,13 @@ void advance(inout Vertex vertex, vec3 velocity, vec3 along) {
   const float drag = h * u_step.contact.y;
   const float along_drag = drag * u_air_along;
   const float stiffness = style_stiffness(vertex.arc);
-  const float pull = h * stiffness;
+  const float brake = h * pull_rate(stiffness);
   const vec3 air = u_step.wind.xyz + gust_velocity(vertex.old);
   const vec3 weight = u_step.push.xyz - drag * u_step.wind.xyz + support_of(stiffness);
-  vec3 moved = velocity + weight + pull * (vertex.target - vertex.old);
+  vec3 moved = velocity + weight + pulled(vertex, stiffness);
   moved += drag * air + ((along_drag - drag) * dot(air, along)) * along;
-  const float across_share = 1.0 / (1.0 + h * pull + drag);
-  const float along_share = 1.0 / (1.0 + h * pull + along_drag);
+  const float across_share = 1.0 / (1.0 + brake + drag);
+  const float along_share = 1.0 / (1.0 + brake + along_drag);
   moved = across_share * moved + ((along_share - across_share) * dot(moved, along)) * along;
   vertex.predicted = vertex.old + h * within_speed_limit(moved);
 }

@@ -19,7 +19,7 @@ layout(std140, binding = kBindingStep) uniform StepBlock {
   float follicle_cosine;    // of the most that a root leans from its groomed direction
   float follicle_sine;
   vec4 previous_turn[3];    // columns: velocity of a point by the head's turn in the step before, 1/s; w unused
-  vec4 wind;                // mean wind relative to the head joint, m/s; w unused
+  vec4 wind;                // mean wind relative to the head joint, m/s; w = time by which a pull looks ahead, s
   vec4 gust_amplitude[kMaxGustWaves];  // m/s; w = phase, rad
   vec4 gust_wave[kMaxGustWaves];       // rad/m
   vec4 collider[kMaxSphereColliders];    // centre, m; w = radius (0 = none)
@@ -62,6 +62,12 @@ vec3 in_head(vec3 point) {
 
 vec3 carried_by_head(vec3 point) {
   return u_step.carry[0].xyz * point.x + u_step.carry[1].xyz * point.y + u_step.carry[2].xyz * point.z;
+}
+
+// Where a direction that goes with the head pointed before the substep.
+vec3 before_the_turn(vec3 direction) {
+  return vec3(dot(u_step.carry[0].xyz, direction), dot(u_step.carry[1].xyz, direction),
+              dot(u_step.carry[2].xyz, direction));
 }
 
 // A place of the skin, in head space, where it was before the substep and is now; chest and neck have their own way.

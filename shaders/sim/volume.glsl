@@ -3,8 +3,9 @@
 #include "sim/step.glsl"
 
 // Where the grid begins, in cells, w = cells per metre; nodes along each axis; then the nodes, x fastest: mean
-// velocity relative to the head joint in world axes, m/s; w = density, m/m^3. With extras then as many of
-// these (common/kernels/volume/volume_extras.h).
+// velocity relative to the head joint in world axes, m/s; w = density, m/m^3. With extras then as many of the
+// share of the wind that comes there, and with a target as many of the density beyond the target's
+// (pack_corners() in common/kernels/volume/volume_extras.h).
 layout(binding = kUnitVolume) uniform lookup_table u_volume;
 
 const uint kVolumeHeader = 2u;
@@ -107,20 +108,42 @@ VolumeHere volume_at(VolumeGrid grid, VolumePlace place) {
 }
 
 #if HAS_EXTRAS
-struct VolumeExtra {
-  vec3 excess_slope;  // of the density beyond the target's, per metre, head space
-  float wind;         // share of it that comes through
+// One number of the extras between eight nodes, and how it changes along x, y and z per cell.
+struct VolumeNumber {
+  float value;
+  vec3 slope;
 };
 
-VolumeExtra volume_extra(VolumeGrid grid, VolumePlace place) {
-  const lane_uint offset = lane_uint(grid.nodes.x * grid.nodes.y * grid.nodes.z);
-  const VolumeValue found = volume_value(place, offset);
-  const vec3 slope =
-      vec3(found.x0.x + place.share.z * (found.x1.x - found.x0.x),
-           found.y0.x + place.share.z * (found.y1.x - found.y0.x), found.z.x);
-  VolumeExtra extra;
-  extra.excess_slope = select(place.is_inside, grid.per_cell * slope, vec3(0.0));
-  extra.wind = select(place.is_inside, found.value.y, 1.0);
-  return extra;
+// Trilinear; `part` counts the extras from 1.
+VolumeNumber volume_number(VolumeGrid grid, VolumePlace place, uint part) {
+  const lane_uint offset = lane_uint(grid.nodes.x * grid.nodes.y * grid.nodes.z) * lane_uint(part);
+  const vec4 front = look_up(u_volume, place.front + offset);
+  const vec4 back = look_up(u_volume, place.back + offset);
+  const vec3 share = place.share;
+  const float x00 = front.y - front.x;
+  const float x10 = front.w - front.z;
+  const float x01 = back.y - back.x;
+  const float x11 = back.w - back.z;
+  const float e00 = front.x + share.x * x00;
+  const float e01 = back.x + share.x * x01;
+  const float y0 = (front.z + share.x * x10) - e00;
+  const float y1 = (back.z + share.x * x11) - e01;
+  const float x0 = x00 + share.y * (x10 - x00);
+  const float x1 = x01 + share.y * (x11 - x01);
+  const float f0 = e00 + share.y * y0;
+  const float z = (e01 + share.y * y1) - f0;
+  return VolumeNumber(f0 + share.z * z, vec3(x0 + share.z * (x1 - x0), y0 + share.z * (y1 - y0), z));
+}
+
+// What of the wind comes through; beyond the grid all of it does.
+float volume_wind(VolumeGrid grid, VolumePlace place) {
+  const VolumeNumber found = volume_number(grid, place, 1u);
+  return select(place.is_inside, found.value, 1.0);
+}
+
+// Slope of the density beyond the target's, per metre, head space.
+vec3 volume_excess_slope(VolumeGrid grid, VolumePlace place) {
+  const VolumeNumber found = volume_number(grid, place, 2u);
+  return select(place.is_inside, grid.per_cell * found.slope, vec3(0.0));
 }
 #endif

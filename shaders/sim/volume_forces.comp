@@ -40,12 +40,9 @@ uniform float u_shadow;        // share of its shadow that hair casts on the win
 uniform float u_reynolds;  // per m/s
 uniform float u_air_rate;  // 1/s per drag number
 uniform float u_lock;      // m^2: real hairs of a strand x width of a lock x radius of a hair
+uniform float u_along;     // of the drag across a hair, what there is along it
+uniform float u_around;    // of the wind, what goes around hair that carries all of its air along
 
-// Of the drag across a hair, what there is along it (slender bodies at low Reynolds numbers).
-const float kAlongShare = 0.5;
-// Air also goes around hair that lets little through: of its momentum, that of a drag coefficient of 2, a solid
-// cylinder takes 1.1. 1 - sqrt(1.1 / 2).
-const float kAroundShare = 0.25838;
 // Air that stands still against hair is carried along, as far as there is hair.
 const float kLeastReynolds = 1e-6;
 
@@ -87,11 +84,11 @@ Pull taken_on(AirHere air, vec3 moving, float h, float friction) {
   const float with_wind =
       dot(air.hair, air.outside) / max(dot(air.outside, air.outside), kTinySquared);
   const vec3 own = air.hair - clamp(with_wind, 0.0, 1.0) * air.outside;
-  const vec3 flow = (1.0 - kAroundShare * carried) * air.outside + carried * own - moving - rubbed;
+  const vec3 flow = (1.0 - u_around * carried) * air.outside + carried * own - moving - rubbed;
   const float rate = u_air_rate * drag_number(u_reynolds * sqrt(dot(flow, flow)));
   const float time = time_at_rate(h, rate);
   const float length_squared = max(dot(air.along, air.along), kTinySquared);
-  const float slip = (1.0 - kAlongShare) * (dot(flow, air.along) / length_squared);
+  const float slip = (1.0 - u_along) * (dot(flow, air.along) / length_squared);
   return Pull(rubbed + (time * rate) * (flow - slip * air.along), h / time);
 }
 #endif
@@ -134,11 +131,12 @@ void main() {
     float stiffness = select(over > 0.0, u_repulsion * dot(slope, slope), 0.0);
     vec3 push = (-u_repulsion * over) * slope;
 #if HAS_EXTRAS
-    const VolumeExtra extra = volume_extra(grid, place);
-    push -= (u_target / u_mean_density) * turned_with_head(extra.excess_slope);
-    const vec3 groom_slope = here.slope / u_mean_density;
-    stiffness += u_target * dot(groom_slope, groom_slope);
-    const float let_in = 1.0 - u_shadow * (1.0 - extra.wind);
+    if (u_target > 0.0) {
+      push -= (u_target / u_mean_density) * turned_with_head(volume_excess_slope(grid, place));
+      const vec3 groom_slope = here.slope / u_mean_density;
+      stiffness += u_target * dot(groom_slope, groom_slope);
+    }
+    const float let_in = 1.0 - u_shadow * (1.0 - volume_wind(grid, place));
 #endif
 #if HAS_AIR || HAS_EXTRAS
     const vec3 wind = u_step.wind.xyz + gust_velocity(position);

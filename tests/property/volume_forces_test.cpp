@@ -122,12 +122,10 @@ struct ShakenTuft {
     const double hairs_per_m2 = here.density_mpm3 * air.hairs / layout.strand_count;
     const glm::dvec3 rubbed_mps = -std::expm1(-input.h_s * friction_per_s) * (here.velocity_mps - moving);
     const double carried = carried_air_share(air, hairs_per_m2, glm::length(outside_mps - here.velocity_mps));
-    // What of the hair's motion is not with the wind, which hair at rest has braked already; of a solid
-    // cylinder's drag coefficient of 1.1, a wind that is all stopped would make 2.
+    // What of the hair's motion is not with the wind, which hair at rest has braked already.
     const double with_wind = glm::dot(here.velocity_mps, outside_mps) / glm::dot(outside_mps, outside_mps);
     const glm::dvec3 own_mps = here.velocity_mps - std::clamp(with_wind, 0.0, 1.0) * outside_mps;
-    const double around = 1.0 - std::sqrt(1.1 / 2.0);
-    const glm::dvec3 air_mps = (1.0 - around * carried) * outside_mps + carried * own_mps;
+    const glm::dvec3 air_mps = met_wind_share(carried) * outside_mps + carried * own_mps;
     const glm::dvec3 flow_mps = air_mps - moving - rubbed_mps;
     const double rate_per_s = air_rate_per_s(air, glm::length(flow_mps));
     const size_t after = std::min(i / layout.strand_count + 1, size_t{layout.vertex_count} - 1);
@@ -136,7 +134,7 @@ struct ShakenTuft {
         glm::dvec3(state.position_m[after * layout.strand_count + strand]) -
         glm::dvec3(state.position_m[std::max(i, size_t{layout.strand_count}) - layout.strand_count]));
     const glm::dvec3 flow_along = along * glm::dot(along, flow_mps);
-    return rubbed_mps - std::expm1(-input.h_s * rate_per_s) * (flow_mps - 0.5 * flow_along);
+    return rubbed_mps - std::expm1(-input.h_s * rate_per_s) * (flow_mps - (1.0 - kAlongShare) * flow_along);
   }
 
   Groom groom;

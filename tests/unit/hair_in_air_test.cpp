@@ -50,6 +50,33 @@ TEST(HairInAir, ALockCarriesItsAirAlong) {
     EXPECT_GT(carried_air_share(air, kPerCm2, speed_mps), carried_air_share(air, kPerCm2, 2.0 * speed_mps));
 }
 
+// Hair at rest in a wind leans as far as drag and weight say in steps of any length: other forces do as much
+// less as drag does. Without that the lean goes with the step.
+TEST(HairInAir, AHairLeansAlikeAtAnyStepRate) {
+  const AirDesc air;
+  constexpr double kWindMps = 1.0, kForceMps2 = 9.81;
+  const double rate_per_s = air_rate_per_s(air, kWindMps);
+  for (const double step_s : {1.0 / 30.0, 1.0 / 60.0, 1.0 / 960.0}) {
+    const double taken_on = -std::expm1(-step_s * rate_per_s);
+    // Speed against the force that drag and force agree on.
+    const auto speed_mps = [&](double inertia) { return step_s * kForceMps2 / inertia / taken_on; };
+    EXPECT_NEAR(speed_mps(inertia_in_air(step_s, rate_per_s)), kForceMps2 / rate_per_s, 1e-9) << step_s;
+    EXPECT_GT(speed_mps(1.0), (1.0 + 0.3 * step_s * rate_per_s) * kForceMps2 / rate_per_s) << step_s;
+  }
+  EXPECT_EQ(inertia_in_air(1.0 / 60.0, 0.0), 1.0);
+}
+
+// Hair in front takes its part of a wind, and the more there is the more goes around: all of a thin wisp's
+// comes, little of a thick lock's does. No lock is held by more than twice what a solid cylinder takes of it.
+TEST(HairInAir, ADenseLockMeetsLittleWind) {
+  const AirDesc air;
+  EXPECT_NEAR(met_wind_share(carried_air_share(air, 1e2, 1.0)), 1.0, 1e-2);
+  EXPECT_NEAR(2.0 * std::pow(met_wind_share(1.0), 2.0), 1.1, 1e-4);
+  EXPECT_GT(arriving_wind_share(air, 1e4 * air.lock_width_m, 1.0), 0.9);
+  EXPECT_LT(arriving_wind_share(air, 3e6 * air.lock_width_m, 1.0), 1e-2);
+  EXPECT_EQ(arriving_wind_share(air, 0.0, 1.0), 1.0);
+}
+
 // Momentum of wind of 1 m/s gets 4 to 7 mm into 100 hairs/cm^2.
 TEST(HairInAir, WindEndsWithinMillimetres) {
   const double depth_m = 1.0 / (1e6 * stopping_width_m(AirDesc{}, 1.0));

@@ -324,12 +324,11 @@ TEST(VolumeExtras, TheSlopeOfTheExcessIsTheDerivativeOfTheEnergy) {
     const Filled wanted = fill(other, options);
     const TargetDensity target = make_target(wanted.volume.grid(), wanted.nodes);
     VolumeExtras extras(options);
-    std::vector<glm::vec4> found(grid.size());
-    extras.update(grid, filled.nodes, &target, nullptr, found);
+    extras.update(grid, filled.nodes, &target, nullptr);
     std::vector<glm::vec4> excess(grid.size());
     for (size_t i = 0; i < excess.size(); ++i) {
-      excess[i] = glm::vec4(glm::vec3(0.0f), found[i].x);
-      ASSERT_EQ(found[i].y, 1.0f) << "no wind was asked for";
+      excess[i] = glm::vec4(glm::vec3(0.0f), extras.excess_mpm3()[i]);
+      ASSERT_EQ(extras.wind_share()[i], 1.0f) << "no wind was asked for";
     }
     const auto target_at = [&](const glm::ivec3& lattice) {
       const glm::ivec3 node = lattice - target.grid.first;
@@ -396,8 +395,7 @@ TEST(VolumeExtras, TheWindThroughASlabFallsExponentially) {
         along[(axis + 1) % 3] = tilt;
         WindShadow shadow{glm::normalize(along), kWidthM};
         VolumeExtras extras({16, 1});
-        std::vector<glm::vec4> found(grid.size());
-        extras.update(grid, values, nullptr, &shadow, found);
+        extras.update(grid, values, nullptr, &shadow);
         // Five layers of nodes, half of whose cells are at either side of each.
         const double way_m = 0.05 / std::cos(std::atan(static_cast<double>(tilt)));
         const double through =
@@ -406,9 +404,42 @@ TEST(VolumeExtras, TheWindThroughASlabFallsExponentially) {
         behind[axis] = sign > 0.0f ? 15u : 5u;
         glm::uvec3 before(20u);
         before[axis] = sign > 0.0f ? 5u : 15u;
-        EXPECT_NEAR(found[grid.index(behind.x, behind.y, behind.z)].y, through, 1e-4) << axis << ' ' << tilt;
-        EXPECT_EQ(found[grid.index(before.x, before.y, before.z)].y, 1.0f);
+        EXPECT_NEAR(extras.wind_share()[grid.index(behind.x, behind.y, behind.z)], through, 1e-4)
+            << axis << ' ' << tilt;
+        EXPECT_EQ(extras.wind_share()[grid.index(before.x, before.y, before.z)], 1.0f);
       }
+}
+
+// An element holds what is interpolated between: the numbers of a cell's four corners in a layer.
+TEST(VolumeExtras, ElementsHoldTheCornersOfACell) {
+  const VolumeGrid grid{0.01f, {0, 0, 0}, {5, 4, 3}};
+  std::vector<float> values;
+  for (size_t i = 0; i < grid.size(); ++i) values.push_back(static_cast<float>(i * i));
+  std::vector<glm::vec4> elements(grid.size());
+  pack_corners(grid, values, elements);
+  for (uint32_t z = 0; z < 3; ++z)
+    for (uint32_t y = 0; y + 1 < 4; ++y)
+      for (uint32_t x = 0; x + 1 < 5; ++x)
+        EXPECT_EQ(elements[grid.index(x, y, z)],
+                  glm::vec4(values[grid.index(x, y, z)], values[grid.index(x + 1, y, z)],
+                            values[grid.index(x, y + 1, z)], values[grid.index(x + 1, y + 1, z)]));
+}
+
+// Hair may lie in any layer that there is, and in others the next time.
+TEST(HairVolume, ForgetsWhereTheHairWasBefore) {
+  Hair hair = random_hair(300, 16, 0.006f, 13);
+  HairVolume volume = std::move(HairVolume::make(strands_of(hair.layout), {24, 1})).value();
+  const std::vector<glm::vec3> home_m = hair.position_m;
+  std::vector<glm::vec4> nodes(volume.most_nodes());
+  for (const float away_m : {0.3f, -0.4f, 0.0f}) {
+    for (size_t i = 0; i < home_m.size(); ++i)
+      hair.position_m[i] = home_m[i] + away_m * glm::vec3(hair.world_from_head * glm::dvec3(0.0, 0.0, 1.0));
+    volume.update(hair.input(), nodes);
+    const Filled expected = fill(hair, {24, 1});
+    ASSERT_EQ(volume.grid(), expected.volume.grid()) << away_m;
+    EXPECT_EQ(volume.outside_count(), expected.volume.outside_count());
+    EXPECT_EQ(std::memcmp(nodes.data(), expected.nodes.data(), std::span(expected.nodes).size_bytes()), 0);
+  }
 }
 
 }  // namespace

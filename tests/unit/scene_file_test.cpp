@@ -532,6 +532,17 @@ TEST(SceneFile, AQualityIsTakenWhenItIsSet) {
   EXPECT_EQ(scene.gravity_mps2.y, -3.0);
 }
 
+// Long steps take substeps in full quality, which go with it; those of one's own stay.
+TEST(SceneFile, FastQualityDropsTheSubstepsOfFull) {
+  const SceneDesc full = parse_scene("step_rate_hz: 30 quality: 'full'", "s", {}).value();
+  EXPECT_EQ(full.substeps, 2u);
+  const SceneDesc fast = with_overrides(full, {"quality=fast"}).value();
+  EXPECT_EQ(fast.substeps, 1u);
+  EXPECT_EQ(with_overrides(fast, {"quality=full"}).value().substeps, 2u);
+  const SceneDesc own = with_overrides(full, {"substeps=3"}).value();
+  EXPECT_EQ(with_overrides(own, {"quality=fast"}).value().substeps, 3u);
+}
+
 TEST(SceneFile, AFurtherHeadIsAsTheSceneWhereItSaysNothing) {
   const auto scene = parse_scene(
       "name: 'anna' groom { procedural { strand_count: 70 vertex_count: 9 } } "

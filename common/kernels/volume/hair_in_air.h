@@ -1,5 +1,6 @@
 // Hair in air: how fast air carries a hair along, and how much of the air a lock of hair carries along
-// itself. Plain functions in double precision; shaders/sim/volume_forces.comp has the same law for strands.
+// itself. Plain functions in double precision; shaders/sim/volume_forces.comp does the same for strands, with
+// the numbers that are here.
 // Any thread.
 #pragma once
 
@@ -63,6 +64,30 @@ inline double carried_air_share(const AirDesc& air, double hairs_per_m2, double 
   const double reynolds = std::max(reynolds_per_mps(air) * speed_mps, 1e-6);
   const double pulled = hairs_per_m2 * air.lock_width_m * air.hair_radius_m * drag_number(reynolds);
   return pulled / (pulled + reynolds);
+}
+
+/// Of the drag across a hair, what there is along it (slender bodies at low Reynolds numbers).
+inline constexpr double kAlongShare = 0.5;
+/// Air also goes around hair that lets little through: of its momentum, that of a drag coefficient of 2, a
+/// solid cylinder takes 1.1. 1 - sqrt(1.1 / 2).
+inline constexpr double kAroundShare = 0.25838;
+
+/// Speed over that of the wind which a lock meets, where hair carries `carried_share` of the air with it.
+inline double met_wind_share(double carried_share) {
+  return 1.0 - kAroundShare * carried_share;
+}
+
+/// Of the speed of a wind, what reaches the hair behind others whose drag adds up over `hairs_per_m` hairs on
+/// a metre across the wind.
+inline double arriving_wind_share(const AirDesc& air, double hairs_per_m, double speed_mps) {
+  return std::exp(-hairs_per_m * stopping_width_m(air, speed_mps));
+}
+
+/// How much more inert air that drags a hair at this rate makes it for all other forces in a step. They do
+/// less: hair that rests in a wind then leans as far as drag and weight say, at any step rate.
+inline double inertia_in_air(double step_s, double rate_per_s) {
+  const double faded = step_s * rate_per_s;
+  return faded > 0.0 ? faded / -std::expm1(-faded) : 1.0;
 }
 
 }  // namespace strandcast

@@ -138,7 +138,7 @@ void HairVolume::update(const VolumeInput& input, std::span<glm::vec4> nodes) {
   };
   constexpr float kFar = kMaxLayers;
   for (Share& share : shares_) {
-    std::fill(share.places.begin(), share.places.end(), 0);
+    std::fill(share.places.begin() + counted_.begin, share.places.begin() + counted_.end, 0);
     share.bounds = {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
   }
   for_shares([&](const VolumeScatterRange& range) { count_records(options_.set, range); });
@@ -206,14 +206,31 @@ void HairVolume::fit_grid() {
   grid_.nodes = glm::uvec3(last - first + 1);
 }
 
-/// Counts of layers and shares to where their records begin: layer by layer, in the order of strands.
+/// Counts of layers and shares to where their records begin: layer by layer, in the order of strands. Of the
+/// many layers that hair could be in only those that have some are walked.
 void HairVolume::choose_places() {
+  constexpr float kMiddle = kMaxLayers / 2;
+  float low = kMaxLayers;
+  float high = -low;
+  for (const Share& share : shares_) {
+    low = std::min(low, share.bounds.low[2]);
+    high = std::max(high, share.bounds.high[2]);
+  }
+  counted_ = {};
+  if (low <= high) {
+    counted_.begin = static_cast<uint32_t>(std::floor(low) + kMiddle);
+    counted_.end = static_cast<uint32_t>(std::floor(high) + kMiddle) + 1;
+  }
   uint32_t next = 0;
-  for (size_t layer = 0; layer < kMaxLayers; ++layer) {
+  for (uint32_t layer = counted_.begin; layer < counted_.end; ++layer) {
     layer_begin_[layer] = next;
     for (Share& share : shares_) next += std::exchange(share.places[layer], next);
   }
-  layer_begin_[kMaxLayers] = next;
+  // The grid reaches beyond the hair.
+  const auto first = static_cast<uint32_t>(grid_.first.z + kMaxLayers / 2);
+  const uint32_t end = first + grid_.nodes.z;
+  for (uint32_t layer = first; layer < std::min(end, counted_.begin); ++layer) layer_begin_[layer] = 0;
+  for (uint32_t layer = std::max(first, counted_.end); layer < end; ++layer) layer_begin_[layer] = next;
 }
 
 /// Layers of cells in runs of about as many records each.
@@ -288,8 +305,8 @@ void HairVolume::add_last_layers(const Field& sums) {
 
 template <class Work>
 void HairVolume::for_layers(const Work& work) {
-  constexpr size_t kGrain = 4;
-  workers_->at(options_.priority).for_ranges(grid_.nodes.z, kGrain, [&](size_t begin, size_t end) {
+  const size_t grain = std::max<size_t>(kNodesOfRange / grid_.layer_size(), 1);
+  workers_->at(options_.priority).for_ranges(grid_.nodes.z, grain, [&](size_t begin, size_t end) {
     work(static_cast<uint32_t>(begin), static_cast<uint32_t>(end));
   });
 }

@@ -95,6 +95,11 @@ class HairVolume {
     std::vector<double> layers;
     std::vector<uint8_t> rows;
   };
+  /// Lattice layers from the first that has hair to behind the last, from 0.
+  struct LayerRange {
+    uint32_t begin = 0;
+    uint32_t end = 0;
+  };
   /// A field under way: values at nodes, and which rows of them count.
   struct Field {
     glm::vec4* values = nullptr;
@@ -126,6 +131,7 @@ class HairVolume {
   std::vector<float> length_m_;  // (blocks x vertex_count x 16)
   std::vector<Share> shares_;
   std::vector<uint32_t> layer_begin_;  // (kMaxLayers + 1) records of each lattice layer
+  LayerRange counted_;                 // that shares have counts of
   std::vector<VolumeRecord> records_;
   std::vector<Slab> slabs_;
   std::vector<Scratch> scratch_;  // of each worker

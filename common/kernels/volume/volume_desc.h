@@ -22,12 +22,12 @@ struct VolumeDesc {
   /// How hard hair leaves where it is denser than in the groom: acceleration per cell where it is twice as
   /// dense, and where the density falls to the groom's within a cell.
   double repulsion_per_s2 = 0.0;
-  double target_per_s2 = 0.0;            // how hard hair goes to where its density is the groom's
-  double wind_width_m = 0.0;             // by which a simulated strand keeps the wind off what is behind it
-  double rest_density_scale = 1.0;       // times the groom's own density there, from which on it is repelled
-  uint32_t resolution = 32;              // cells along the longest side of the groom's box
-  uint32_t smoothing = 1;                // of density and velocity: passes of [1 2 1] / 4
-  uint32_t interval = 1;                 // steps that a volume is good for
+  double target_per_s2 = 0.0;       // how hard hair goes to where its density is the groom's
+  double wind_width_m = 0.0;        // by which a simulated strand keeps the wind off what is behind it
+  double rest_density_scale = 1.0;  // times the groom's own density there, from which on it is repelled
+  uint32_t resolution = 32;         // cells along the longest side of the groom's box
+  uint32_t smoothing = 1;           // of density and velocity: passes of [1 2 1] / 4
+  uint32_t interval = 1;            // times it is used before it is made anew: of those of renews_volume()
   std::string integration = "implicit";  // of the repulsion: "implicit", or "explicit" as in the sources
   std::string scatter = "auto";          // how strands get into it, one of kVolumeScatters
   AirDesc air = {};                      // between the strands and around them; wind_width_m is its own then

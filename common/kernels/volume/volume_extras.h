@@ -31,25 +31,43 @@ class VolumeExtras {
   explicit VolumeExtras(const VolumeOptions& options)
       : options_(options), workers_(options.workers == nullptr ? &shared_workers() : options.workers) {}
 
-  /// Fills `extras` (as many as the grid's nodes): x = density less the target's, smoothed as the density is,
-  /// so that its slope is the exact derivative of half the sum of squares by a vertex's place, per length of
-  /// hair and cell; y = share of the wind. What is not asked for is 0, and 1.
+  /// What is not asked for is left as it was, but the wind: all of it comes through.
   void update(const VolumeGrid& grid, std::span<const glm::vec4> nodes, const TargetDensity* target,
-              const WindShadow* shadow, std::span<glm::vec4> extras);
-  uint64_t size_bytes() const { return other_.size() * sizeof(glm::vec4) + 2 * rows_.size(); }
+              const WindShadow* shadow);
+  /// (nodes of the last update) density less the target's, m/m^3, smoothed as the density is, so that its
+  /// slope is the exact derivative of half the sum of squares by a vertex's place, per length of hair and
+  /// cell.
+  std::span<const float> excess_mpm3() const { return excess_mpm3_; }
+  /// (nodes of the last update) share of the wind that comes there.
+  std::span<const float> wind_share() const { return wind_share_; }
+  uint64_t size_bytes() const {
+    const size_t floats =
+        excess_mpm3_.size() + wind_share_.size() + all_density_.size() + left_.size() + density_.size();
+    return (one_.size() + other_.size()) * sizeof(glm::vec4) + 2 * rows_.size() + floats * sizeof(float);
+  }
 
  private:
   WorkerPool::Terms terms() const { return workers_->at(options_.priority); }
-  void find_excess(const VolumeGrid& grid, std::span<const glm::vec4> nodes, const TargetDensity& target,
-                   std::span<glm::vec4> extras);
-  void sweep(const VolumeGrid& grid, std::span<const glm::vec4> nodes, const WindShadow& shadow,
-             std::span<glm::vec4> extras) const;
+  void find_excess(const VolumeGrid& grid, std::span<const glm::vec4> nodes, const TargetDensity& target);
+  void sweep(const VolumeGrid& grid, std::span<const glm::vec4> nodes, const WindShadow& shadow);
 
   VolumeOptions options_;
   WorkerPool* workers_;
+  std::vector<float> excess_mpm3_;
+  std::vector<float> wind_share_;
+  // Between two passes of smoothing.
+  std::vector<glm::vec4> one_;
   std::vector<glm::vec4> other_;
   std::vector<uint8_t> rows_;
   std::vector<uint8_t> other_rows_;
+  // Of the sweep: density at all nodes, then two layers across the wind.
+  std::vector<float> all_density_;
+  std::vector<float> left_;
+  std::vector<float> density_;
 };
+
+/// Numbers at nodes as shaders/sim/volume.glsl looks them up: to an element those of the node, of its next
+/// along x, along y, and along both.
+void pack_corners(const VolumeGrid& grid, std::span<const float> values, std::span<glm::vec4> elements);
 
 }  // namespace strandcast

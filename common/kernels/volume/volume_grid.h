@@ -8,6 +8,9 @@
 
 namespace strandcast {
 
+/// Ranges of fewer nodes than this are done before another thread is awake.
+inline constexpr size_t kNodesOfRange = 16'384;
+
 /// Node (x, y, z) lies at cell_m * (first + (x, y, z)) in head space; x is the fastest.
 struct VolumeGrid {
   float cell_m = 0.0f;

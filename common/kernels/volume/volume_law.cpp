@@ -68,6 +68,8 @@ KernelDesc VolumeLaw::kernel(bool has_way) const {
   if (air.acts) {
     kernel.constants["u_reynolds"] = reynolds_per_mps(air);
     kernel.constants["u_air_rate"] = air_rate_scale_per_s(air);
+    kernel.constants["u_along"] = kAlongShare;
+    kernel.constants["u_around"] = kAroundShare;
     kernel.constants["u_lock"] = hairs_per_strand_ * air.lock_width_m * air.hair_radius_m;
   }
   kernel.meets_colliders = false;
@@ -111,9 +113,10 @@ std::span<const glm::vec4> VolumeLaw::fill(const StepBlock& step, const VolumeSt
   if (desc_.is_implicit()) input.ahead_s = step.head_velocity.w;
   volume_.update(input, table.subspan(kHeader));
   const VolumeGrid& grid = volume_.grid();
+  const size_t nodes = grid.size();
   table[0] = glm::vec4(grid.first, 1.0f / grid.cell_m);
   table[1] = glm::vec4(grid.nodes, 0.0f);
-  if (!extras_) return table.first(kHeader + grid.size());
+  if (!extras_) return table.first(kHeader + nodes);
 
   const glm::vec3 wind_mps(step.wind);
   const float speed_mps = glm::length(wind_mps);
@@ -123,9 +126,13 @@ std::span<const glm::vec4> VolumeLaw::fill(const StepBlock& step, const VolumeSt
   shadow.is_arriving = desc_.air.acts;
   const bool is_windy = desc_.is_sheltered() && speed_mps > 0.0f && shadow.width_m > 0.0f;
   if (is_windy) shadow.along_in_head = input.head_from_world * (wind_mps / speed_mps);
-  extras_->update(grid, table.subspan(kHeader, grid.size()), desc_.target_per_s2 > 0.0 ? &target_ : nullptr,
-                  is_windy ? &shadow : nullptr, table.subspan(kHeader + grid.size(), grid.size()));
-  return table.first(kHeader + 2 * grid.size());
+  const bool has_target = desc_.target_per_s2 > 0.0;
+  extras_->update(grid, table.subspan(kHeader, nodes), has_target ? &target_ : nullptr,
+                  is_windy ? &shadow : nullptr);
+  pack_corners(grid, extras_->wind_share(), table.subspan(kHeader + nodes, nodes));
+  if (!has_target) return table.first(kHeader + 2 * nodes);
+  pack_corners(grid, extras_->excess_mpm3(), table.subspan(kHeader + 2 * nodes, nodes));
+  return table.first(kHeader + 3 * nodes);
 }
 
 uint64_t VolumeLaw::size_bytes() const {

@@ -32,7 +32,10 @@ class VolumeLaw {
                                                  const VolumeStrands* target = nullptr);
 
   /// Elements that a table needs.
-  size_t most_elements() const { return kHeader + (extras_ ? 2 : 1) * volume_.most_nodes(); }
+  size_t most_elements() const {
+    const size_t of_target = desc_.target_per_s2 > 0.0 ? 1 : 0;
+    return kHeader + (extras_ ? 2 + of_target : 1) * volume_.most_nodes();
+  }
   /// Density from which on each vertex is pushed away, four vertices of a strand to an element:
   /// (vertex_count / 4 rounded up x strand_count), strand fastest.
   const std::vector<glm::vec4>& rest_density() const { return rest_density_; }

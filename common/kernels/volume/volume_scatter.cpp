@@ -15,7 +15,7 @@ using Doubles = double __attribute__((vector_size(64)));  // two neighbouring no
 using HalfDoubles = double __attribute__((vector_size(32)));
 using Quad = float __attribute__((vector_size(16)));
 
-static_assert(kBlockStrands % kLanes == 0 && sizeof(VolumeRecord) == 32);
+static_assert(kBlockStrands % kLanes == 0 && kLanes == 8 && sizeof(VolumeRecord) == sizeof(FloatBits));
 
 STRANDCAST_LANES vec3 load_vertex(const StrandBlocksView& blocks, uint32_t block, uint32_t vertex,
                                   uint32_t lane) {
@@ -128,6 +128,27 @@ STRANDCAST_LANES void count_records_lanes(const VolumeScatterRange& range) {
   }
 }
 
+/// Numbers of eight lanes become lanes of eight numbers.
+STRANDCAST_LANES void turn_over(FloatBits (&rows)[8]) {
+  FloatBits pairs[8];
+  for (uint32_t i = 0; i < 8; i += 2) {
+    pairs[i] = __builtin_shufflevector(rows[i], rows[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+    pairs[i + 1] = __builtin_shufflevector(rows[i], rows[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+  }
+  FloatBits fours[8];
+  for (uint32_t i = 0; i < 8; i += 4)
+    for (uint32_t k = 0; k < 2; ++k) {
+      const FloatBits a = pairs[i + k];
+      const FloatBits b = pairs[i + 2 + k];
+      fours[i + 2 * k] = __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13);
+      fours[i + 2 * k + 1] = __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15);
+    }
+  for (uint32_t i = 0; i < 4; ++i) {
+    rows[i] = __builtin_shufflevector(fours[i], fours[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+    rows[i + 4] = __builtin_shufflevector(fours[i], fours[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+  }
+}
+
 STRANDCAST_LANES void place_records_lanes(const VolumeScatterRange& range) {
   const VolumeScatter& work = *range.work;
   const Float share = 1.0f / static_cast<float>(work.samples);
@@ -136,21 +157,16 @@ STRANDCAST_LANES void place_records_lanes(const VolumeScatterRange& range) {
   for_each_sample(
       range, [&](const Sample& sample, const float* length, uint32_t used) STRANDCAST_LANES_LAMBDA {
         const IntBits layer = layer_of(sample, simd::floor(sample.cells.z), simd::load_lanes(length));
-        float at[7][kLanes];
-        simd::store_lanes(sample.cells.x - first.x, at[0]);
-        simd::store_lanes(sample.cells.y - first.y, at[1]);
-        simd::store_lanes(sample.cells.z - first.z, at[2]);
-        simd::store_lanes(simd::load_lanes(length) * share, at[3]);
-        simd::store_lanes(sample.velocity_mps.x, at[4]);
-        simd::store_lanes(sample.velocity_mps.y, at[5]);
-        simd::store_lanes(sample.velocity_mps.z, at[6]);
+        FloatBits of_lane[kLanes] = {(sample.cells.x - first.x).v, (sample.cells.y - first.y).v,
+                                     (sample.cells.z - first.z).v, (simd::load_lanes(length) * share).v,
+                                     sample.velocity_mps.x.v,      sample.velocity_mps.y.v,
+                                     sample.velocity_mps.z.v,      FloatBits{}};
+        turn_over(of_lane);
         int32_t layers[kLanes];
         std::memcpy(layers, &layer, sizeof layers);
-        for (uint32_t i = 0; i < used; ++i) {
-          if (layers[i] < 0) continue;
-          work.records[work.places[layers[i]]++] = {
-              {at[0][i], at[1][i], at[2][i]}, at[3][i], {at[4][i], at[5][i], at[6][i]}, 0.0f};
-        }
+        for (uint32_t i = 0; i < used; ++i)
+          if (layers[i] >= 0)
+            std::memcpy(work.records + work.places[layers[i]]++, of_lane + i, sizeof(VolumeRecord));
       });
 }
 
@@ -180,6 +196,9 @@ STRANDCAST_LANES void store_layer(const VolumeSlab& slab, double* layer, uint8_t
   }
 }
 
+// Records are taken in turns from so many places of a layer.
+constexpr uint32_t kRecordStreams = 4;
+
 STRANDCAST_LANES void sum_slab_lanes(const VolumeSlab& slab) {
   const size_t layer_size = size_t{slab.nodes.x} * slab.nodes.y;
   uint64_t outside = 0;
@@ -189,8 +208,14 @@ STRANDCAST_LANES void sum_slab_lanes(const VolumeSlab& slab) {
     double* const back = slab.scratch + ((layer + 1) % 2) * layer_size * 4;
     uint8_t* const front_rows = slab.scratch_rows + (layer % 2) * slab.nodes.y;
     uint8_t* const back_rows = slab.scratch_rows + ((layer + 1) % 2) * slab.nodes.y;
-    for (uint32_t i = slab.layer_begin[layer]; i < slab.layer_begin[layer + 1]; ++i) {
-      const VolumeRecord& record = slab.records[i];
+    // Neighbours lie in the same cell, whose sum would wait for the one before.
+    const uint32_t begin = slab.layer_begin[layer];
+    const uint32_t count = slab.layer_begin[layer + 1] - begin;
+    const uint32_t apart = (count + kRecordStreams - 1) / kRecordStreams;
+    for (uint32_t k = 0; k < apart * kRecordStreams; ++k) {
+      const uint32_t i = k % kRecordStreams * apart + k / kRecordStreams;
+      if (i >= count) continue;
+      const VolumeRecord& record = slab.records[begin + i];
       const auto x = static_cast<int32_t>(record.at[0]);
       const auto y = static_cast<int32_t>(record.at[1]);
       if (!(record.at[0] >= 0.0f && record.at[1] >= 0.0f) || x + 1 >= static_cast<int32_t>(slab.nodes.x) ||

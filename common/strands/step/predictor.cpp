@@ -87,6 +87,8 @@ Status Predictor::prepare() {
     return make_error(ErrorCode::Unsupported, "this build has no {} for this processor to predict with",
                       model_.kernel.shader_path);
   LaneWork work{places_, vertex_count, true, true, &ground_.workers, Priority::Encoding};
+  // Gusts pull by the model's own drag alone.
+  work.has_turbulence = model_.parameters.air_drag_per_s > 0.0;
   program_.emplace(*kernel, model_.kernel, work);
   work.has_turbulence = false;
   follicle_program_.emplace(*follicle_kernel, follicle, work);

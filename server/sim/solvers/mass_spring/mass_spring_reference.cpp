@@ -74,7 +74,9 @@ class SpringMotion {
   bool has_free_tip() const { return tail_ == n_; }
   /// Last vertex that the springs of the free ones reach.
   uint32_t last() const { return has_free_tip() ? n_ - 1 : std::min(tail_ + 1, n_ - 1); }
-  double hold(uint32_t i) const { return 1.0 + step_.h_s * (shared_.air_drag_per_s + step_.h_s * pull_[i]); }
+  double hold(uint32_t i) const {
+    return 1.0 + step_.h_s * (shared_.air_drag_per_s + pull_ahead_s(step_.h_s) * pull_[i]);
+  }
   /// Mass over the mass per length.
   double mass(uint32_t i) const { return 0.5 * (soft_[i] + (i + 1 < n_ ? soft_[i + 1] : 0.0)); }
   double capped(double stiffness, double inertia) const {
@@ -93,16 +95,18 @@ class SpringMotion {
     x_ = predicted_;
   }
 
-  // As predict() of reference_strands.cpp: backward Euler in drag and pull, forward for the rest.
+  // As predict() of reference_strands.cpp: implicit in drag and pull, forward for the rest.
   glm::dvec3 predicted(uint32_t i) const {
     const double h = step_.h_s;
     const double carried = shared_.sag_free * std::min(1.0, pull_[i] / kSupportStiffnessPerS2);
     const glm::dvec3 groom_gravity = limited(step_.input->groom_gravity_in_head_mps2, kMaxGravityMps2);
-    const glm::dvec3 gravity =
-        limited(step_.input->gravity_mps2, kMaxGravityMps2) - carried * (step_.rotation * groom_gravity);
+    const glm::dvec3 support = -carried * (step_.rotation * groom_gravity);
+    const glm::dvec3 gravity = limited(step_.input->gravity_mps2, kMaxGravityMps2) + support;
+    const glm::dvec3 held = pull_[i] * target_[i] + support;
     const glm::dvec3 air = air_velocity_mps(*step_.input, old_[i]) - step_.head_velocity_mps;
     const glm::dvec3 impulse =
-        velocity_[i] + h * (gravity + shared_.air_drag_per_s * air + pull_[i] * (target_[i] - old_[i]));
+        velocity_[i] + h * (gravity + shared_.air_drag_per_s * air + pull_[i] * (target_[i] - old_[i])) +
+        (pull_ahead_s(h) - h) * (held - glm::conjugate(step_.carry) * held);
     return old_[i] + h * shortened(impulse / hold(i), shared_.max_speed_mps);
   }
 

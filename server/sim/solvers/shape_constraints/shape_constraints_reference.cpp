@@ -55,7 +55,8 @@ class ShapeConstraintsReference final : public ReferenceStrands {
     const glm::dvec3 change = (rigid_mps(old) - before) + (carry() * own - own);
     const glm::dvec3 start = before + own + share * change - head_velocity_mps();
 
-    // (1 + h^2 s + h D) u = start + h (g + D air) + h s (target - x), D the tensor of the drag.
+    // (1 + h a s + h D) u = start + h (g + D air) + h s (target - x) + b, D the tensor of the drag; a and b
+    // as in predict() of reference_strands.cpp.
     const glm::dvec3 along = direction_or(old - strand.old_m[i - 1], glm::dvec3(0.0));
     const glm::dmat3 drag =
         parameters().air_drag_per_s *
@@ -63,8 +64,9 @@ class ShapeConstraintsReference final : public ReferenceStrands {
     const double stiffness = style_stiffness_per_s2(strand, i);
     const glm::dvec3 air = air_velocity_mps(input(), old) - head_velocity_mps();
     const glm::dvec3 impulse = start + h_s() * (uncarried_gravity_mps2(strand, i) + drag * air) +
-                               h_s() * stiffness * (strand.target_m[i] - old);
-    const glm::dmat3 system = (1.0 + h_s() * h_s() * stiffness) * glm::dmat3(1.0) + h_s() * drag;
+                               h_s() * stiffness * (strand.target_m[i] - old) + pulled_on_mps(strand, i);
+    const glm::dmat3 system =
+        (1.0 + h_s() * pull_ahead_s(h_s()) * stiffness) * glm::dmat3(1.0) + h_s() * drag;
     return old + h_s() * shortened(glm::inverse(system) * impulse, parameters().max_speed_mps);
   }
 
