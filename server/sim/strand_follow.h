@@ -4,17 +4,15 @@
 // the shared workers.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
 #include <vector>
 
 #include "common/groom/groom.h"
+#include "common/math/strand_guides.h"
 
 namespace strandcast {
-
-inline constexpr uint32_t kMaxGuidesOfStrand = 3;
 
 class StrandFollow {
  public:
@@ -36,19 +34,14 @@ class StrandFollow {
   uint64_t size_bytes() const;
 
  private:
-  struct Guides {
-    std::array<uint32_t, kMaxGuidesOfStrand> strand{};
-    std::array<float, kMaxGuidesOfStrand> weight{};  // sum 1; of strands that do not count 0
-  };
   void follow_some(const glm::vec3* guides_in_head_m, glm::vec3* all_in_head_m, size_t begin,
                    size_t end) const;
-  void choose_guides(const std::vector<glm::vec3>& rest);
 
   uint32_t strand_count_ = 0;
   uint32_t vertex_count_ = 0;
   uint32_t guide_count_ = 0;
   uint32_t pinned_count_ = 1;
-  std::vector<Guides> guides_;               // (followers)
+  std::vector<StrandGuides> guides_;         // (followers)
   std::vector<glm::vec3> pinned_in_head_m_;  // (pinned_count x followers)
   // (vertex_count x followers), of the segment before the vertex in the groom, head space:
   std::vector<glm::vec3> own_segment_m_;
