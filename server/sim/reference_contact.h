@@ -31,11 +31,23 @@ ReferenceSphere deepest_sphere(const StepInput& input, const glm::dvec3& point_m
 /// Times a point inside several colliders is pushed, out of the deepest first.
 int push_rounds(const StepInput& input);
 
-/// Coulomb friction in displacements: sliding over the collider, which turns rigidly with the head, is undone
-/// up to the friction coefficient times the depth that the collider has to push back. `carry` is the turn of
-/// the head during the substep; the point was at `old_m` before it.
-glm::dvec3 held_by_friction(const glm::dvec3& old_m, const glm::dvec3& point_m, const glm::dquat& carry,
-                            double friction, const ReferenceSphere& sphere);
+/// What strands touch in a substep: colliders where they are at its end, on a skin that turns with the head,
+/// and where the bust is with the chest.
+struct ReferenceSkin {
+  const StepInput& input;
+  glm::dquat carry{1.0, 0.0, 0.0, 0.0};  // turn of the head during the substep
+  double friction = 0.0;                 // Coulomb coefficient
+
+  /// Where a place of the skin is at the end that was at `old_m` before the substep.
+  glm::dvec3 carried(const glm::dvec3& old_m) const;
+  /// Where it is at the end; `groomed_m` is turned with the head alone.
+  glm::dvec3 on_bust(const glm::dvec3& groomed_m) const;
+};
+
+/// Coulomb friction in displacements: sliding over the skin is undone up to the friction coefficient times
+/// the depth that the collider has to push back. The point was at `old_m` before the substep.
+glm::dvec3 held_by_friction(const ReferenceSkin& skin, const glm::dvec3& old_m, const glm::dvec3& point_m,
+                            const ReferenceSphere& sphere);
 
 /// A segment's end, moved by a collider.
 struct ReferenceSegment {
@@ -43,13 +55,13 @@ struct ReferenceSegment {
   glm::dvec3 start_m{0.0};
   glm::dvec3 end_m{0.0};
   double length_m = 0.0;
-  std::optional<glm::dvec3> groomed_m = {};  // where the end may stay, inside of a sphere or not
+  /// Where the end may stay, inside of a sphere or not; turned with the head alone.
+  std::optional<glm::dvec3> groomed_m = {};
 };
 
 /// The end turned about the start until it is outside all spheres (two rounds, out of the deepest first) and
-/// held by Coulomb friction; `carry` is the turn of the head during the substep.
-glm::dvec3 pushed_out(const StepInput& input, const glm::dquat& carry, double friction,
-                      ReferenceSegment segment);
+/// held by Coulomb friction.
+glm::dvec3 pushed_out(const ReferenceSkin& skin, ReferenceSegment segment);
 
 /// Turns a segment about its start until its end lies on the sphere (center, radius): both equations of 003
 /// figure 4.1 at once. The nearest end that can be had when the two spheres do not meet.
