@@ -65,8 +65,16 @@ StrandFollow::StrandFollow(const Groom& groom, uint32_t guide_count)
   }
 }
 
-void StrandFollow::follow(std::span<const glm::vec3> guides_in_head_m,
-                          std::span<glm::vec3> all_in_head_m) const {
+glm::vec3 StrandFollow::groomed_in_head_m(size_t follower, size_t vertex) const {
+  const size_t follower_count = guides_.size();
+  const size_t last_pinned = std::min<size_t>(vertex, pinned_count_ - 1);
+  glm::vec3 place = pinned_in_head_m_[last_pinned * follower_count + follower];
+  for (size_t v = last_pinned + 1; v <= vertex; ++v) place += own_segment_m_[v * follower_count + follower];
+  return place;
+}
+
+void StrandFollow::follow(std::span<const glm::vec3> guides_in_head_m, std::span<glm::vec3> all_in_head_m,
+                          const FollowedSkin& skin) const {
   CHECK(guides_in_head_m.size() == size_t{guide_count_} * vertex_count_ &&
         all_in_head_m.size() == size_t{strand_count_} * vertex_count_);
   for (size_t v = 0; v < vertex_count_; ++v)
@@ -74,13 +82,15 @@ void StrandFollow::follow(std::span<const glm::vec3> guides_in_head_m,
                 all_in_head_m.data() + v * strand_count_);
   const size_t grain = std::max(1u, kVerticesPerRange / vertex_count_);
   shared_workers().at(Priority::Simulation).for_ranges(guides_.size(), grain, [&](size_t begin, size_t end) {
-    follow_some(guides_in_head_m.data(), all_in_head_m.data(), begin, end);
+    follow_some(guides_in_head_m.data(), all_in_head_m.data(), begin, end, skin);
   });
 }
 
 void StrandFollow::follow_some(const glm::vec3* guides_in_head_m, glm::vec3* all_in_head_m, size_t begin,
-                               size_t end) const {
+                               size_t end, const FollowedSkin& skin) const {
   const size_t follower_count = guides_.size();
+  const bool has_skin = skin.exists();
+  std::vector<float> room_m(has_skin ? end - begin : 0, 0.0f);
   for (size_t v = 0; v < vertex_count_; ++v) {
     glm::vec3* out = all_in_head_m + v * strand_count_ + guide_count_;
     if (v < pinned_count_) {
@@ -98,7 +108,10 @@ void StrandFollow::follow_some(const glm::vec3* guides_in_head_m, glm::vec3* all
         const uint32_t guide = guides_[f].strand[g];
         mean += guides_[f].weight[g] * (of_guides[guide] - before[guide]);
       }
-      out[f] = (out - strand_count_)[f] + shortest_turn(own[f], at_rest[f], direction_of(mean));
+      const glm::vec3& start = (out - strand_count_)[f];
+      out[f] = start + shortest_turn(own[f], at_rest[f], direction_of(mean));
+      if (has_skin && skin.may_touch(out[f], glm::length(own[f]), room_m[f - begin]))
+        out[f] = skin.turned_out({start, out[f], groomed_in_head_m(f, v - 1), groomed_in_head_m(f, v)});
     }
   }
 }

@@ -1,7 +1,7 @@
 // StrandFollow: where strands are that are not simulated. Each goes with one to three of the first strands,
 // its guides: those whose roots and groomed shapes are nearest. Every segment of it turns as theirs do from
-// the groom on, so that it is groomed where they are, and keeps its length. No GL; one thread, with
-// the shared workers.
+// the groom on, so that it is groomed where they are, and keeps its length. What its guides collide with it
+// does not enter either. No GL; one thread, with the shared workers.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +11,7 @@
 
 #include "common/groom/groom.h"
 #include "common/math/strand_guides.h"
+#include "server/sim/followed_skin.h"
 
 namespace strandcast {
 
@@ -21,8 +22,10 @@ class StrandFollow {
   StrandFollow(const Groom& groom, uint32_t guide_count);
 
   /// All strands from the first ones: (vertex_count x guide_count) to (vertex_count x strand_count), both in
-  /// head space, the strand fastest.
-  void follow(std::span<const glm::vec3> guides_in_head_m, std::span<glm::vec3> all_in_head_m) const;
+  /// head space, the strand fastest. Segments of followers that would end inside of the skin are turned out
+  /// of it.
+  void follow(std::span<const glm::vec3> guides_in_head_m, std::span<glm::vec3> all_in_head_m,
+              const FollowedSkin& skin = {}) const;
   /// The guides' mean of something that they have at each vertex.
   void blend(std::span<const glm::vec3> of_guides, std::span<glm::vec3> of_all) const;
 
@@ -34,8 +37,10 @@ class StrandFollow {
   uint64_t size_bytes() const;
 
  private:
-  void follow_some(const glm::vec3* guides_in_head_m, glm::vec3* all_in_head_m, size_t begin,
-                   size_t end) const;
+  void follow_some(const glm::vec3* guides_in_head_m, glm::vec3* all_in_head_m, size_t begin, size_t end,
+                   const FollowedSkin& skin) const;
+  /// Groomed place of a follower's vertex, head space.
+  glm::vec3 groomed_in_head_m(size_t follower, size_t vertex) const;
 
   uint32_t strand_count_ = 0;
   uint32_t vertex_count_ = 0;
