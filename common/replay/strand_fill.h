@@ -3,12 +3,12 @@
 // rest shape apart. No network, no GL; one thread.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
 #include <vector>
 
+#include "common/math/strand_guides.h"
 #include "common/strands/snapshot.h"
 
 namespace strandcast {
@@ -26,20 +26,11 @@ class StrandFill {
   std::vector<glm::vec3> positions(const Snapshot& snapshot);
 
  private:
-  static constexpr uint32_t kGuides = 3;
-  struct Guides {
-    std::array<uint32_t, kGuides> strand{};
-    std::array<float, kGuides> weight{};  // sum 1
-  };
-  void choose_guides(uint32_t sent_count);
-  /// From a strand's root to its tip at rest, m.
-  glm::vec3 fall_m(uint32_t strand) const;
-
   uint32_t strand_count_ = 0;
   uint32_t vertex_count_ = 0;
   std::vector<glm::vec3> rest_in_head_m_;
-  uint32_t sent_count_ = 0;     // for which the guides were chosen
-  std::vector<Guides> guides_;  // of strands sent_count_ to strand_count_ - 1
+  uint32_t sent_count_ = 0;           // for which the guides were chosen
+  std::vector<StrandGuides> guides_;  // of strands sent_count_ to strand_count_ - 1
 };
 
 }  // namespace strandcast

@@ -38,6 +38,7 @@ Status ServedHead::load(OtherHeads others) {
     config_.tap = records_->first_tap();
   }
   ASSIGN_OR_RETURN(source_, config_.make_source(config_, inputs_));
+  if (const std::optional<SceneDesc> loaded = source_->scene()) scene.camera = loaded->camera;
   const std::shared_ptr<const SceneAsset> asset = source_->asset();
   RETURN_IF_ERROR(choose_stream());
   RETURN_IF_ERROR(choose_codecs());

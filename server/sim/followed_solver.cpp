@@ -62,6 +62,8 @@ Status FollowedSolver::load(const Groom& groom, const glm::dquat& world_from_hea
   follow_.emplace(groom, count);
   world_from_head_rotation_ = world_from_head_rotation;
   head_velocity_mps_ = head_spin_radps_ = glm::dvec3(0.0);
+  skin_.spheres.clear();
+  skin_.bust = {};
   is_followed_ = false;
   const size_t size = size_t{follow_->strand_count()} * follow_->vertex_count();
   all_.position_m.resize(size);
@@ -84,16 +86,21 @@ void FollowedSolver::substep(const StepInput& input) {
   const double angle = glm::angle(turn);
   head_spin_radps_ = angle > 0.0 ? glm::axis(turn) * (angle / h_s) : glm::dvec3(0.0);
   world_from_head_rotation_ = rotation;
+  const glm::dquat head_from_world = glm::conjugate(rotation);
+  skin_.spheres.clear();
+  for (const SphereCollider& sphere : input.colliders)
+    skin_.spheres.push_back({glm::vec3(head_from_world * glm::dvec3(sphere.center_m)), sphere.radius_m});
+  skin_.bust = input.bust;
   is_followed_ = false;
 }
 
 void FollowedSolver::expand(const std::vector<glm::vec3>& simulated_in_world_m,
-                            const glm::dquat& world_from_head_rotation,
+                            const glm::dquat& world_from_head_rotation, const FollowedSkin& skin,
                             std::vector<glm::vec3>& all_in_world_m) {
   const glm::dmat3 world_from_head = glm::mat3_cast(world_from_head_rotation);
   turn(glm::transpose(world_from_head), simulated_in_world_m, simulated_in_head_m_);
   vertices_->follow(simulated_in_head_m_, guides_m_);
-  follow_->follow(guides_m_, all_in_head_m_);
+  follow_->follow(guides_m_, all_in_head_m_, skin);
   all_in_world_m.resize(all_in_head_m_.size());
   turn(world_from_head, all_in_head_m_, all_in_world_m);
   put_simulated(simulated_in_world_m, all_in_world_m);
@@ -110,7 +117,7 @@ void FollowedSolver::put_simulated(std::span<const glm::vec3> simulated, std::sp
 void FollowedSolver::follow_guides() {
   if (is_followed_) return;
   guides_->read(simulated_);
-  expand(simulated_.position_m, world_from_head_rotation_, all_.position_m);
+  expand(simulated_.position_m, world_from_head_rotation_, skin_, all_.position_m);
   vertices_->blend(simulated_.velocity_mps, guides_m_);
   follow_->blend(guides_m_, all_.velocity_mps);
   pack_blocks(all_.position_m, position_blocks_);
@@ -124,10 +131,12 @@ SolverBlocks FollowedSolver::read_blocks() {
 }
 
 // Seen from the head joint strands are looked at once more a little later: what they have moved by is their
-// velocity, beside the head's.
+// velocity, beside the head's. Both looks are without the skin: to which side of it a strand is turned may
+// change from one to the other, and that is no motion.
 void FollowedSolver::read(SolverState& state) {
   guides_->read(simulated_);
-  expand(simulated_.position_m, world_from_head_rotation_, state.position_m);
+  expand(simulated_.position_m, world_from_head_rotation_, skin_, state.position_m);
+  expand(simulated_.position_m, world_from_head_rotation_, {}, free_m_);
   const glm::vec3 head_velocity(head_velocity_mps_), head_spin(head_spin_radps_);
   const size_t pinned = size_t{follow_->pinned_count()} * follow_->guide_count();
   std::vector<glm::vec3> ahead(simulated_.position_m);
@@ -139,9 +148,9 @@ void FollowedSolver::read(SolverState& state) {
   const double spin = glm::length(head_spin_radps_);
   const glm::dquat turn_ahead =
       spin > 0.0 ? glm::angleAxis(spin * kAheadS, head_spin_radps_ / spin) : glm::dquat(1.0, 0.0, 0.0, 0.0);
-  expand(ahead, turn_ahead * world_from_head_rotation_, state.velocity_mps);
+  expand(ahead, turn_ahead * world_from_head_rotation_, {}, state.velocity_mps);
   for (size_t i = 0; i < state.velocity_mps.size(); ++i)
-    state.velocity_mps[i] = head_velocity + (state.velocity_mps[i] - state.position_m[i]) / kAheadS;
+    state.velocity_mps[i] = head_velocity + (state.velocity_mps[i] - free_m_[i]) / kAheadS;
   put_simulated(simulated_.velocity_mps, state.velocity_mps);
   is_followed_ = false;
 }

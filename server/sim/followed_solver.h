@@ -30,9 +30,13 @@ Groom simulated_groom(const Groom& groom, const SimulatedPart& part);
 
 class FollowedSolver : public Solver {
  public:
-  /// Wraps `guides`, which must own its strands.
-  FollowedSolver(std::unique_ptr<Solver> guides, SimulatedPart part)
-      : guides_(std::move(guides)), part_(part) {}
+  /// Wraps `guides`, which must own its strands. `head_field` is what they collide with besides spheres; null:
+  /// nothing.
+  FollowedSolver(std::unique_ptr<Solver> guides, SimulatedPart part,
+                 std::shared_ptr<const DistanceField> head_field = nullptr)
+      : guides_(std::move(guides)), part_(part) {
+    skin_.field = std::move(head_field);
+  }
 
   Status load(const Groom& groom, const glm::dquat& world_from_head_rotation) override;
   void substep(const StepInput& input) override;
@@ -55,7 +59,7 @@ class FollowedSolver : public Solver {
 
  private:
   void expand(const std::vector<glm::vec3>& simulated_in_world_m, const glm::dquat& world_from_head_rotation,
-              std::vector<glm::vec3>& all_in_world_m);
+              const FollowedSkin& skin, std::vector<glm::vec3>& all_in_world_m);
 
   void put_simulated(std::span<const glm::vec3> simulated, std::span<glm::vec3> all) const;
 
@@ -63,6 +67,7 @@ class FollowedSolver : public Solver {
   const SimulatedPart part_;
   std::optional<VertexFollow> vertices_;  // of the guides
   std::optional<StrandFollow> follow_;
+  FollowedSkin skin_;  // as it was in the newest substep
   glm::dquat world_from_head_rotation_{1.0, 0.0, 0.0, 0.0};
   // Of the head in the newest substep, world: what roots move with.
   glm::dvec3 head_velocity_mps_{0.0};
@@ -70,7 +75,7 @@ class FollowedSolver : public Solver {
   bool is_followed_ = false;  // all_ and the blocks are of the guides as they are
   SolverState simulated_;
   SolverState all_;
-  std::vector<glm::vec3> simulated_in_head_m_, guides_m_, all_in_head_m_;
+  std::vector<glm::vec3> simulated_in_head_m_, guides_m_, all_in_head_m_, free_m_;
   StrandBlocks position_blocks_;
   StrandBlocks velocity_blocks_;
 };

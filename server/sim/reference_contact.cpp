@@ -41,16 +41,34 @@ int push_rounds(const StepInput& input) {
   return sphere_count(input) > 1 ? 2 : 1;
 }
 
-glm::dvec3 held_by_friction(const glm::dvec3& old_m, const glm::dvec3& point_m, const glm::dquat& carry,
-                            double friction, const ReferenceSphere& sphere) {
+// Seen from the head the skin is bent from one pose of the bust to the other. Its place at rest says which
+// part of the chest's turn it takes.
+glm::dvec3 ReferenceSkin::carried(const glm::dvec3& old_m) const {
+  const BustInput& bust = input.bust;
+  const glm::dvec3 with_head = carry * old_m;
+  if (!bust.rig.exists()) return with_head;
+  const glm::dquat rotation = limited_rotation(input.world_from_head_rotation);
+  const glm::dvec3 rest = without_bust(bust.rig, bust.turn_before, glm::conjugate(rotation) * with_head);
+  return rotation * with_bust(bust.rig, bust.turn, rest);
+}
+
+glm::dvec3 ReferenceSkin::on_bust(const glm::dvec3& groomed_m) const {
+  const BustInput& bust = input.bust;
+  if (!bust.rig.exists()) return groomed_m;
+  const glm::dquat rotation = limited_rotation(input.world_from_head_rotation);
+  return rotation * with_bust(bust.rig, bust.turn, glm::conjugate(rotation) * groomed_m);
+}
+
+glm::dvec3 held_by_friction(const ReferenceSkin& skin, const glm::dvec3& old_m, const glm::dvec3& point_m,
+                            const ReferenceSphere& sphere) {
   const double distance = glm::distance(point_m, sphere.center_m);
   if (distance < kTinyContact) return point_m;
   const glm::dvec3 normal = (point_m - sphere.center_m) / distance;
-  const glm::dvec3 slip = point_m - carry * old_m;
+  const glm::dvec3 slip = point_m - skin.carried(old_m);
   const glm::dvec3 sliding = slip - normal * glm::dot(slip, normal);
   const double way = glm::length(sliding);
   if (way < kTinyContact) return point_m;
-  return point_m - sliding * std::min(1.0, friction * (sphere.radius_m - distance) / way);
+  return point_m - sliding * std::min(1.0, skin.friction * (sphere.radius_m - distance) / way);
 }
 
 glm::dvec3 shortened(const glm::dvec3& value, double longest) {
@@ -77,14 +95,15 @@ glm::dvec3 turned_onto_sphere(const ReferenceSegment& segment, const glm::dvec3&
 // 003 solves collider and length constraints in turn and leaves the exact solution of both (figure 4.1) out
 // for its cost; turning the segment onto the sphere is that exact solution. Several colliders: out of the one
 // with the largest r^2 - |p - c|^2 first, then once more.
-glm::dvec3 pushed_out(const StepInput& input, const glm::dquat& carry, double friction,
-                      ReferenceSegment segment) {
+glm::dvec3 pushed_out(const ReferenceSkin& skin, ReferenceSegment segment) {
+  const StepInput& input = skin.input;
   for (int round = 0; round < push_rounds(input); ++round) {
     ReferenceSphere sphere = deepest_sphere(input, segment.end_m);
     if (segment.groomed_m)
-      sphere.radius_m = std::min(sphere.radius_m, glm::distance(*segment.groomed_m, sphere.center_m));
+      sphere.radius_m =
+          std::min(sphere.radius_m, glm::distance(skin.on_bust(*segment.groomed_m), sphere.center_m));
     if (glm::distance(segment.end_m, sphere.center_m) >= sphere.radius_m) break;
-    segment.end_m = held_by_friction(segment.old_m, segment.end_m, carry, friction, sphere);
+    segment.end_m = held_by_friction(skin, segment.old_m, segment.end_m, sphere);
     segment.end_m = turned_onto_sphere(segment, sphere.center_m, sphere.radius_m);
   }
   return segment.end_m;

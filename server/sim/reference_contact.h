@@ -33,11 +33,23 @@ ReferenceSphere deepest_sphere(const StepInput& input, const glm::dvec3& point_m
 /// Returns how often a point inside several colliders is pushed, each time out of the deepest.
 int push_rounds(const StepInput& input);
 
-/// Applies Coulomb friction to a displacement. Sliding over the collider, which rotates rigidly with the
-/// head, is undone up to the friction coefficient times the penetration depth. `carry` is the head's rotation
-/// during the substep; `old_m` is the point before it.
-glm::dvec3 held_by_friction(const glm::dvec3& old_m, const glm::dvec3& point_m, const glm::dquat& carry,
-                            double friction, const ReferenceSphere& sphere);
+/// Surface that strands touch in a substep: the colliders at its end, on a skin that turns with the head, and
+/// with the chest where the bust is.
+struct ReferenceSkin {
+  const StepInput& input;
+  glm::dquat carry{1.0, 0.0, 0.0, 0.0};  // turn of the head during the substep
+  double friction = 0.0;                 // Coulomb coefficient
+
+  /// Returns where the place of the skin that was at `old_m` before the substep is at its end.
+  glm::dvec3 carried(const glm::dvec3& old_m) const;
+  /// Returns where a groomed place is at the end; `groomed_m` is turned with the head alone.
+  glm::dvec3 on_bust(const glm::dvec3& groomed_m) const;
+};
+
+/// Applies Coulomb friction to a displacement. Sliding over the skin is undone up to the friction coefficient
+/// times the penetration depth. `old_m` is the point before the substep.
+glm::dvec3 held_by_friction(const ReferenceSkin& skin, const glm::dvec3& old_m, const glm::dvec3& point_m,
+                            const ReferenceSphere& sphere);
 
 /// A segment whose end a collider moves.
 struct ReferenceSegment {
@@ -45,13 +57,13 @@ struct ReferenceSegment {
   glm::dvec3 start_m{0.0};
   glm::dvec3 end_m{0.0};
   double length_m = 0.0;
-  std::optional<glm::dvec3> groomed_m = {};  // where the end may stay, inside of a sphere or not
+  /// Where the end may stay, inside of a sphere or not; turned with the head alone.
+  std::optional<glm::dvec3> groomed_m = {};
 };
 
 /// Rotates the end about the start until it is outside all spheres (two rounds, out of the deepest first),
-/// then applies Coulomb friction. `carry` is the head's rotation during the substep.
-glm::dvec3 pushed_out(const StepInput& input, const glm::dquat& carry, double friction,
-                      ReferenceSegment segment);
+/// then applies Coulomb friction.
+glm::dvec3 pushed_out(const ReferenceSkin& skin, ReferenceSegment segment);
 
 /// Rotates a segment about its start until its end lies on the sphere (center, radius): both equations of 003
 /// figure 4.1 at once. Returns the nearest possible end if the two spheres do not intersect.

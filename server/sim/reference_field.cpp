@@ -18,8 +18,7 @@ struct FieldContact {
   double depth_m = 0.0;  // below the clearance; not positive = none
 };
 
-FieldContact contact_at(const DistanceField& field, const glm::dvec3& point_m, double clearance_m) {
-  const DistanceField::Sample sample = field.sample(point_m);
+FieldContact contact_of(const DistanceField::Sample& sample, double clearance_m) {
   const double slope = glm::length(sample.gradient);
   return {slope > 0.0 ? sample.gradient / slope : glm::dvec3(0.0),
           (clearance_m - sample.distance_m) / std::max(slope, kLeastSlope)};
@@ -52,7 +51,21 @@ double field_clearance_m(const DistanceField& field, const glm::dvec3& groomed_m
   return std::min(kFieldClearanceM, field.sample(groomed_m).distance_m - kFieldSlackM);
 }
 
+// The skin's place at rest lies as far from the field, and the way there is turned with it.
+DistanceField::Sample sample_on_bust(const DistanceField& field, const BustInput& bust,
+                                     const glm::dvec3& point_m) {
+  const glm::dvec3 rest_m = without_bust(bust.rig, bust.turn, point_m);
+  DistanceField::Sample found = field.sample(rest_m);
+  found.gradient = turned_with_bust(bust.rig, bust.turn, rest_m, found.gradient);
+  return found;
+}
+
 bool keep_out_of(const DistanceField& field, const ReferenceFieldStrand& strand) {
+  const BustInput& bust = strand.bust;
+  const auto sampled = [&](const glm::dvec3& point_m) { return sample_on_bust(field, bust, point_m); };
+  const auto carried = [&](const glm::dvec3& before_m) {
+    return with_bust(bust.rig, bust.turn, without_bust(bust.rig, bust.turn_before, before_m));
+  };
   bool has_moved = false;
   glm::dvec3 start_before = strand.position_m[strand.first - 1];
   for (size_t i = strand.first; i < strand.position_m.size(); ++i) {
@@ -71,14 +84,14 @@ bool keep_out_of(const DistanceField& field, const ReferenceFieldStrand& strand)
           field_clearance_m(field, 0.5 * (strand.groomed_m[i - 1] + strand.groomed_m[i]));
       for (int attempt = 0; attempt < 2; ++attempt) {
         for (int round = 0; round < kMostRounds; ++round) {
-          const FieldContact contact = contact_at(field, end, clearance_m);
-          const double left_m = clearance_m - field.sample(end).distance_m;
-          if (!(left_m > (round < 2 ? 0.0 : kResidueM))) break;
-          const glm::dvec3 held = after_friction(strand.before_m[i], end, contact, strand.friction);
+          const DistanceField::Sample found = sampled(end);
+          const FieldContact contact = contact_of(found, clearance_m);
+          if (!(clearance_m - found.distance_m > (round < 2 ? 0.0 : kResidueM))) break;
+          const glm::dvec3 held = after_friction(carried(strand.before_m[i]), end, contact, strand.friction);
           end = start + segment_at_height(held - start, contact.normal, length_m,
                                           glm::dot(end - start, contact.normal) + contact.depth_m);
         }
-        const FieldContact cut = contact_at(field, 0.5 * (start + end), middle_clearance_m);
+        const FieldContact cut = contact_of(sampled(0.5 * (start + end)), middle_clearance_m);
         if (!(cut.depth_m > 0.0)) break;
         end = start + segment_at_height(end - start, cut.normal, length_m,
                                         glm::dot(end - start, cut.normal) + 2.0 * cut.depth_m);

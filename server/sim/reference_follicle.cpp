@@ -70,7 +70,7 @@ bool hold_root(const StepInput& input, const ReferenceRoot& root) {
     const glm::dvec3 before = root.position_m[i - 1];
     const glm::dvec3 next = root.position_m[i] + shift;
     const glm::dvec3 end =
-        pushed_out(input, {1.0, 0.0, 0.0, 0.0}, 0.0, {next, before, next, glm::distance(before, next)});
+        pushed_out(ReferenceSkin{input}, {next, before, next, glm::distance(before, next)});
     shift = end - root.position_m[i];
     root.position_m[i] = end;
   }

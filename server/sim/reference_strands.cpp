@@ -130,7 +130,7 @@ void ReferenceStrands::place(ReferenceStrand& strand, uint32_t i) const {
   glm::dvec3 end = norm < kTinySegment ? start : start + length * (direction / norm);
 
   const glm::dvec3 outside =
-      pushed_out(input(), carry(), parameters_.collider_friction, {strand.old_m[i], start, end, length});
+      pushed_out({input(), carry(), parameters_.collider_friction}, {strand.old_m[i], start, end, length});
   strand.pushed_m[i] = outside - end;
   end = outside;
   if (layout().pinned_tail_count > 0) {

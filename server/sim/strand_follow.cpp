@@ -5,18 +5,11 @@
 
 #include "common/base/check.h"
 #include "common/base/worker_pool.h"
-#include "common/math/point_tree.h"
 #include "server/sim/shortest_turn.h"
 
 namespace strandcast {
 namespace {
 
-/// Strands by their roots that are looked at for the nearest in shape.
-constexpr uint32_t kCandidates = 10;
-/// Nearer than this two strands are one, m.
-constexpr float kSameStrandM = 1e-3f;
-/// How much a difference in shape counts beside one of the roots, both as distances.
-constexpr float kShapeWeight = 1.0f;
 constexpr float kShortestM = 1e-9f;
 /// Vertices that a worker takes at a time.
 constexpr uint32_t kVerticesPerRange = 8'192;
@@ -49,7 +42,7 @@ StrandFollow::StrandFollow(const Groom& groom, uint32_t guide_count)
   for (uint32_t s = 0; s < strand_count_; ++s)
     for (uint32_t v = 0; v < vertex_count_; ++v)
       rest[size_t{v} * strand_count_ + s] = groom.rest_position_m[groom.offset[s] + v];
-  choose_guides(rest);
+  guides_ = choose_guides(rest, vertex_count_, guide_count_);
   const uint32_t follower_count = strand_count_ - guide_count_;
   pinned_in_head_m_.resize(size_t{pinned_count_} * follower_count);
   own_segment_m_.resize(size_t{vertex_count_} * follower_count);
@@ -63,7 +56,7 @@ StrandFollow::StrandFollow(const Groom& groom, uint32_t guide_count)
       const glm::vec3* before = here - strand_count_;
       own_segment_m_[i] = here[guide_count_ + f] - before[guide_count_ + f];
       glm::vec3 mean(0.0f);
-      for (size_t g = 0; g < kMaxGuidesOfStrand; ++g) {
+      for (size_t g = 0; g < kGuidesOfStrand; ++g) {
         const uint32_t guide = guides_[f].strand[g];
         mean += guides_[f].weight[g] * (here[guide] - before[guide]);
       }
@@ -72,35 +65,16 @@ StrandFollow::StrandFollow(const Groom& groom, uint32_t guide_count)
   }
 }
 
-void StrandFollow::choose_guides(const std::vector<glm::vec3>& rest) {
-  const PointTree tree(std::span<const glm::vec3>(rest).first(guide_count_));
-  guides_.resize(strand_count_ - guide_count_);
-  for (uint32_t f = 0; f < guides_.size(); ++f) {
-    const uint32_t strand = guide_count_ + f;
-    std::vector<PointTree::Neighbour> near = tree.nearest(rest[strand], kCandidates);
-    for (PointTree::Neighbour& guide : near) {
-      float shape = 0.0f;  // mean square of how far apart the two are with their roots in one place
-      for (size_t v = 1; v < vertex_count_; ++v) {
-        const glm::vec3* here = rest.data() + v * strand_count_;
-        const glm::vec3 apart = (here[strand] - rest[strand]) - (here[guide.index] - rest[guide.index]);
-        shape += glm::dot(apart, apart) / static_cast<float>(vertex_count_ - 1);
-      }
-      guide.distance_squared += kShapeWeight * shape;
-    }
-    std::sort(near.begin(), near.end());
-    Guides& guides = guides_[f];
-    float sum = 0.0f;
-    for (size_t g = 0; g < std::min<size_t>(kMaxGuidesOfStrand, near.size()); ++g) {
-      guides.strand[g] = near[g].index;
-      guides.weight[g] = 1.0f / (near[g].distance_squared + kSameStrandM * kSameStrandM);
-      sum += guides.weight[g];
-    }
-    for (float& weight : guides.weight) weight /= sum;
-  }
+glm::vec3 StrandFollow::groomed_in_head_m(size_t follower, size_t vertex) const {
+  const size_t follower_count = guides_.size();
+  const size_t last_pinned = std::min<size_t>(vertex, pinned_count_ - 1);
+  glm::vec3 place = pinned_in_head_m_[last_pinned * follower_count + follower];
+  for (size_t v = last_pinned + 1; v <= vertex; ++v) place += own_segment_m_[v * follower_count + follower];
+  return place;
 }
 
-void StrandFollow::follow(std::span<const glm::vec3> guides_in_head_m,
-                          std::span<glm::vec3> all_in_head_m) const {
+void StrandFollow::follow(std::span<const glm::vec3> guides_in_head_m, std::span<glm::vec3> all_in_head_m,
+                          const FollowedSkin& skin) const {
   CHECK(guides_in_head_m.size() == size_t{guide_count_} * vertex_count_ &&
         all_in_head_m.size() == size_t{strand_count_} * vertex_count_);
   for (size_t v = 0; v < vertex_count_; ++v)
@@ -108,13 +82,15 @@ void StrandFollow::follow(std::span<const glm::vec3> guides_in_head_m,
                 all_in_head_m.data() + v * strand_count_);
   const size_t grain = std::max(1u, kVerticesPerRange / vertex_count_);
   shared_workers().at(Priority::Simulation).for_ranges(guides_.size(), grain, [&](size_t begin, size_t end) {
-    follow_some(guides_in_head_m.data(), all_in_head_m.data(), begin, end);
+    follow_some(guides_in_head_m.data(), all_in_head_m.data(), begin, end, skin);
   });
 }
 
 void StrandFollow::follow_some(const glm::vec3* guides_in_head_m, glm::vec3* all_in_head_m, size_t begin,
-                               size_t end) const {
+                               size_t end, const FollowedSkin& skin) const {
   const size_t follower_count = guides_.size();
+  const bool has_skin = skin.exists();
+  std::vector<float> room_m(has_skin ? end - begin : 0, 0.0f);
   for (size_t v = 0; v < vertex_count_; ++v) {
     glm::vec3* out = all_in_head_m + v * strand_count_ + guide_count_;
     if (v < pinned_count_) {
@@ -128,11 +104,14 @@ void StrandFollow::follow_some(const glm::vec3* guides_in_head_m, glm::vec3* all
     const glm::vec3* at_rest = guides_direction_.data() + v * follower_count;
     for (size_t f = begin; f < end; ++f) {
       glm::vec3 mean(0.0f);
-      for (size_t g = 0; g < kMaxGuidesOfStrand; ++g) {
+      for (size_t g = 0; g < kGuidesOfStrand; ++g) {
         const uint32_t guide = guides_[f].strand[g];
         mean += guides_[f].weight[g] * (of_guides[guide] - before[guide]);
       }
-      out[f] = (out - strand_count_)[f] + shortest_turn(own[f], at_rest[f], direction_of(mean));
+      const glm::vec3& start = (out - strand_count_)[f];
+      out[f] = start + shortest_turn(own[f], at_rest[f], direction_of(mean));
+      if (has_skin && skin.may_touch(out[f], glm::length(own[f]), room_m[f - begin]))
+        out[f] = skin.turned_out({start, out[f], groomed_in_head_m(f, v - 1), groomed_in_head_m(f, v)});
     }
   }
 }
@@ -146,15 +125,14 @@ void StrandFollow::blend(std::span<const glm::vec3> of_guides, std::span<glm::ve
     std::copy_n(from, guide_count_, to);
     for (size_t f = 0; f < guides_.size(); ++f) {
       glm::vec3 mean(0.0f);
-      for (size_t g = 0; g < kMaxGuidesOfStrand; ++g)
-        mean += guides_[f].weight[g] * from[guides_[f].strand[g]];
+      for (size_t g = 0; g < kGuidesOfStrand; ++g) mean += guides_[f].weight[g] * from[guides_[f].strand[g]];
       to[guide_count_ + f] = mean;
     }
   }
 }
 
 uint64_t StrandFollow::size_bytes() const {
-  return guides_.size() * sizeof(Guides) +
+  return guides_.size() * sizeof(StrandGuides) +
          (pinned_in_head_m_.size() + own_segment_m_.size() + guides_direction_.size()) * sizeof(glm::vec3);
 }
 

@@ -1,20 +1,19 @@
 // StrandFollow: computes the strands that are not simulated. Each follows one to three of the first strands,
 // its guides, whose roots and groomed shapes are nearest. Each of its segments rotates as theirs have since
-// the groom, so it matches the groom where they do and keeps its length. No GL; one thread, with the shared
-// workers.
+// the groom, so it matches the groom where they do and keeps its length. It stays out of what the guides
+// collide with. No GL; one thread, with the shared workers.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
 #include <vector>
 
 #include "common/groom/groom.h"
+#include "common/math/strand_guides.h"
+#include "server/sim/followed_skin.h"
 
 namespace strandcast {
-
-inline constexpr uint32_t kMaxGuidesOfStrand = 3;
 
 class StrandFollow {
  public:
@@ -23,8 +22,9 @@ class StrandFollow {
   StrandFollow(const Groom& groom, uint32_t guide_count);
 
   /// Computes all strands from the guides: (vertex_count x guide_count) to (vertex_count x strand_count),
-  /// both in head space, strand fastest.
-  void follow(std::span<const glm::vec3> guides_in_head_m, std::span<glm::vec3> all_in_head_m) const;
+  /// both in head space, strand fastest. Segments that would end inside the skin are rotated out of it.
+  void follow(std::span<const glm::vec3> guides_in_head_m, std::span<glm::vec3> all_in_head_m,
+              const FollowedSkin& skin = {}) const;
   /// Computes a per-vertex quantity of all strands as the weighted mean of their guides'.
   void blend(std::span<const glm::vec3> of_guides, std::span<glm::vec3> of_all) const;
 
@@ -36,19 +36,16 @@ class StrandFollow {
   uint64_t size_bytes() const;
 
  private:
-  struct Guides {
-    std::array<uint32_t, kMaxGuidesOfStrand> strand{};
-    std::array<float, kMaxGuidesOfStrand> weight{};  // sum 1; of strands that do not count 0
-  };
-  void follow_some(const glm::vec3* guides_in_head_m, glm::vec3* all_in_head_m, size_t begin,
-                   size_t end) const;
-  void choose_guides(const std::vector<glm::vec3>& rest);
+  void follow_some(const glm::vec3* guides_in_head_m, glm::vec3* all_in_head_m, size_t begin, size_t end,
+                   const FollowedSkin& skin) const;
+  /// Groomed place of a follower's vertex, head space.
+  glm::vec3 groomed_in_head_m(size_t follower, size_t vertex) const;
 
   uint32_t strand_count_ = 0;
   uint32_t vertex_count_ = 0;
   uint32_t guide_count_ = 0;
   uint32_t pinned_count_ = 1;
-  std::vector<Guides> guides_;               // (followers)
+  std::vector<StrandGuides> guides_;         // (followers)
   std::vector<glm::vec3> pinned_in_head_m_;  // (pinned_count x followers)
   // (vertex_count x followers), of the segment before the vertex in the groom, head space:
   std::vector<glm::vec3> own_segment_m_;

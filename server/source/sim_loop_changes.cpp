@@ -231,7 +231,9 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
                                  config_.content->volume_target,
                                  scene.wind.along_share};
   ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver, row->make(parameters, context));
-  if (are_followed) solver = std::make_unique<FollowedSolver>(std::move(solver), part);
+  if (are_followed)
+    solver = std::make_unique<FollowedSolver>(
+        std::move(solver), part, features.has_distance_field ? config_.content->head_field : nullptr);
   const bool is_first = solver_ == nullptr;
   const glm::dquat& rotation = builder_->world_from_head().rotation;
   RETURN_IF_ERROR(solver_ == nullptr ? solver->load(config_.content->groom, rotation)

@@ -5,6 +5,7 @@
 #include "common/groom/groom_asset.h"
 #include "common/log/log.h"
 #include "common/scene/scene_file.h"
+#include "server/scene/first_camera.h"
 #include "server/source/scene_change.h"
 
 namespace strandcast {
@@ -45,8 +46,7 @@ class SimulationSource : public StateSource {
   void set_tap(StepTap* tap, OnTapped on_tapped) override { loop_->set_tap(tap, std::move(on_tapped)); }
   SimStats stats() const override { return loop_ != nullptr ? loop_->stats() : SimStats{}; }
   std::optional<SceneDesc> scene() const override {
-    if (loop_ == nullptr) return std::nullopt;
-    SceneDesc scene = loop_->scene();
+    SceneDesc scene = loop_ != nullptr ? loop_->scene() : config_.scene;
     // Where the scene left the codec to the machine that runs it, it still does.
     if (!config_.scene.stream.has_codec) {
       scene.stream.codec = config_.scene.stream.codec;
@@ -70,6 +70,8 @@ Result<std::unique_ptr<StateSource>> make_simulation(SimulationConfig config, In
   RETURN_IF_ERROR(check_solver(config.scene));
   ASSIGN_OR_RETURN(SceneContent content, load_scene_content(config.scene));
   for (const std::string& note : content.notes) log_info("scene", "{}", note);
+  if (config.scene.camera == CameraDesc{})
+    config.scene.camera = first_camera(config.scene.camera, content.groom.rest_position_m);
   return std::unique_ptr<StateSource>(std::make_unique<SimulationSource>(
       std::move(config), std::make_shared<const SceneContent>(std::move(content)), inputs));
 }

@@ -38,6 +38,7 @@ struct ParityCase {
   SolverParameters parameters = {{"style_stiffness_per_s2", 120.0}};
   int steps = 6;
   double bend_rad = TestGroomDesc().bend_rad;
+  bool has_bust = false;
 };
 
 // Short segments divide a rounding: iterated models are given vertices over 8 times as much, in the first
@@ -60,11 +61,32 @@ double bound_for(const SolverRow& row, const ParityCase& test, int step) {
   return bound_m + bounds.stiff_rounding_m * squared;
 }
 
+/// A bust that begins high, so that colliders and what slides on them lie on neck and chest.
+BustInput moving_bust(int step) {
+  const auto turn_at = [](double t_s) {
+    const double half_rad = 0.3 * std::sin(6.0 * t_s);
+    return std::sin(half_rad) * glm::normalize(BustTurn(0.2, 1.0, -0.1));
+  };
+  BustInput bust;
+  bust.rig = {glm::vec3(0.0f, 0.03f, -0.01f), glm::vec4(0.0f, 8.0f, 0.0f, 0.9f)};
+  bust.turn = turn_at(step * kSubstepS);
+  bust.turn_before = turn_at((step - 1) * kSubstepS);
+  return bust;
+}
+
 StepInput input_for(const ParityCase& test, int step) {
   StepInput input = moving_input(step, kSubstepS);
   if (!test.has_wind) input.wind_mps = glm::dvec3(0.0);
   if (!test.has_gusts) input.gusts.clear();
   if (!test.has_colliders) input.colliders.clear();
+  if (test.has_bust) {
+    // Strands stand in it from the beginning, on one side of its middle.
+    const glm::dvec3 at_rest(0.13, 0.06, 0.02);
+    input.bust = moving_bust(step);
+    input.colliders = {
+        {glm::vec3(input.world_from_head_rotation * with_bust(input.bust.rig, input.bust.turn, at_rest)),
+         0.05f}};
+  }
   return input;
 }
 
@@ -109,6 +131,10 @@ std::vector<ParityCase> parity_cases() {
        false,
        true,
        {{"style_stiffness_per_s2", 30.0}, {"style_tip_share", 0.1}, {"sag_free", 0.4}}},
+      {.name = "bust",
+       .has_colliders = true,
+       .parameters = {{"style_stiffness_per_s2", 120.0}, {"collider_friction", 1.0}},
+       .has_bust = true},
       {"limp, rough",
        Pinning::RootPair,
        16,
@@ -182,6 +208,31 @@ TEST_P(SolverParity, TheKernelFollowsItsReference) {
     SCOPED_TRACE(test.name);
     ASSERT_NO_FATAL_FAILURE(compare(row, test));
   }
+}
+
+// What lies on neck and chest goes along with them: a reference that takes them for the head is seen.
+TEST_P(SolverParity, ABustThatIsRigidIsAnother) {
+  const SolverRow& row = **find_solver(std::get<std::string>(GetParam()));
+  const auto of_bust = [](const ParityCase& test) { return test.has_bust; };
+  const std::vector<ParityCase> cases = parity_cases();
+  const ParityCase& test = *std::find_if(cases.begin(), cases.end(), of_bust);
+  const Groom groom = make_test_groom({});
+  const auto parameters = complete_parameters(row, known_parameters(row, test.parameters));
+  ASSERT_TRUE(parameters);
+  if (!parameters->contains("collider_friction")) return;  // nothing slides
+  SolverState states[2];
+  for (const bool is_rigid : {false, true}) {
+    const auto reference = row.make_reference(*parameters);
+    ASSERT_TRUE(reference->load(groom, moving_input(0, kSubstepS).world_from_head_rotation));
+    for (int step = 1; step <= test.steps; ++step) {
+      StepInput input = input_for(test, step);
+      if (is_rigid) input.bust = {};
+      reference->substep(input);
+    }
+    reference->read(states[is_rigid ? 1 : 0]);
+  }
+  EXPECT_GT(largest_distance_m(states[0].position_m, states[1].position_m),
+            3.0 * bound_for(row, test, test.steps));
 }
 
 std::vector<std::string> rows_with_kernel() {

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <random>
 
+#include "common/scene/scene_file.h"
 #include "common/strands/strand_payload.h"
 #include "tests/support/stepped_hair.h"
 #include "tests/support/test_grid.h"
@@ -74,11 +75,22 @@ class RandomHead {
   glm::dvec3 spin_rad_per_s_{0.0};
 };
 
+SceneDesc full_scene() {
+  Result<SceneDesc> scene = built_in_scene_with({"quality=full", "head.field_resolution=24"});
+  EXPECT_TRUE(scene) << scene.error().to_string();
+  auto& groom = std::get<ProceduralGroomDesc>(scene->groom);
+  groom.strand_count = kStrands;
+  groom.vertex_count = kVertices;
+  return std::move(scene).value();
+}
+
 /// Hair, and what befalls it.
 class SoakedHair {
  public:
-  explicit SoakedHair(Chance& chance)
-      : chance_(chance), head_(chance), hair_(stepped_scene(kStrands, kVertices)) {}
+  SoakedHair(Chance& chance, const SceneDesc& scene)
+      : chance_(chance), head_(chance), is_full_(scene.volume.acts()), hair_(scene) {
+    if (is_full_) hair_.move_bust();
+  }
 
   const SteppedHair& hair() const { return hair_; }
 
@@ -133,8 +145,9 @@ class SoakedHair {
     if (chance_.once_in(4)) scene.gravity_mps2 = chance_.vector(12.0);
     if (chance_.once_in(4)) scene.follicle_limit_deg = chance_.between(5.0, 180.0);
     if (chance_.once_in(4)) scene.substeps = static_cast<uint32_t>(chance_.from_to(1, 4));
-    if (chance_.once_in(3)) {
-      scene.solver = some_solver();
+    if (is_full_ ? chance_.once_in(2) : chance_.once_in(3)) {
+      scene.solver = is_full_ ? some_full_solver() : some_solver();
+      if (is_full_) scene.volume = some_volume();
       has_model_ = true;
     }
     hair_.change(scene);
@@ -152,6 +165,23 @@ class SoakedHair {
     return solver;
   }
 
+  /// As sliders change it.
+  SolverDesc some_full_solver() {
+    SolverDesc solver = full_.solver;
+    if (chance_.once_in(4)) solver = {"dftl", {{"sag_free", 1.0}}};
+    // Whatever it is, another one: a solver is made anew where it differs.
+    solver.parameters["collider_friction"] = chance_.between(0.0, 1.0);
+    return solver;
+  }
+  VolumeDesc some_volume() {
+    VolumeDesc volume = full_.volume;
+    if (chance_.once_in(5)) return {};
+    volume.friction_per_s *= chance_.between(0.2, 3.0);
+    volume.air.acts = !chance_.once_in(4);
+    volume.air.has_wind = !chance_.once_in(3);
+    return volume;
+  }
+
   /// The bound is promised there; models that fling strands further are none of the codec's.
   static bool is_within_reach(const SteppedState& state) {
     return std::all_of(state.position_in_head_m.begin(), state.position_in_head_m.end(),
@@ -162,6 +192,8 @@ class SoakedHair {
 
   Chance& chance_;
   RandomHead head_;
+  const bool is_full_;  // rods that act on each other, in air, on a head and a bust
+  const SceneDesc full_ = full_scene();
   SteppedHair hair_;
   int pause_ = 0;
   bool has_wind_stream_ = false;
@@ -298,7 +330,8 @@ TEST(StepSoak, HoldsWhateverBefallsAStream) {
   int unnoticed = 0;
   for (int seed = 1; seed <= stream_count; ++seed) {
     Chance chance(static_cast<uint32_t>(seed));
-    SoakedHair hair(chance);
+    // Every other stream is of the full quality.
+    SoakedHair hair(chance, seed % 2 == 0 ? full_scene() : stepped_scene(kStrands, kVertices));
     SoakedStream stream(hair.hair(), chance);
     for (int i = 0; i < kSoakFrames; ++i) {
       SCOPED_TRACE(fmt::format("seed {}, frame {}", seed, i));

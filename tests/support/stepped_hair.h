@@ -61,6 +61,17 @@ class SteppedHair {
   explicit SteppedHair(const SceneDesc& scene) : SteppedHair(scene, loaded(scene)) {}
   SteppedHair(const SceneDesc& scene, Groom groom)
       : SteppedHair(scene, content_of(scene, std::move(groom))) {}
+  SteppedHair(const SceneDesc& scene, SceneContent content)
+      : scene_(scene),
+        content_(std::move(content)),
+        executor_(std::move(make_lanes_executor()).value()),
+        features_(analyse(scene, {})),
+        builder_(scene, content_.colliders) {
+    solver_ = made();
+    EXPECT_TRUE(solver_->load(content_.groom, walking_head(0.0).rotation));
+    log_.set_model(solver_->step_model());
+    rest_in_head_m_ = make_scene_asset(content_.groom, {}).rest_position_m;
+  }
 
   /// (vertex_count x strand_count), strand fastest
   const std::vector<glm::vec3>& rest_in_head_m() const { return rest_in_head_m_; }
@@ -138,17 +149,6 @@ class SteppedHair {
     content.groom = std::move(groom);
     content.colliders = scene.colliders;
     return content;
-  }
-  SteppedHair(const SceneDesc& scene, SceneContent content)
-      : scene_(scene),
-        content_(std::move(content)),
-        executor_(std::move(make_lanes_executor()).value()),
-        features_(analyse(scene, {})),
-        builder_(scene, content_.colliders) {
-    solver_ = made();
-    EXPECT_TRUE(solver_->load(content_.groom, walking_head(0.0).rotation));
-    log_.set_model(solver_->step_model());
-    rest_in_head_m_ = make_scene_asset(content_.groom, {}).rest_position_m;
   }
 
   /// To fit a head to the hair takes most of the time: kept for the next one.

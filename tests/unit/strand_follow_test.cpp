@@ -10,6 +10,7 @@
 #include "common/groom/procedural.h"
 #include "common/math/pose.h"
 #include "server/sim/solver_registry.h"
+#include "tests/support/meshes.h"
 #include "tests/support/sim_devices.h"
 
 namespace strandcast::strand_follow_test {
@@ -97,6 +98,58 @@ TEST(StrandFollow, AStrandGroomedAsItsGuideGoesAsItsGuide) {
   follow.follow(guide, all);
   for (uint32_t v = 0; v < kVertices; ++v)
     EXPECT_LT(glm::distance(all[2 * v + 1], all[2 * v] + apart), 1e-5f) << v;
+}
+
+/// How deep a vertex of these lies in a sphere, at most; less than nothing: none.
+double deepest_m(std::span<const glm::vec3> all, const SphereCollider& sphere, uint32_t first_strand) {
+  double deepest = -INFINITY;
+  for (size_t i = 0; i < all.size(); ++i)
+    if (i % kStrands >= first_strand)
+      deepest = std::max(deepest, double{sphere.radius_m - glm::distance(all[i], sphere.center_m)});
+  return deepest;
+}
+
+/// Guides with all that is free of them turned about their roots.
+std::vector<glm::vec3> turned_guides(const Groom& groom, uint32_t pinned, float angle_rad) {
+  std::vector<glm::vec3> guides = rest_of(groom, kGuides);
+  const glm::quat turn = glm::angleAxis(angle_rad, glm::vec3(0.0f, 0.0f, 1.0f));
+  for (size_t i = size_t{pinned} * kGuides; i < guides.size(); ++i) {
+    const glm::vec3 root = guides[size_t{pinned - 1} * kGuides + i % kGuides];
+    guides[i] = root + turn * (guides[i] - root);
+  }
+  return guides;
+}
+
+TEST(StrandFollow, WhatGuidesCollideWithFollowersDoNotEnter) {
+  constexpr float kRadiusM = 0.1f;
+  const Groom groom = grown();
+  const StrandFollow follow(groom, kGuides);
+  const std::vector<glm::vec3> rest = rest_of(groom, kStrands);
+  const std::vector<glm::vec3> guides = turned_guides(groom, follow.pinned_count(), 0.9f);
+  const auto ball =
+      std::make_shared<const DistanceField>(make_distance_field(make_icosphere(kRadiusM, 4), 48).value());
+  for (const bool is_field : {false, true}) {
+    SCOPED_TRACE(is_field ? "field" : "spheres");
+    FollowedSkin skin;
+    const SphereCollider sphere{glm::vec3(0.0f), kRadiusM};
+    if (is_field)
+      skin.field = ball;
+    else
+      skin.spheres = {sphere};
+    std::vector<glm::vec3> free(rest.size()), held(rest.size());
+    follow.follow(guides, free);
+    follow.follow(guides, held, skin);
+    const double groomed_m = std::max(0.0, deepest_m(rest, sphere, kGuides));
+    EXPECT_GT(deepest_m(free, sphere, kGuides), groomed_m + 0.01) << "without it they enter";
+    // As deep as the groom itself has it, and no deeper; a field is coarse.
+    EXPECT_LT(deepest_m(held, sphere, kGuides), groomed_m + (is_field ? 1e-3 : 1e-5));
+    for (size_t i = kStrands; i < held.size(); ++i)
+      ASSERT_NEAR(glm::distance(held[i], held[i - kStrands]), glm::distance(rest[i], rest[i - kStrands]),
+                  2e-6);
+    for (size_t v = 0; v < kVertices; ++v)
+      for (size_t s = 0; s < kGuides; ++s)
+        ASSERT_EQ(held[v * kStrands + s], guides[v * kGuides + s]) << "guides are the solver's";
+  }
 }
 
 TEST(StrandFollow, ShareOfStrands) {

@@ -17,7 +17,7 @@ trap 'rm -rf "$work"' EXIT
 "$node" "$here/lanes.mjs" "$modules/lane_check.wasm" | diff "$work/lanes" - || { echo "lanes differ"; exit 1; }
 echo "$(wc -l <"$work/lanes") functions of lanes as native"
 
-for tape in kept hostile tiny; do
+for tape in kept hostile tiny full; do
   "$build/bin/record_tapes" "$tape" "$work/$tape.tape"
 done
 sizes=(2000x16); rounds=1
@@ -32,6 +32,6 @@ done
 
 # What the page begins with, and what takes steps for it.
 "$node" "$here/play.mjs" "$modules/strand_page.wasm" --only "dftl tangent 2000 x 16" "$work"/*.tape
-for only in "tiny sim/dftl.comp" "dftl step 2000 x 16" "dftl tangent 2000 x 16"; do
+for only in "tiny sim/dftl.comp" "full from 0" "full from 22" "dftl step 2000 x 16" "dftl tangent 2000 x 16"; do
   "$node" "$here/play.mjs" "$modules/strand_step.wasm" --only "$only" "$work"/*.tape
 done

@@ -153,6 +153,27 @@ const all = {
     await tab.close();
     await other.end();
   },
+  async 'what comes while a module is on its way is not refused'() {
+    // Fast on a head that is a field, as a server in full quality comes to run that was too slow; and a model for which
+    // the page fetches the whole core.
+    for (const [options, takesWhole] of [[['quality=fast', 'head.collider=field'], false], [['solver.name=xpbd'], true]]) {
+      const other = await Server.start([...SMALL, ...options.flatMap((one) => ['--set', one])]);
+      const tab = await browser.open(`${other.url}#mode=strands`, { seesWorkers: true });
+      await tab.until((now) => now.states !== undefined, 'the page');
+      await tab.evaluate(`(() => {
+        window.refused = [];
+        new MutationObserver(() => {
+          const { hash_ok, rejected } = JSON.parse(document.documentElement.dataset.strandcast);
+          if (!hash_ok) window.refused.push(rejected);
+        }).observe(document.documentElement, { attributes: true });
+      })()`);
+      await tab.until((now) => now.codec === 'step' && now.states > 10, 'steps');
+      assert.deepEqual(await tab.evaluate('window.refused'), [], options.join(' '));
+      assert.equal(tab.requests.some((one) => one.url.includes('strand_core')), takesWhole, options.join(' '));
+      await tab.close();
+      await other.end();
+    }
+  },
   async 'a second tab sees the same, from the cache'() {
     const first = await browser.open(`${server.url}#mode=strands`);
     await first.until((now) => now.states > 3, 'states');

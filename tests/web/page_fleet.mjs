@@ -85,7 +85,7 @@ const link = (words) => `http://127.0.0.1:${port}/s/anna/#token=${token}&${words
 /** Strands, then the server's pictures, both turned by the mouse. */
 async function walkAround(tab, name) {
   const strands = await tab.until((now) => now.mode === 'strands' && now.states > 10 && now.hz > 0, 'strands');
-  assert.equal(strands.hash_ok, true);
+  assert.equal(strands.hash_ok, true, `refused: ${strands.rejected}`);
   const turn = async (before) => {
     await tab.drag([480, 240], [540, 250]);
     return tab.until((now) => String(now.camera) !== String(before.camera), 'another camera');

@@ -2,13 +2,18 @@
 //   record_tapes kept FILE                 every kept stream of tests/conformance
 //   record_tapes hostile FILE              the fuzzers' inputs for strand decoders and assets
 //   record_tapes tiny FILE                 every kernel on strands whose lengths, forces and speeds go down
-//   to 2^-156 record_tapes stream FILE SOLVER CODEC STRANDSxVERTICES FRAMES    the server's own solver on the
-//   built-in walk
+//                                          to 2^-156
+//   record_tapes full FILE                 full quality on a head that turns wildly over its bust, with
+//   changes
+//                                          of scene and model, and somebody who joins every now and then
+//   record_tapes stream FILE SOLVER CODEC STRANDSxVERTICES FRAMES    the server's own solver on the built-in
+//   walk
 #include <array>
 #include <cmath>
 #include <ctime>
 
 #include "common/kernels/step_model.h"
+#include "common/scene/scene_file.h"
 #include "common/strands/scene_asset.h"
 #include "common/strands/step/rod_planes.h"
 #include "server/report/stream_codec.h"
@@ -17,6 +22,7 @@
 #include "tests/conformance/stored_stream.h"
 #include "tests/fuzz/strand_chain.h"
 #include "tests/support/hair_motion.h"
+#include "tests/support/stepped_hair.h"
 #include "tests/web/tape.h"
 
 namespace strandcast {
@@ -219,6 +225,75 @@ Status record_tiny(Tape& tape) {
   return {};
 }
 
+constexpr uint32_t kFullStrands = 400;
+constexpr uint32_t kFullVertices = 12;
+
+/// A message that followers get, and what who joins there gets instead; empty: nobody does.
+struct TapedFrame {
+  std::vector<std::byte> frame, keyframe;
+};
+
+Result<std::vector<TapedFrame>> full_frames(std::vector<glm::vec3>& rest_in_head_m) {
+  constexpr int kFrames = 260;
+  constexpr int kJoinEvery = 23;
+  ASSIGN_OR_RETURN(SceneDesc scene, built_in_scene_with({"quality=full", "step_rate_hz=30", "substeps=2"}));
+  auto& groom = std::get<ProceduralGroomDesc>(scene.groom);
+  groom.strand_count = kFullStrands;
+  groom.vertex_count = kFullVertices;
+  SteppedHair hair(scene);
+  hair.move_bust();
+  rest_in_head_m = hair.rest_in_head_m();
+  ASSIGN_OR_RETURN(const auto encoder, make_strand_encoder("step"));
+  encoder->set_rest_shape(rest_in_head_m);
+  const SceneDesc full = scene;
+  const auto change = [&](const auto& by) {
+    by();
+    hair.change(scene);
+  };
+  std::vector<TapedFrame> frames;
+  for (int i = 0; i < kFrames; ++i) {
+    // What sliders do, and a server whose steps took too long.
+    if (i % 50 == 30) change([&] { scene.hair.wind = 0.3 + 0.01 * i; });
+    if (i % 50 == 31) change([&] { scene.solver.parameters["collider_friction"] = 0.1 + 0.001 * i; });
+    if (i == 140) change([&] { scene.solver = {"dftl", {{"sag_free", 1.0}}}, scene.volume = {}; });
+    if (i == 170) change([&] { scene.solver = full.solver, scene.volume = full.volume; });
+    if (i == 180) hair.reset();
+    InputFrame input;
+    input.has_motion = true;
+    const double t_s = i / 30.0;
+    input.world_from_head = walking_head(t_s);
+    input.world_from_head.rotation =
+        glm::angleAxis(0.96 * std::sin(2.0 * std::numbers::pi * 2.2 * t_s), glm::dvec3(0.1, 0.99, 0.05)) *
+        input.world_from_head.rotation;
+    const Snapshot snapshot = hair.step(input).snapshot;
+    TapedFrame taped;
+    if (i % kJoinEvery == kJoinEvery - 1 || i == 140 || i == 31) {
+      const JoinFrames join = encoder->encode_for_join(snapshot);
+      taped = {join.frame->message, join.keyframe->message};
+    } else {
+      taped.frame = encoder->encode(snapshot)->message;
+    }
+    frames.push_back(std::move(taped));
+  }
+  return frames;
+}
+
+Status record_full(Tape& tape) {
+  std::vector<glm::vec3> rest_in_head_m;
+  ASSIGN_OR_RETURN(const auto frames, full_frames(rest_in_head_m));
+  constexpr size_t kMostFollowed = 60;
+  for (size_t first = 0; first < frames.size(); ++first) {
+    if (first > 0 && frames[first].keyframe.empty()) continue;
+    tape.add_name(fmt::format("full from {}", first));
+    Player player(tape, "step", {kFullStrands, kFullVertices}, rest_in_head_m);
+    for (size_t i = first; i < std::min(frames.size(), first + (first > 0 ? kMostFollowed : frames.size()));
+         ++i)
+      if (!player.play(first > 0 && i == first ? frames[i].keyframe : frames[i].frame))
+        return make_error(ErrorCode::Internal, "frame {} is refused by who joined at {}", i, first);
+  }
+  return {};
+}
+
 struct StreamWish {
   std::string solver;
   std::string codec;
@@ -259,13 +334,15 @@ Status record(const std::vector<std::string>& arguments) {
     RETURN_IF_ERROR(record_hostile(tape));
   } else if (arguments.size() == 2 && arguments[0] == "tiny") {
     RETURN_IF_ERROR(record_tiny(tape));
+  } else if (arguments.size() == 2 && arguments[0] == "full") {
+    RETURN_IF_ERROR(record_full(tape));
   } else if (arguments.size() == 6 && arguments[0] == "stream") {
     StreamWish wish{arguments[2], arguments[3], {}, std::atoi(arguments[5].c_str())};
     if (std::sscanf(arguments[4].c_str(), "%ux%u", &wish.size.strand_count, &wish.size.vertex_count) != 2)
       return make_error(ErrorCode::BadInput, "\"{}\" is no size", arguments[4]);
     RETURN_IF_ERROR(record_stream(wish, tape));
   } else {
-    return make_error(ErrorCode::BadInput, "usage: record_tapes kept|hostile|tiny|stream FILE ...");
+    return make_error(ErrorCode::BadInput, "usage: record_tapes kept|hostile|tiny|full|stream FILE ...");
   }
   return tape.save(arguments[1]);
 }

@@ -527,7 +527,7 @@ class Viewer {
       isConnected: this.isConnected, mode: ['strands', 'pictures'][this.shown] ?? '', hz, camera: this.camera.offset,
       states: this.figures?.decodedFrames ?? 0, pictures: this.pictureCount, codec: this.figures?.codec ?? '',
       decodeMs: this.figures?.decodeMs ?? 0, wholeMs: this.drawFigures?.leastWholeMs ?? 0,
-      hash_ok: !this.figures?.rejectedFrames, error: at('trouble').hidden ? '' : at('trouble-why').textContent,
+      hash_ok: !this.figures?.rejectedFrames, rejected: this.figures?.lastError ?? '', error: at('trouble').hidden ? '' : at('trouble-why').textContent,
     });
   }
   private showWarnings(): void {

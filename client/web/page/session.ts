@@ -99,6 +99,9 @@ class Net {
     this.stepCore = ''; // once
     if (file) await this.load(file);
   }
+  get changesModule(): boolean {
+    return this.isLoading;
+  }
   /** True when the stream needs another module: it comes with that one again. */
   changesCore(error: Error): boolean {
     if (this.isLoading) return true;
@@ -460,6 +463,8 @@ class Connection {
   private takeStrands(header: FrameHeader, message: Uint8Array, received: number): void {
     const isKeyframe = header.opcode === Opcode.strandKeyframe;
     const isOther = header.streamId !== this.strandStream;
+    // The module that can decode its keyframe is on its way, and a session of its own follows.
+    if (this.net.changesModule) return;
     if (isOther && !isKeyframe) return this.reject(new Error(`delta ${header.sequence} is of stream ${header.streamId}`));
     if (isOther) this.lastSequence = 0;
     if (this.lastSequence && header.sequence > this.lastSequence + 1)

@@ -406,7 +406,7 @@ class RodMotion {
     const glm::dvec3 start = x_[i - 1];
     glm::dvec3 end = solved[i];
     if (start != solved[i - 1] || !has_free_tip()) end = start + length * aimed_direction(i, start, solved);
-    end = pushed_out(*step_.input, step_.carry, parameters_.collider_friction,
+    end = pushed_out({*step_.input, step_.carry, parameters_.collider_friction},
                      {strand_.vertex[i].position_m, start, end, length, target_[i]});
     if (!has_free_tip()) {
       double reach = 0.0;

@@ -301,7 +301,7 @@ class SpringMotion {
       }
       const glm::dvec3 groomed = direction_or(target_[i] - target_[i - 1], glm::dvec3(0.0));
       const glm::dvec3 point = end[i - 1] + length * direction_or(edge, groomed);
-      end[i] = pushed_out(*step_.input, step_.carry, shared_.collider_friction,
+      end[i] = pushed_out({*step_.input, step_.carry, shared_.collider_friction},
                           {old_[i], end[i - 1], point, length});
     }
     return end;

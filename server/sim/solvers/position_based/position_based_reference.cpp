@@ -143,7 +143,8 @@ class PositionBasedReference final : public ReferenceStrands {
       const ReferenceSphere sphere = deepest_sphere(input(), point);
       // No way out of the very centre is shorter than another.
       if (sphere.radius_m <= 0.0 || glm::distance(point, sphere.center_m) < kTinyConstraintM) return point;
-      const glm::dvec3 held = held_by_friction(old, point, carry(), friction_, sphere) - sphere.center_m;
+      const glm::dvec3 held =
+          held_by_friction({input(), carry(), friction_}, old, point, sphere) - sphere.center_m;
       point = sphere.center_m + held * (sphere.radius_m / std::max(glm::length(held), kTinyConstraintM));
     }
     return point;

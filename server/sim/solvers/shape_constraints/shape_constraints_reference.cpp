@@ -149,7 +149,7 @@ class ShapeConstraintsReference final : public ReferenceStrands {
       segment.start_m = start;
       segment.length_m = within(glm::length(along), strand.segment_m[i]);
       segment.end_m = start + segment.length_m * direction_or(along, groomed(strand, i));
-      segment.end_m = pushed_out(input(), carry(), parameters().collider_friction, segment);
+      segment.end_m = pushed_out({input(), carry(), parameters().collider_friction}, segment);
       if (layout().pinned_tail_count > 0) {
         const glm::dvec3 anchor = strand.target_m[tail];
         double reach_m = 0.0;
