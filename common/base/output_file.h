@@ -14,18 +14,18 @@ namespace strandcast {
 
 class OutputFile {
  public:
-  /// Begins a file beside `path`; its folder is made where there is none.
+  /// Creates a temporary file beside `path`, and its folder if needed.
   static Result<OutputFile> create(const std::filesystem::path& path);
-  /// What was not finished is removed.
+  /// Removes the temporary file if finish() was not called.
   ~OutputFile();
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&&) = delete;
   OutputFile(const OutputFile&) = delete;
 
   Status append(std::string_view bytes);
-  /// Writes over what stands at `offset`.
+  /// Overwrites the bytes at `offset`.
   Status patch(uint64_t offset, std::string_view bytes);
-  /// Gives the file its name; one that was there is replaced.
+  /// Renames the file to its final name, replacing an existing one.
   Status finish();
 
   uint64_t size_bytes() const { return size_bytes_; }

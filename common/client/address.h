@@ -1,5 +1,5 @@
-// HOST:PORT as people type it, with wss:// in front for TLS, and /s/NAME behind it for a session behind a
-// proxy. Pure, any thread.
+// HOST:PORT as people type it, with wss:// in front for TLS and /s/NAME after it for a session of a proxy.
+// Pure, any thread.
 #pragma once
 
 #include <cstdint>
@@ -17,16 +17,16 @@ struct Address {
   std::string session = {};  // empty: the server itself
 
   bool operator==(const Address&) const = default;
-  /// HOST:PORT, or HOST:PORT/s/NAME.
+  /// Returns HOST:PORT, or HOST:PORT/s/NAME.
   std::string to_string() const;
-  /// HOST:PORT.
+  /// Returns HOST:PORT.
   std::string authority() const;
-  /// What stands in front of every path: "", or "/s/NAME".
+  /// Returns the prefix of every path: "" or "/s/NAME".
   std::string folder() const;
 };
 
-/// Reads "host", "host:port", ":port", "[ipv6]" or "[ipv6]:port", after "ws://" or "wss://" if any and before
-/// "/s/NAME" if any; what is missing keeps its default. BadInput names the text.
+/// Parses "host", "host:port", ":port", "[ipv6]" or "[ipv6]:port", optionally after "ws://" or "wss://" and
+/// before "/s/NAME". Missing parts keep their defaults. BadInput names the text.
 Result<Address> parse_address(const std::string& text);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// The token that a client says Hello with, from a file.
+// Reads the token of a client's Hello from a file.
 #pragma once
 
 #include <filesystem>
@@ -9,9 +9,9 @@
 
 namespace strandcast {
 
-/// The token for this role from a file of at most 4 KiB: a token alone in the first line, or lines
-/// "role token" as the server makes them, of which the least that serves is taken. NotFound when there is
-/// none.
+/// Returns the token for this role from a file of at most 4 KiB: a single token in the first line, or lines
+/// "role token" as the server writes them. Of these it takes the one with the least rights that suffices.
+/// NotFound if there is none.
 Result<std::string> load_token(const std::filesystem::path& path, Role role);
 
 }  // namespace strandcast

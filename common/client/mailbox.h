@@ -19,7 +19,7 @@
 
 namespace strandcast {
 
-/// One media message as received: asset, strand frame or picture. Header checked, payload not.
+/// One received media message: asset, strand frame or picture. Its header was checked, its payload not.
 struct MediaEvent {
   FrameHeader header;
   std::vector<std::byte> message;  // header + payload
@@ -28,7 +28,7 @@ struct MediaEvent {
   std::span<const std::byte> payload() const { return std::span(message).subspan(kFrameHeaderBytes); }
 };
 
-/// The last event of a connection: it is over and says why.
+/// The last event of a connection, with the reason of its end.
 struct ClosedEvent {
   Error error;
 };
@@ -52,8 +52,9 @@ class Mailbox {
 
   enum class Outcome { Kept, KeyframeNeeded };
 
-  /// Takes a media message. When strand frames pass their limit all of them are dropped, and so is every
-  /// delta until the next keyframe; KeyframeNeeded tells the caller to ask for one. Likewise pictures.
+  /// Takes a media message. If strand frames exceed their limit, all of them are dropped, and so are deltas
+  /// until the next keyframe. KeyframeNeeded tells the caller to request one. Pictures are treated in the
+  /// same way.
   Outcome push(MediaEvent event);
   void push(const ServerStatus& status);
   void push(const StreamQuality& quality);
@@ -64,22 +65,22 @@ class Mailbox {
   void push(const SceneText& scene);
   void push(const CameraChange& camera);
   void push(const StreamList& streams);
-  /// The oldest gives way when there are too many.
+  /// Takes a notice; the oldest is dropped if there are too many.
   void push(Notice notice);
   void push(ParameterList list);
   void push(StateTimes times);
   /// Adds the final event; later pushes are ignored.
   void close(Error error);
 
-  /// Everything received since the last call, in order of arrival.
+  /// Returns everything received since the last call, in order of arrival.
   std::vector<ClientEvent> take();
-  /// As take(), but waits for the first event up to `timeout`.
+  /// Returns like take(), but waits up to `timeout` for the first event.
   std::vector<ClientEvent> wait(std::chrono::milliseconds timeout);
-  /// The oldest event alone, waiting up to `timeout` for one. Whoever takes long for each uses this: what
-  /// waits stays within the limits, and newer statuses and pictures replace older ones meanwhile.
+  /// Returns the oldest event alone, waiting up to `timeout`. For applications that need long for each event:
+  /// the rest stays bounded, and newer statuses and pictures replace older ones.
   std::optional<ClientEvent> next(std::chrono::milliseconds timeout);
 
-  /// Frames, of strands and pictures, thrown away because the application did not keep up.
+  /// Returns the number of frames and pictures that were dropped because the application was too slow.
   uint64_t dropped_frames() const;
 
  private:

@@ -1,5 +1,5 @@
 // Outbox: messages that wait to be sent to the server, in order and bounded in number and bytes. Any thread
-// puts in, the network thread takes out. Does not send.
+// adds, the network thread removes. Does not send.
 #pragma once
 
 #include <cstddef>
@@ -18,13 +18,13 @@ inline constexpr size_t kMaxSendQueueBytes = 1u << 20;
 
 class Outbox {
  public:
-  /// LimitExceeded when it is full (the message is dropped), Unavailable once it is closed.
+  /// Adds a message. LimitExceeded if the box is full (the message is dropped), Unavailable once it is
+  /// closed.
   Status push(std::vector<std::byte> message);
-  /// The oldest message, which keeps its place until pop(), so that the bound holds; empty when there is
-  /// none.
+  /// Returns the oldest message, which stays until pop(); empty if there is none.
   std::span<const std::byte> front() const;
   void pop();
-  /// Nothing can be put in any more.
+  /// Closes the box: nothing can be added any more.
   void close();
 
   size_t message_count() const;

@@ -38,7 +38,7 @@ bool is_final(const Error& error, Standing standing);
 /// attempt makes sense (is_final). Close code 0: the connection broke without one.
 Error error_from_close(uint16_t close_code, const std::string& reason);
 
-/// How its sentence begins: the server said this, and it is no trouble of our own with what it sent.
+/// Beginning of the sentence of an error that the server stated when it closed the connection.
 inline constexpr std::string_view kClosedByServer = "the server closed the connection: ";
 
 /// Whether a connection on which something came last at `heard_ns` is to be shown as none; by now_ns().

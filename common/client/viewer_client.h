@@ -22,9 +22,9 @@
 
 namespace strandcast {
 
-/// What a connection is at, in this order.
+/// Steps of connecting, in order.
 enum class ConnectStep { FindHost, Connect, BeginTls, AskForWebSocket, AwaitWelcome };
-/// For a person: "looking for the host".
+/// Describes a step for a person: "looking for the host".
 const char* to_string(ConnectStep step);
 
 struct ClientConfig {
@@ -36,10 +36,10 @@ struct ClientConfig {
   std::chrono::milliseconds welcome_timeout{5000};  // from the handshake to the Welcome
   std::chrono::milliseconds idle_timeout{15'000};   // nothing received for this long: the server is gone
   MailboxLimits mailbox;
-  /// Asked every kCancelPoll by the thread that waits in ViewerClient::connect(); a sentence ends the wait.
-  /// Empty: never.
+  /// Called every kCancelPoll by the thread that waits in ViewerClient::connect(); a returned error ends the
+  /// wait. Empty: never.
   std::function<std::optional<Error>()> cancel;
-  /// Told by the connection's own thread what it begins with. Empty: nobody is told.
+  /// Called on the connection's own thread when a step begins. Empty: not called.
   std::function<void(ConnectStep)> on_step;
 
   // Out of line: copied and taken apart in many files, which need no copy of that code.
@@ -52,7 +52,7 @@ struct ClientConfig {
 };
 
 inline constexpr std::chrono::milliseconds kCancelPoll{20};
-/// Of the HTTP answer to the request for a WebSocket, all of it.
+/// Largest HTTP answer to the WebSocket request.
 inline constexpr uint64_t kMaxUpgradeAnswerBytes = 16u << 10;
 
 inline constexpr int kQuickPings = 10;  // clock probes right after the Welcome
@@ -84,22 +84,23 @@ class ViewerClient {
 
   const Welcome& welcome() const;
 
-  /// Events since the last call, in order; after a ClosedEvent nothing more comes. One application thread.
+  /// Returns the events since the last call, in order; nothing follows a ClosedEvent. Call it from one
+  /// application thread.
   std::vector<ClientEvent> poll();
-  /// As poll(), waiting up to `timeout` for the first event.
+  /// Returns like poll(), but waits up to `timeout` for the first event.
   std::vector<ClientEvent> wait(std::chrono::milliseconds timeout);
-  /// As Mailbox::next().
+  /// Returns the next event like Mailbox::next().
   std::optional<ClientEvent> next(std::chrono::milliseconds timeout);
 
-  /// Puts a message into the outbox. LimitExceeded when that is full (the message is dropped), Unavailable
-  /// when the connection is over. Any thread.
+  /// Queues a message. LimitExceeded if the outbox is full (the message is dropped), Unavailable if the
+  /// connection is over. Any thread.
   Status send(const ClientMessage& message);
-  /// Asks for a keyframe, at most once in kKeyframeRequestInterval; extra calls do nothing. Any thread.
+  /// Requests a keyframe, at most once per kKeyframeRequestInterval; further calls do nothing. Any thread.
   void request_keyframe();
-  /// Messages queued and not yet written. Any thread.
+  /// Returns the number of messages that are queued and not yet written. Any thread.
   size_t queued_messages() const;
 
-  /// Copy of the clock estimate; has no value until the first probe returned. Any thread.
+  /// Returns a copy of the clock estimate, which has no value before the first probe returned. Any thread.
   ClockOffset clock() const;
   ConnectionCounters counters() const;
   /// When something came from the server last, by now_ns(); in the middle of a long message within

@@ -1,4 +1,4 @@
-// CRC-32 as zlib, PNG and MCAP have it (polynomial 0xEDB88320). Pure functions, any thread.
+// CRC-32 of zlib, PNG and MCAP (polynomial 0xEDB88320). Pure functions, any thread.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,7 @@
 
 namespace strandcast {
 
-/// Of `bytes`, or of all that was before and `bytes`, where `before` is what it gave for that.
+/// Returns the CRC of `bytes`, continuing from `before`, the CRC of all preceding bytes.
 uint32_t crc32(std::span<const std::byte> bytes, uint32_t before = 0);
 
 }  // namespace strandcast

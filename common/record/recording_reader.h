@@ -21,7 +21,7 @@
 
 namespace strandcast {
 
-/// A keyframe or delta of the recorded strands, as a viewer got it: what StrandDecoder::decode() takes.
+/// A keyframe or delta of the recorded strands, in the form that StrandDecoder::decode() takes.
 struct RecordedFrame {
   EncodedFramePtr frame;
   bool is_keyframe() const { return frame->header.opcode == Opcode::StrandKeyframe; }
@@ -32,14 +32,14 @@ struct RecordedItem {
   std::variant<RecordedFrame, RecordedMessage> what;
 };
 
-/// What next() gives.
+/// Kind of item that next() returns.
 enum class RecordedPart {
   Frames,    // strands
   Messages,  // all else
   All,
 };
 
-/// What the file says without its frames being decoded.
+/// Facts about the file that need no decoding of frames.
 struct RecordingInfo {
   uint64_t file_bytes = 0;
   bool is_indexed = false;    // it was closed, or recovered
@@ -51,7 +51,7 @@ struct RecordingInfo {
   std::vector<int64_t> keyframe_sim_time_ns;  // in the order of the file; never decreasing in a sound one
 };
 
-/// What all chunks that can be read hold.
+/// Number of items of one channel in all readable chunks.
 struct RecordedTopic {
   uint64_t items = 0;
   uint64_t bytes = 0;  // of the file; of a chunk with several topics by their share before it was compressed
@@ -78,16 +78,15 @@ class RecordingReader {
   /// The same, decoded, or BadInput. Its payload's hash is checked against start().asset_hash.
   Result<SceneAsset> asset() const;
 
-  /// Reads all of the file; next() goes on where it was.
+  /// Reads the whole file; next() then continues where it was.
   RecordingContents contents() const;
 
-  /// The next item, in the order in which it was recorded; nothing at the end. RecordingStart and the asset
-  /// are not among them. An error is that of one damaged chunk, or one message in it; the call after goes on
-  /// behind it.
+  /// Returns the next item in recorded order; empty at the end. RecordingStart and the asset are not among
+  /// them. An error concerns one damaged chunk or message; the next call continues after it.
   Result<std::optional<RecordedItem>> next();
 
-  /// The next frame is then the last keyframe at or before this time of the simulation, or the first one;
-  /// messages go on from where that keyframe was written. Decode from there to the frame that is wanted.
+  /// Moves to the last keyframe at or before this simulated time, or the first one; messages continue from
+  /// where it was written. Decode from there to the wanted frame.
   Status seek(int64_t sim_time_ns);
 
  private:
@@ -96,8 +95,8 @@ class RecordingReader {
   std::unique_ptr<State> state_;
 };
 
-/// Step of the first state in it: 0 where it began with the simulation, more where that ran already; nothing
-/// where no state is found.
+/// Returns the step of a recording's first state: 0 if it began with the simulation, more otherwise; empty if
+/// there is no state.
 std::optional<uint64_t> first_recorded_tick(const std::filesystem::path& path);
 
 }  // namespace strandcast

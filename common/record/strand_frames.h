@@ -1,4 +1,4 @@
-// StrandFrames: the decoded strands of a recording, one state after the other. One thread.
+// StrandFrames: the decoded strands of a recording, state by state. One thread.
 #pragma once
 
 #include <cstdint>
@@ -13,10 +13,10 @@ namespace strandcast {
 
 class StrandFrames {
  public:
-  /// `reader` gives frames at least, and outlives it.
+  /// Starts decoding; `reader` must return frames and outlive this object.
   static Result<StrandFrames> begin(RecordingReader& reader);
 
-  /// The next state; nothing at the end. An error is that of one frame, or of one damaged chunk.
+  /// Returns the next state; empty at the end. An error concerns one frame or one damaged chunk.
   Result<std::shared_ptr<const Snapshot>> next();
 
  private:
@@ -27,7 +27,7 @@ class StrandFrames {
   std::unique_ptr<StrandDecoder> decoder_;
 };
 
-/// A decoder for the strands of a recording.
+/// Makes a decoder for the strands of a recording.
 Result<std::unique_ptr<StrandDecoder>> make_recorded_decoder(const RecordingReader& reader);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// Who may talk to the server: listening address, Host and Origin headers, message rate. Pure functions
-// on untrusted text, any thread.
+// Access checks of the server: listening address, Host and Origin headers, message rate. Pure functions on
+// untrusted text, any thread.
 #pragma once
 
 #include <cstdint>
@@ -12,28 +12,28 @@
 
 namespace strandcast {
 
-/// Refuses to listen without a token where others can reach us. `is_trusted`: on loopback, and loopback is
-/// trusted.
+/// Refuses to listen without a token where other machines can connect. `is_trusted`: the address is loopback,
+/// and loopback is trusted.
 Status check_listening(bool is_trusted, const std::string& address, const std::vector<AccessToken>& tokens);
 
-/// Host header without its port, lower case, IPv6 without brackets; empty when malformed.
+/// Returns the Host header without its port, in lower case, IPv6 without brackets; empty if malformed.
 std::string host_name_of(std::string_view host_header);
 
-/// True for names that a foreign web page cannot make a browser send for an address of ours (DNS rebinding):
-/// loopback names when the connection came in on loopback, the address it came in on, and the allowed names.
+/// Returns true for names that a foreign web page cannot make a browser send to us (DNS rebinding). They are
+/// the allowed names, the address of the connection, and loopback names on a loopback connection.
 bool is_host_allowed(std::string_view host_header, const std::string& local_address, bool is_loopback,
                      const std::vector<std::string>& allowed_names);
 
-/// Absent (empty: not a browser), or the page came from this very server, or exactly one of the allowed
-/// origins ("https://hair.example:8443").
+/// Returns true if the origin is absent (not a browser), is this server's own page, or is exactly one of the
+/// allowed origins ("https://hair.example:8443").
 bool is_origin_allowed(std::string_view origin_header, std::string_view host_header,
                        const std::vector<std::string>& allowed_origins);
 
-/// Token bucket: `rate_per_s` on average, as many at once.
+/// Token bucket that fills at `rate_per_s` and holds as many.
 class RateLimit {
  public:
   explicit RateLimit(double rate_per_s) : rate_per_s_(rate_per_s), tokens_(rate_per_s) {}
-  /// False when this one is too many.
+  /// Takes a token; returns false if there is none.
   bool take(int64_t time_ns);
 
  private:

@@ -1,5 +1,4 @@
-// AddressGuard: how fast one address connects and asks, and how often its token was wrong, in a table of
-// bounded size.
+// AddressGuard: limits connections, requests and wrong tokens of each address, in a table of bounded size.
 // Plain logic without a clock; one thread.
 #pragma once
 
@@ -25,14 +24,14 @@ class AddressGuard {
  public:
   explicit AddressGuard(const GuardLimits& limits) : limits_(limits) {}
 
-  /// False when this connection is one too many.
+  /// Counts a connection; returns false if it exceeds the limit.
   bool take_connection(const std::string& address, int64_t time_ns);
-  /// False when this HTTP request is one too many.
+  /// Counts an HTTP request; returns false if it exceeds the limit.
   bool take_request(const std::string& address, int64_t time_ns);
-  /// True while no token of this address is looked at.
+  /// Returns true while tokens of this address are not checked.
   bool is_blocked(const std::string& address, int64_t time_ns) const;
   void on_wrong_token(const std::string& address, int64_t time_ns);
-  /// An admin's word: nobody of this address gets in before.
+  /// Bans an address until a time, at an admin's request.
   void ban(const std::string& address, int64_t time_ns, int64_t until_ns);
   bool is_banned(const std::string& address, int64_t time_ns) const;
 

@@ -19,7 +19,7 @@ namespace http = boost::beast::http;
 namespace websocket = boost::beast::websocket;
 using tcp = boost::asio::ip::tcp;
 
-/// Beast's view of a text as the standard library's.
+/// Converts Beast's view of a text to the standard library's.
 inline std::string_view view(beast::string_view text) {
   return {text.data(), text.size()};
 }

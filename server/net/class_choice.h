@@ -1,6 +1,6 @@
-// ClassChoice: which class of frames fits a viewer's link and its decoding. Down at trouble that a cheaper
-// class can cure, up one class after quiet time that grows with every try that failed. Plain logic on given
-// times, no I/O and no clock; network thread.
+// ClassChoice: chooses the class of frames that fits a viewer's link and its decoding. It changes to a
+// cheaper class on trouble that this can cure. It tries the next better class after a quiet time, which grows
+// with every failed try. Plain logic on given times, no I/O and no clock; network thread.
 #pragma once
 
 #include <cstddef>
@@ -13,53 +13,53 @@
 
 namespace strandcast {
 
-/// Of queue delays: one that stays above kHighDelayNs throughout is trouble.
+/// Window of queue delays; if all of them exceed kHighDelayNs, that is trouble.
 inline constexpr int64_t kDelayWindowNs = 500 * kMsInNs;
 inline constexpr size_t kMinDelaySamples = 3;
-/// Lost chains that count as trouble when they fall within kLossWindowNs.
+/// Number of lost chains within kLossWindowNs that counts as trouble.
 inline constexpr size_t kTroublingLosses = 2;
 inline constexpr int64_t kLossWindowNs = 2'000 * kMsInNs;
-/// Share of the measured capacity that a class may take on average, and at most while the strands move
-/// quickly, as they did once in kDemandWindowNs.
+/// Largest shares of the measured capacity that a class may take: on average, and while strands move as
+/// quickly as they did once in kDemandWindowNs.
 inline constexpr double kUsableShare = 0.85;
 inline constexpr double kBurstShare = 1.4;
 inline constexpr int64_t kDemandWindowNs = 15'000 * kMsInNs;
-/// A viewer that decodes for so much of the time between two frames is what they wait for. One that does not
-/// and is late all the same lacks its processor: fewer strands would not help it.
+/// Share of the time between two frames beyond which a viewer's decoding causes their delay. A late viewer
+/// below it lacks processor time, and fewer strands would not help.
 inline constexpr double kBusyDecodeShare = 0.8;
-/// Quiet time before a better class is tried; before one that failed it doubles with every try.
+/// Quiet time before a better class is tried; it doubles with every failed try of that class.
 inline constexpr int64_t kFirstProbeNs = 3'000 * kMsInNs;
 inline constexpr int64_t kLongestProbeNs = 60'000 * kMsInNs;
-/// Trouble this soon after a change for the better means that the try has failed.
+/// Time after a change to a better class in which trouble counts as a failed try.
 inline constexpr int64_t kProbationNs = 5'000 * kMsInNs;
 
 class ClassChoice {
  public:
-  /// Other frames follow: what was seen of the ones before is no reason to change the class.
+  /// Resets the observations, because other frames follow.
   void start_over(int64_t time_ns) { quiet_since_ns_ = time_ns; }
-  /// How long an acknowledged frame waited, by the link alone and in all.
+  /// Delay of an acknowledged frame: by the link alone, and in all.
   struct Delay {
     int64_t link_ns = 0;
     int64_t all_ns = 0;
   };
   void on_delay(const Delay& delay, int64_t time_ns);
-  /// A frame found no place, so that a keyframe is needed.
+  /// Notes that a frame was dropped, so that a keyframe is needed.
   void on_chain_loss(int64_t time_ns);
 
-  /// The class to be in, given the present one and what each costs, bytes/s, best first;
-  /// `allowed_bytes_per_s` is what a class may cost at all, 0 = unknown.
+  /// Present class and cost of each class, bytes/s, best first. `allowed_bytes_per_s` is the largest
+  /// permitted cost, 0 = unknown.
   struct Question {
     size_t present = 0;
     std::span<const double> costs;
     double allowed_bytes_per_s = 0.0;
     double cap_bytes_per_s = 0.0;  // 0 = none
     bool has_acks = true;          // without them the class stays, but for the first one
-    /// Decoding of each class by this viewer, of the time between two frames; empty = unknown.
+    /// Decoding time of each class on this viewer, relative to the time between two frames; empty = unknown.
     std::span<const double> decode_shares = {};
   };
-  /// Remembers a change as made.
+  /// Returns the class to use and notes it as the present one.
   size_t choose(const Question& question, int64_t time_ns);
-  /// A better class is on probation.
+  /// Returns whether a better class is being tried.
   bool is_trying(int64_t time_ns) const;
 
  private:

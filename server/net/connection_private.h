@@ -1,5 +1,5 @@
-// Connection: one TCP connection until its last HTTP request is answered or has become a Session. It is kept
-// for another request behind a file of the page, and ends behind all else. Network thread.
+// Connection: one TCP connection until its last HTTP request is answered or it becomes a Session. It stays
+// open after a file of the page, and ends after any other answer. Network thread.
 #pragma once
 
 #include <memory>
@@ -16,22 +16,22 @@ namespace strandcast::net {
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
   Connection(Context& context, tcp::socket socket);
-  /// False when its address has too many connections: it is to be closed unanswered. A proxy of ours is
-  /// welcome; whom it speaks for is looked at when that is known.
+  /// Returns false if the address has too many connections, and the connection must be closed unanswered. A
+  /// trusted proxy is accepted; its client is checked once it is known.
   bool is_welcome();
   void start();
-  /// Ends what takes too long.
+  /// Ends the connection if it takes too long.
   void check_deadline(int64_t time_ns);
   void abort();
   const Peer& peer() const { return peer_; }
-  /// True while nothing of a request is there and one was answered before: whoever has it may as well make
-  /// another connection.
+  /// Returns true if at least one request was answered and nothing of the next has arrived; closing it then
+  /// costs the client little.
   bool is_idle() const;
 
  private:
   using Request = http::request<http::empty_body>;
 
-  /// An exception ends this connection only.
+  /// Runs `work`; an exception ends this connection only.
   template <class Work>
   void guarded(Work&& work) {
     try {

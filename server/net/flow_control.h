@@ -1,6 +1,6 @@
-// FlowControl: what one viewer's link can take, learned from its acknowledgements: how many frames may be on
-// their way (SendGate) and which class of frames fits (ClassChoice), by what the link is (LinkEstimate).
-// Plain logic on given times, no I/O and no clock; network thread.
+// FlowControl: learns from acknowledgements what one viewer's link can take. It limits the frames in flight
+// (SendGate) and chooses the class of frames (ClassChoice), both based on LinkEstimate. Plain logic on given
+// times, no I/O and no clock; network thread.
 #pragma once
 
 #include <cstddef>
@@ -23,33 +23,33 @@ class FlowControl {
   FlowControl(const FlowControl&) = delete;
   FlowControl& operator=(const FlowControl&) = delete;
 
-  /// Without acknowledgements nothing is known: everything may be sent, and the class stays. From a client
-  /// that promises them, starts with the asset.
+  /// Enables flow control for a client that promises acknowledgements, starting with the asset. Otherwise
+  /// everything may be sent and the class stays.
   void expect_acks() { has_acks_ = true; }
   bool expects_acks() const { return has_acks_; }
-  /// Instead of kCapacityAgeNs.
+  /// Replaces kCapacityAgeNs.
   void remember_capacity_for(int64_t duration_ns) { link_.remember_capacity_for(duration_ns); }
-  /// Other frames follow: what was seen of the ones before is no reason to change the class.
+  /// Resets the observations, because other frames follow.
   void start_over(int64_t time_ns) { choice_.start_over(time_ns); }
 
-  /// A media frame goes to the socket.
+  /// Notes that a media frame is written to the socket.
   void on_sent(const FrameHeader& header, size_t bytes, int64_t time_ns) {
     if (has_acks_) gate_.on_sent(header, bytes, time_ns);
   }
-  /// The link has taken a part of this frame.
+  /// Notes that the link has taken a part of this frame.
   void on_written(const FrameHeader& header, int64_t time_ns) { gate_.on_written(header, time_ns); }
-  /// Acknowledges this frame and all before it. Numbers that are not on their way are ignored.
+  /// Acknowledges this frame and all before it; numbers that are not in flight are ignored.
   void on_ack(uint16_t stream_id, uint32_t sequence, int64_t time_ns, const ClientTimes& client = {});
-  /// A round trip of something small.
+  /// Adds the round trip time of a small message.
   void on_round_trip(int64_t round_trip_ns, int64_t time_ns) { link_.on_round_trip(round_trip_ns, time_ns); }
-  /// The client could not use what is on its way: no acknowledgement will come.
+  /// Forgets the frames in flight, because the client could not use them and will not acknowledge them.
   void forget_in_flight() { gate_.forget(); }
-  /// A frame found no place, so that a keyframe is needed.
+  /// Notes that a frame was dropped, so that a keyframe is needed.
   void on_chain_loss(int64_t time_ns);
 
-  /// Whether the next media frame may go to the socket.
+  /// Returns whether the next media frame may be written to the socket.
   bool may_send(int64_t time_ns) const;
-  /// Whether a keyframe or whole picture may be asked for: it would be on its way at once.
+  /// Returns whether a keyframe or whole picture may be requested, because it could be sent at once.
   bool may_start(int64_t time_ns) const;
 
   struct Classes {
@@ -58,16 +58,16 @@ class FlowControl {
     double cap_bytes_per_s = 0.0;               // of any; 0 = none
     std::span<const StrandClass> strands = {};  // where they are of strands
   };
-  /// The class to be in. Call often. Remembers a change as made.
+  /// Returns the class to use and notes it as the present one; call it often.
   size_t choose_class(const Classes& classes, int64_t time_ns);
 
-  /// How long data waits on its way, from the newest acknowledgement.
+  /// Returns the queueing delay according to the newest acknowledgement.
   int64_t queue_delay_ns() const { return queue_delay_ns_; }
-  /// As LinkEstimate.
+  /// Returns LinkEstimate::base_ns().
   int64_t base_ns() const { return link_.base_ns(); }
   double capacity_bytes_per_s(int64_t time_ns) const { return link_.capacity_bytes_per_s(time_ns); }
   size_t in_flight_bytes() const { return gate_.in_flight_bytes(); }
-  /// As SendGate.
+  /// Returns SendGate::oldest_due_ns().
   int64_t oldest_due_ns(int64_t time_ns) const { return gate_.oldest_due_ns(time_ns); }
 
  private:

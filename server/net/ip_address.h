@@ -1,5 +1,5 @@
-// IpAddress and AddressRange: addresses of IPv4 and IPv6 as values, out of text and bytes that nobody has
-// checked. Pure functions, any thread.
+// IpAddress and AddressRange: IPv4 and IPv6 addresses as values, parsed from untrusted text and bytes. Pure
+// functions, any thread.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace strandcast {
 
-/// IPv4 in its IPv6 form (::ffff:10.0.0.7) counts as IPv4.
+/// An address; IPv4 in its IPv6 form (::ffff:10.0.0.7) counts as IPv4.
 class IpAddress {
  public:
   using Bytes4 = std::array<uint8_t, 4>;
@@ -22,11 +22,12 @@ class IpAddress {
   IpAddress() = default;
   explicit IpAddress(const Bytes4& bytes);
   explicit IpAddress(const Bytes16& bytes) : bytes_(bytes) {}
-  /// Numeric text without brackets, port or zone; nothing for all else.
+  /// Parses a numeric address without brackets, port or zone; empty for anything else.
   static std::optional<IpAddress> parse(std::string_view text);
 
   std::string to_string() const;
-  /// What counts as one address. Of IPv6 the network of 64 bits, which is as easily had as one of IPv4.
+  /// Returns the key by which addresses are counted. For IPv6 it is the 64-bit network, which is as easy to
+  /// obtain as one IPv4 address.
   std::string key() const;
   bool is_v4() const;
   bool is_loopback() const;
@@ -37,7 +38,7 @@ class IpAddress {
   Bytes16 bytes_{};  // of IPv4 the mapped form
 };
 
-/// All addresses that begin with the same bits.
+/// A range of addresses that begin with the same bits.
 struct AddressRange {
   IpAddress first;
   uint32_t bit_count = 128;  // of the 16 bytes
@@ -45,7 +46,8 @@ struct AddressRange {
   bool contains(const IpAddress& address) const;
 };
 
-/// "10.0.0.7", "10.0.0.0/8" or "2001:db8::/32"; BadInput for all else, such as bits behind the count.
+/// Parses "10.0.0.7", "10.0.0.0/8" or "2001:db8::/32"; BadInput for anything else, including non-zero bits
+/// after the prefix.
 Result<AddressRange> parse_address_range(std::string_view text);
 
 bool is_in(const std::vector<AddressRange>& ranges, const IpAddress& address);

@@ -1,6 +1,6 @@
-// LinkEstimate: what a link is, learned from acknowledged frames: its bare round trip and what it carries.
-// Delay is the signal, as in TCP Vegas: a reliable transport shows no loss. Plain logic on given times, no
-// I/O and no clock; network thread.
+// LinkEstimate: estimates a link from acknowledged frames: its unloaded round trip and its capacity. It uses
+// delay as the signal, as TCP Vegas does, because a reliable transport shows no loss. Plain logic on given
+// times, no I/O and no clock; network thread.
 #pragma once
 
 #include <cstddef>
@@ -11,22 +11,22 @@
 #include "common/base/units.h"
 
 namespace strandcast {
-/// A link that shows less delay than this has no queue; with more there may be one.
+/// Delay below which the link has no queue.
 inline constexpr int64_t kLowDelayNs = 25 * kMsInNs;
 inline constexpr int64_t kHighDelayNs = 100 * kMsInNs;
-/// A capacity that was seen says nothing about the link after this long.
+/// Age beyond which a measured capacity is discarded.
 inline constexpr int64_t kCapacityAgeNs = 30'000 * kMsInNs;
 inline constexpr int64_t kBaseWindowNs = 10'000 * kMsInNs;  // of the shortest round trip
-/// A link that has become longer is believed when its shortest round trip is older than this.
+/// Age of the shortest round trip beyond which a longer one replaces it.
 inline constexpr int64_t kLongerPathNs = 2'000 * kMsInNs;
 
-/// A value of some time.
+/// A value with its time.
 struct TimedValue {
   int64_t time_ns = 0;
   double value = 0.0;
 };
 
-/// What a client says of a frame, in its own time.
+/// Times of a frame that the client reports, on its own clock.
 struct ClientTimes {
   int64_t received_ns = 0;  // by its own clock; 0 = unknown
   int64_t decode_ns = 0;
@@ -43,23 +43,23 @@ struct AckedFrame {
 
 class LinkEstimate {
  public:
-  /// Instead of kCapacityAgeNs.
+  /// Replaces kCapacityAgeNs.
   void remember_capacity_for(int64_t duration_ns) { capacity_age_ns_ = duration_ns; }
-  /// Gives how long the frame waited on its way and at the client, ns.
+  /// Takes an acknowledgement; returns how long the frame waited in flight and at the client, ns.
   int64_t on_acked(const AckedFrame& frame, int64_t time_ns);
-  /// How long the newest frame had been due already when the client looked last without finding it: what it
-  /// waited less what the client was not there for. All of it from clients that do not say when they receive.
+  /// Returns the delay of the newest frame that the link caused: the total less the client's absence. For
+  /// clients that do not report reception times it is the total.
   int64_t link_delay_ns() const { return link_delay_ns_; }
-  /// A round trip of something small.
+  /// Adds the round trip time of a small message.
   void on_round_trip(int64_t round_trip_ns, int64_t time_ns);
 
-  /// Round trip of the bare link; 0 while unknown.
+  /// Returns the round trip time of the unloaded link; 0 while unknown.
   int64_t base_ns() const;
-  /// Bytes/s; 0 while unknown: the link has not been the limit.
+  /// Returns the capacity in bytes/s; 0 while unknown because the link was never the limit.
   double capacity_bytes_per_s(int64_t time_ns) const;
-  /// How long the link is busy with so many bytes; 0 while unknown.
+  /// Returns how long the link needs for this many bytes; 0 while unknown.
   int64_t transfer_ns(size_t bytes, int64_t time_ns) const;
-  /// 0 = none came yet.
+  /// Returns the time of the last acknowledgement; 0 = none yet.
   int64_t last_ack_ns() const { return last_ack_ns_; }
 
  private:

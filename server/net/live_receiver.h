@@ -15,15 +15,15 @@
 
 namespace strandcast {
 
-/// Until a server that was asked is tried again.
+/// Time until a failed connection to a server is tried again.
 inline constexpr int64_t kLiveRetryMs = 500;
-/// Between two requests, where a protocol has any.
+/// Time between two requests, for protocols that have them.
 inline constexpr int64_t kLiveRequestMs = 1'000;
 /// Between two ticks, of inputs that are active and of none.
 inline constexpr int64_t kLiveTickMs = 5;
 inline constexpr int64_t kLiveIdleTickMs = 100;
 
-/// One input's place on the network.
+/// Network address of one input.
 struct LivePort {
   std::string field;           // of the scene, for errors
   std::string protocol;        // likewise
@@ -34,30 +34,31 @@ struct LivePort {
   uint16_t request_port = 0;  // of who is asked by datagrams; 0 = nobody is
 };
 
-/// Called on the receiver's thread: return quickly, never wait.
+/// Receiver of the data. Called on the receiver's thread, so functions must return quickly without waiting.
 class LiveHandler {
  public:
   virtual ~LiveHandler() = default;
-  /// False: the connection is of no use any more. `sender` is an address with its port.
+  /// Handles received bytes; `sender` is an address with its port. Returns false if the connection must be
+  /// closed.
   virtual bool on_bytes(size_t input, const std::string& sender, std::span<const std::byte> bytes,
                         int64_t arrival_ns) = 0;
-  /// A datagram came from an address that may not send; what would let it.
+  /// Reports a datagram from an address that may not send, and how to permit it.
   virtual void on_refused(size_t input, const std::string& sender, const std::string& remedy) = 0;
-  /// A connection begins.
+  /// Reports that a connection has begun.
   virtual void on_connection(size_t input) = 0;
-  /// A connection cannot be had, or ended.
+  /// Reports that a connection failed or ended.
   virtual void on_no_connection(size_t input, const std::string& why) = 0;
-  /// To be sent first, and about once a second; empty = nothing.
+  /// Returns the bytes to send at the beginning, and about once a second; empty = nothing.
   virtual std::vector<std::byte> greeting(size_t input) = 0;
   virtual std::vector<std::byte> request(size_t input) = 0;
-  /// False while there is nothing to do until something comes.
+  /// Does periodic work; returns false if there is none until data arrives.
   virtual bool on_tick(int64_t now_ns) = 0;
 };
 
 class LiveReceiver {
  public:
-  /// Opens the sockets; what comes waits until start(). `handler` outlives the receiver. Errors name the
-  /// field: Unavailable for a port in use, NotFound for a host that cannot be found.
+  /// Opens the sockets; received data waits until start(). `handler` must outlive the receiver. Errors name
+  /// the field: Unavailable for a port in use, NotFound for an unknown host.
   static Result<std::unique_ptr<LiveReceiver>> open(const std::vector<LivePort>& ports,
                                                     const std::vector<AddressRange>& allowed,
                                                     LiveHandler& handler);

@@ -1,4 +1,4 @@
-// How the network side of a server is set up: where it listens, who may come in, and its limits. Plain data.
+// Configuration of a server's network side: address, access and limits. Plain data.
 #pragma once
 
 #include <cstddef>
@@ -49,9 +49,10 @@ struct NetLimits {
   double viewer_bytes_per_s = 0.0;          // cap of what a stream may take for one viewer; 0 = none
 };
 
-/// LikeAllOthers: behind a proxy or tunnel on this machine, where everybody seems to be local.
+/// Whether loopback connections are trusted. LikeAllOthers suits a proxy or tunnel on this machine, through
+/// which all clients seem local.
 enum class LoopbackTrust { Trusted, LikeAllOthers };
-/// Who may do without TLS when the server has a certificate.
+/// Connections that may omit TLS when the server has a certificate.
 enum class PlainAccess { TrustedLoopback, Nobody };
 
 /// Whether trusted proxies begin each connection with a PROXY header.

@@ -1,4 +1,5 @@
-// NetHandler: what an application does with the sessions of a NetServer, and what the two tell each other.
+// NetHandler: interface of the application for the sessions of a NetServer, and the data that the two
+// exchange.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +16,7 @@
 
 namespace strandcast {
 
-/// Who says Hello.
+/// The client that says Hello.
 struct Visitor {
   SessionId session = 0;
   std::string peer;            // what counts as one address, for shares
@@ -23,14 +24,14 @@ struct Visitor {
   Subscription& subscription;  // the session's; valid until on_left()
 };
 
-/// Answer to a Hello. Without an asset none is sent; strands or pictures follow by the subscription, which
-/// also fills in the mode of the Welcome.
+/// Answer to a Hello. Without an asset none is sent. The subscription decides strands or pictures and fills
+/// in the mode of the Welcome.
 struct Admission {
   Welcome welcome;
   EncodedFramePtr asset;
 };
 
-/// What one session's link does, for choosing between strands and frames; 0 = unknown.
+/// Measurements of one session's link, for choosing between strands and pictures; 0 = unknown.
 struct LinkState {
   StreamMode mode = StreamMode::Strands;  // of the frames it gets now
   size_t strand_class = 0;                // of its strands, if it gets any
@@ -40,33 +41,34 @@ struct LinkState {
   std::vector<double> strand_bytes_per_s;  // what each strand class takes by its codec; empty = unknown
 };
 
-/// What a viewer is told about its mode. When its subscription is changing, right before the first frame of
-/// the other mode; otherwise at once, and a change that was under way is given up.
+/// What a viewer is told about its mode. If its subscription is changing, it is sent before the first frame
+/// of the new mode. Otherwise it is sent at once, and a change in progress is cancelled.
 struct ModeAnswer {
   ModeChange change;
   EncodedFramePtr asset;  // for a change to strands
 };
 
-/// Another codec for the strands that a session gets, or will get.
+/// Change of the codec of a session's present or future strands.
 struct CodecAnswer {
   size_t codec = 0;  // of those that are served
   std::string name;
   std::string reason;
 };
 
-/// What comes of a look at a link.
+/// Result of NetHandler::on_link().
 struct LinkAnswer {
   std::optional<ModeAnswer> mode;
   std::optional<CodecAnswer> codec;
   bool is_request_waiting = false;  // a ModeRequest has not had its turn: look again soon
 };
 
-/// What the application does with sessions. Called on the network thread: return quickly, never wait.
+/// The application's reactions to sessions. Called on the network thread, so functions must return quickly
+/// without waiting.
 class NetHandler {
  public:
   virtual ~NetHandler() = default;
-  /// An error closes the session with its sentence: LimitExceeded as Full, Unavailable as TryLater,
-  /// Unauthorized as Unauthorized, else Policy.
+  /// Decides on a Hello. An error closes the session with its sentence: LimitExceeded as Full, Unavailable as
+  /// TryLater, Unauthorized as Unauthorized, else Policy.
   virtual Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) = 0;
   virtual void on_motion(SessionId session, const MotionSamples& samples, int64_t arrival_ns) = 0;
   virtual void on_wind(SessionId session, const WindSamples& samples, int64_t arrival_ns) = 0;
@@ -75,41 +77,42 @@ class NetHandler {
   virtual void on_scene_request(SessionId) {}
   virtual void on_live_command(SessionId, const LiveCommand&) {}
   virtual void on_parameter_request(SessionId, const ParameterRequest&) {}
-  /// Where others look from: a CameraChange sent to a session moves its pictures, too.
+  /// Handles a command about others' cameras; a CameraChange sent to a session also moves its pictures.
   virtual void on_camera_command(SessionId, const CameraCommand&) {}
   virtual void on_state_times_request(SessionId, const StateTimesRequest&) {}
   virtual void on_record_command(SessionId, const RecordCommand&) {}
-  /// May change the class of the subscription's pictures.
+  /// Handles a viewer's camera; it may change the class of the subscription's pictures.
   virtual void on_camera(SessionId session, const CameraChange& camera) = 0;
-  /// An admin wants the server to end.
+  /// Handles an admin's request to shut down the server.
   virtual void on_shut_down(SessionId) {}
-  /// The session waits for a keyframe of this stream of strands given to publish_strands(). Repeated until
-  /// one comes.
+  /// Reports that the session waits for a keyframe of this strand stream, to be given to publish_strands().
+  /// Repeated until one comes.
   virtual void on_keyframe_request(SessionId session, uint16_t stream_id) = 0;
-  /// A relay, which follows the chain, wants one for those who join there.
+  /// Reports that a relay, which follows the chain, needs a keyframe for its joiners.
   virtual void on_anchor_request(SessionId session, uint16_t stream_id) {
     on_keyframe_request(session, stream_id);
   }
-  /// The session waits for a whole picture of its class: publish_picture() with the newest one, changed or
+  /// Reports that the session waits for a whole picture: publish_picture() with the newest one, changed or
   /// not. Repeated until one comes.
   virtual void on_picture_request(SessionId, PictureClass /*picture_class*/) {}
-  /// The link of a viewer of frames asks for another step of its ladder: puts it and its class into the
-  /// subscription; false when it cannot have it.
+  /// Asks for another step of a viewer's quality ladder, because of its link. Puts the step and its class
+  /// into the subscription; returns false if it is unavailable.
   virtual bool on_picture_step(SessionId, size_t /*step*/, const std::string& /*reason*/) { return false; }
-  /// The session has put another strand class into its subscription.
+  /// Reports that the session has put another strand class into its subscription.
   virtual void on_strand_class(SessionId) {}
   virtual void on_report(SessionId, const ViewerReport&) {}
   virtual void on_mode_request(SessionId, const ModeRequest&) {}
-  /// For every viewer, each limits.link_interval_ms, and at once after on_mode_request(). A change that it
-  /// begins stands in the subscription.
+  /// Checks a viewer's link, every limits.link_interval_ms and immediately after on_mode_request(). A change
+  /// of mode that it begins is stored in the subscription.
   virtual LinkAnswer on_link(SessionId, const LinkState&, int64_t /*time_ns*/) { return {}; }
-  /// A change of mode is done: the first frame of the new mode is next in line.
+  /// Reports that a change of mode is complete: the first frame of the new mode is next.
   virtual void on_mode(SessionId) {}
-  /// Once for every session whose on_hello succeeded.
+  /// Reports once that a session has left whose on_hello() succeeded.
   virtual void on_left(SessionId session) = 0;
-  /// The answer of /readyz: the simulation is stepping, or one sentence why not.
+  /// Returns the answer of /readyz: success if the simulation is stepping, otherwise the reason in one
+  /// sentence.
   virtual Status readiness() { return {}; }
-  /// Lines added to /metrics, in Prometheus text form.
+  /// Returns further lines for /metrics, as Prometheus text.
   virtual std::string metrics() { return {}; }
 };
 

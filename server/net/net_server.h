@@ -1,7 +1,6 @@
 // NetServer: one TCP port with HTTP (/healthz, /readyz, /metrics) and the WebSocket protocol of proto/WIRE.md
-// at /v1. One network thread; every public function may be called from any thread and never waits for a
-// client. It does not simulate, encode pictures or strands, or decide what a session may see: that is the
-// NetHandler's.
+// at /v1. It has one network thread. Every public function may be called from any thread and never waits for
+// a client. It does not simulate or encode, and the NetHandler decides what a session may see.
 #pragma once
 
 #include <cstdint>
@@ -48,8 +47,8 @@ struct NetCounters {
   uint64_t bytes_sent = 0;     // WebSocket payload
 };
 
-/// One of the heads that a server has: what a session is about from its Hello on. Its strands and its classes
-/// of pictures are numbered by themselves.
+/// One head of a server; a session chooses its head in the Hello. Each head numbers its strand streams and
+/// picture classes separately.
 struct NetHead {
   std::string name;  // that a Hello asks for; a first head without one is asked for by any, and judges itself
   NetHandler* handler = nullptr;                                     // outlives the server
@@ -61,13 +60,13 @@ class NetServer {
  public:
   /// Opens the port and closes it again: what listen() would refuse is told before a scene is built.
   static Status check_port(const NetConfig& config);
-  /// Opens the port; connections wait until start(). `heads`: who names none in the Hello gets the first,
-  /// whose handler also answers for /metrics. Unavailable when the port is in use, BadInput for an address
-  /// that is none, Unauthorized beyond loopback without a token.
+  /// Opens the port; connections wait until start(). A Hello without a name gets the first of `heads`, whose
+  /// handler also answers for /metrics. Unavailable if the port is in use, BadInput for an invalid address,
+  /// Unauthorized beyond loopback without a token.
   static Result<std::unique_ptr<NetServer>> listen(const NetConfig& config, std::vector<NetHead> heads);
-  /// With one head, which has no name.
+  /// Opens the port for one unnamed head.
   static Result<std::unique_ptr<NetServer>> listen(const NetConfig& config, NetHandler& handler);
-  /// stop(), if it was not called.
+  /// Calls stop() if it was not called.
   ~NetServer();
   NetServer(const NetServer&) = delete;
   NetServer& operator=(const NetServer&) = delete;
@@ -75,50 +74,52 @@ class NetServer {
   /// Starts the network thread. Call once.
   void start();
   uint16_t port() const;
-  /// Reads the certificate and the key again; new connections get them. On an error the old ones stay.
+  /// Reloads the certificate and key for new connections. After an error the previous ones stay.
   Status reload_tls();
-  /// Who joins from now on needs one of these, and sessions whose token is not among them, or is good for
-  /// less now, end with a sentence. BadInput for none where there were some.
+  /// Replaces the tokens. Sessions end with a sentence if their token is missing or no longer permits their
+  /// role. BadInput for an empty list where there were tokens.
   Status set_tokens(std::vector<AccessToken> tokens);
 
   // Each concerns the sessions of one head, by its number in `heads`.
-  /// Who joins from now on asks for it by this name; for one without a name, but the first, nobody can.
+  /// Renames a head. Sessions that join from now on select it by this name; an unnamed head other than the
+  /// first cannot be selected.
   void name_head(size_t head, std::string name);
-  /// Strand frames of one stream (a class by a codec) in the order of their chain. A delta goes to sessions
-  /// of the stream whose last frame it builds on, a keyframe to those that wait for one.
+  /// Sends the strand frames of one stream (a class by a codec), in the order of their chain. A delta goes to
+  /// sessions whose last frame is its base, a keyframe to those that wait for one.
   void publish_strands(EncodedFramePtr frame, size_t head = 0);
-  /// Of the stream that a session gets: a keyframe and the deltas after it, oldest first, if it waits for a
-  /// keyframe. Frames published before are not among those that go on from there.
+  /// Sends a session of this stream a keyframe and the deltas after it, oldest first, if it waits for a
+  /// keyframe. Publish later frames of the chain only after this call.
   void send_chain(SessionId session, std::vector<EncodedFramePtr> chain);
-  /// The newest picture for the viewers of one class; replaces one not yet being sent. Each viewer gets what
-  /// takes it there from the last one it was sent.
+  /// Sends the newest picture to the viewers of one class, replacing one that is not being sent yet. Each
+  /// viewer gets the message that continues from its last picture.
   void publish_picture(PictureClass picture_class, PicturePtr picture, size_t head = 0);
-  /// Strands are coded otherwise from now on: tells every viewer of strands and moves those whose class is
-  /// gone. `then` runs on the network thread after that, before any frame published later.
+  /// Changes the coding of strands: tells every viewer of strands, and moves those whose class is gone.
+  /// `then` runs afterwards on the network thread, before any frame published later.
   void set_strand_classes(std::vector<StrandClass> classes, std::string reason, std::function<void()> then,
                           size_t head = 0);
-  /// Strands have another shape at rest, and as many vertices: viewers of strands get this asset, and strands
-  /// from a keyframe on; relays are asked to join again. `then` as above.
+  /// Changes the rest shape with the same number of vertices. Viewers of strands get this asset and then
+  /// strands from a keyframe on; relays are asked to join again. `then` as above.
   void renew_asset(EncodedFramePtr asset, std::function<void()> then, size_t head = 0);
-  /// Another stream begins: all who are there go with this sentence, to come back. `then` as above.
+  /// Begins another stream: ends all sessions with a sentence that asks them to come back. `then` as above.
   void begin_anew(std::vector<StrandClass> classes, std::vector<StrandByteModel> codecs, std::string reason,
                   std::function<void()> then, size_t head = 0);
-  /// Of the clock that frames are stamped with against this machine's, for those who measure it.
+  /// Sets the offset of the frames' clock from this machine's, for clients that measure it.
   void set_clock_offset(int64_t offset_ns);
-  /// To every joined session. In a ServerStatus dropped_frames is filled in per session.
+  /// Sends a message to every joined session; dropped_frames of a ServerStatus is filled in per session.
   void broadcast(ServerMessage message, size_t head = 0);
-  /// Likewise, what `of` gives for each of them, on the network thread.
+  /// Sends every joined session the message that `of` returns for it, on the network thread.
   void tell_each(std::function<ServerMessage(SessionId)> of, size_t head = 0);
-  /// To those who watch the pictures of one class.
+  /// Sends a message to the viewers of one picture class.
   void send_to_class(PictureClass picture_class, ServerMessage message, size_t head = 0);
-  /// Ignored when the session is gone.
+  /// Sends a message to a session; ignored if it is gone.
   void send(SessionId session, ServerMessage message);
-  /// Goodbye with one sentence. Ignored when the session is gone.
+  /// Ends a session with a Goodbye and one sentence; ignored if it is gone.
   void close(SessionId session, CloseCode code, std::string reason);
 
   NetCounters counters() const;
 
-  /// Goodbye and close GoingAway to all, at most limits.close_ms, then ends the thread. Not from a handler.
+  /// Sends Goodbye and close GoingAway to all for at most limits.close_ms, then ends the thread. Must not be
+  /// called from a handler.
   void stop();
 
  private:

@@ -1,5 +1,5 @@
-// The page for browsers as the server has it: files made at build time (client/web), and what of a request
-// decides how one of them is answered. Pure functions on untrusted text, any thread; nothing here sends.
+// The page for browsers: files embedded at build time (client/web), and the decision how a request for one is
+// answered. Pure functions on untrusted text, any thread; nothing here sends.
 #pragma once
 
 #include <span>
@@ -8,7 +8,7 @@
 
 namespace strandcast {
 
-/// Whether a file's name changes with its content, so that a browser may keep it for good.
+/// Whether a file's name changes with its content, so that a browser may cache it permanently.
 enum class PageFileName { Fixed, Hashed };
 
 struct PageFile {
@@ -22,29 +22,29 @@ struct PageFile {
 };
 using PageFiles = std::span<const PageFile>;  // without the page: none
 
-/// What this program was built with.
+/// Returns the files embedded in this program.
 PageFiles built_in_page();
 
-/// Of a request's target: without what follows a '?', which may hold anything and belongs in no log.
+/// Returns a request's target up to '?'; the query may hold anything and must not be logged.
 std::string_view path_of_target(std::string_view target);
 
-/// nullptr when there is none at this path.
+/// Returns the file at this path; nullptr if there is none.
 const PageFile* find_page_file(PageFiles files, std::string_view path);
 
 enum class PageCoding { Plain, Gzip, Brotli };
-/// "plain", "gzip", "br": as HTTP calls it.
+/// Returns HTTP's name of a coding: "plain", "gzip", "br".
 std::string_view name_of(PageCoding coding);
 std::string_view content_of(const PageFile& file, PageCoding coding);
 
-/// The smallest that an Accept-Encoding field allows: Brotli where it is named, gzip where it or everything
-/// is, and neither where it is unwanted.
+/// Returns the smallest coding that an Accept-Encoding field permits: Brotli if named, gzip if it or
+/// everything is named, otherwise plain.
 PageCoding best_coding(std::string_view accept_encoding);
 
-/// True when an If-None-Match field names this entity tag (weakly compared, RFC 9110, 13.1.2) or any.
+/// Returns whether an If-None-Match field names this entity tag (weak comparison, RFC 9110, 13.1.2) or any.
 bool names_tag(std::string_view if_none_match, std::string_view tag);
 
-/// The Content-Security-Policy of a file that was asked for by this Host, which must be an allowed one: own
-/// scripts, styles and connections, pictures that scripts made, and nothing of anybody else.
+/// Returns the Content-Security-Policy for a file requested with this (allowed) Host: own scripts, styles and
+/// connections, and pictures made by scripts; nothing else.
 std::string page_policy(std::string_view host);
 
 }  // namespace strandcast

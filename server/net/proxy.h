@@ -1,6 +1,6 @@
-// Who stands behind a proxy: the header of the PROXY protocol, version 2 (haproxy.org/download/2.9/doc/
-// proxy-protocol.txt, section 2.2), and the HTTP field X-Forwarded-For. Bytes and text that nobody has
-// checked; pure functions, any thread.
+// Finds the client behind a proxy: the header of the PROXY protocol, version 2 (haproxy.org/download/2.9/doc/
+// proxy-protocol.txt, section 2.2), and the HTTP field X-Forwarded-For. Untrusted input; pure functions, any
+// thread.
 #pragma once
 
 #include <cstddef>
@@ -14,30 +14,30 @@
 
 namespace strandcast {
 
-/// What every header begins with: signature, version and command, family, length of the rest.
+/// Size of a header's fixed part: signature, version and command, family, length of the rest.
 inline constexpr size_t kProxyFixedBytes = 16;
-/// The whole header, with all that a proxy adds.
+/// Largest whole header, with all extensions.
 inline constexpr size_t kMaxProxyBytes = 2'048;
-/// Proxies behind each other that are followed.
+/// Largest number of chained proxies that are followed.
 inline constexpr size_t kMaxForwardedHops = 16;
 
-/// Both ends of the connection that a proxy passes on.
+/// Both ends of the connection that a proxy forwards.
 struct ProxiedPeer {
   IpAddress address;
   IpAddress local_address;  // what it connected to
 };
 
-/// Size of the whole header that begins with these kProxyFixedBytes bytes. BadInput when it is none of
+/// Returns the size of the whole header that begins with these kProxyFixedBytes bytes. BadInput unless it is
 /// version 2 about TCP, LimitExceeded above kMaxProxyBytes.
 Result<size_t> proxy_header_bytes(std::span<const std::byte> fixed);
 
-/// Of the whole header; nothing when the proxy speaks for itself. What it adds must be well-formed and is
+/// Reads the whole header; empty if the proxy speaks for itself. Extensions must be well-formed and are
 /// ignored.
 Result<std::optional<ProxiedPeer>> parse_proxy_header(std::span<const std::byte> bytes);
 
-/// The last address of an X-Forwarded-For that is none of our `proxies`, which is the first one that a proxy
-/// of ours has seen itself; the first of all when every one is a proxy of ours. What stands before it is the
-/// client's own writing and is not looked at.
+/// Returns the last address of an X-Forwarded-For field that is not one of our `proxies`: the one that our
+/// outermost proxy has seen. Returns the first address if all are proxies. Earlier entries are written by the
+/// client and are ignored.
 Result<IpAddress> forwarded_client(std::string_view field, const std::vector<AddressRange>& proxies);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// SendGate: how many frames may be on their way to a viewer, so that a slow link's queue stays short. Plain
-// logic on given times, no I/O and no clock; network thread.
+// SendGate: limits the frames in flight to a viewer, so that a slow link's queue stays short. Plain logic on
+// given times, no I/O and no clock; network thread.
 #pragma once
 
 #include <cstddef>
@@ -13,49 +13,48 @@
 
 namespace strandcast {
 
-/// Nothing new is sent while the oldest frame on its way is later than the bare link by more than this,
+/// Delay of the oldest frame in flight, beyond that of the unloaded link, above which nothing new is sent.
 inline constexpr int64_t kGateDelayNs = 200 * kMsInNs;
-/// or while what is on its way keeps the link busy for longer than this: the frame itself takes time as well.
+/// Time that the link needs for the frames in flight, above which nothing new is sent.
 inline constexpr int64_t kGateQueueNs = 170 * kMsInNs;
-/// Nor a keyframe while more than this waits ahead of it: it fills the queue by itself.
+/// Queueing delay above which no keyframe is sent, since a keyframe fills the queue by itself.
 inline constexpr int64_t kStartDelayNs = 50 * kMsInNs;
-/// Before the first acknowledgement nothing is known of a link: it gets one frame, and no more when it is
-/// this large. Three times what TCP itself begins with (RFC 6928).
+/// Bytes that may be in flight before the first acknowledgement; then one frame of any size is sent. Three
+/// times TCP's initial window (RFC 6928).
 inline constexpr size_t kFirstBytes = 44u << 10;
-/// So many frames may always be on their way: a viewer that draws slowly acknowledges in bursts.
+/// Number of frames that may always be in flight, because a viewer that draws slowly acknowledges in bursts.
 inline constexpr size_t kFreeFrames = 3;
 inline constexpr size_t kMaxInFlightBytes = 4u << 20;  // but one frame always may
 inline constexpr size_t kMaxInFlightFrames = 512;
-/// What a keyframe puts into the queue may take so long to drain; the frames behind it are late by no fault
-/// of theirs.
+/// Time in which a keyframe's queue may drain; frames after it are not late through their own fault.
 inline constexpr int64_t kDrainNs = 3'000 * kMsInNs;
-/// No frame is expected to take longer, however slow the link seemed.
+/// Longest expected transfer of a frame, however slow the link seemed.
 inline constexpr int64_t kLongestTransferNs = 30'000 * kMsInNs;
-/// Without any acknowledgement one more frame is sent this often.
+/// Interval at which one more frame is sent without any acknowledgement.
 inline constexpr int64_t kAskAgainNs = 1'000 * kMsInNs;
 
 class SendGate {
  public:
-  /// `link` outlives the gate.
+  /// Makes a gate; `link` must outlive it.
   explicit SendGate(const LinkEstimate& link) : link_(link) {}
 
-  /// A media frame goes to the socket.
+  /// Notes that a media frame is written to the socket.
   void on_sent(const FrameHeader& header, size_t bytes, int64_t time_ns);
-  /// The link has taken a part of this frame.
+  /// Notes that the link has taken a part of this frame.
   void on_written(const FrameHeader& header, int64_t time_ns);
-  /// Takes this frame and all before it off the way. Nothing for numbers that are not on their way.
+  /// Removes this frame and all before it from those in flight; empty for numbers that are not in flight.
   std::optional<AckedFrame> take_acked(uint16_t stream_id, uint32_t sequence);
-  /// No acknowledgement will come for what is on its way.
+  /// Forgets the frames in flight, which will not be acknowledged.
   void forget();
 
   enum class Delay { Usual, Short };
-  /// Whether the next media frame may go to the socket. Short: while a better class is tried.
+  /// Returns whether the next media frame may be sent. Short: while a better class is tried.
   bool may_send(Delay delay, int64_t time_ns) const;
-  /// Whether a keyframe or whole picture would be on its way at once, if may_send().
+  /// Returns whether a keyframe or whole picture would be sent at once, if may_send().
   bool has_short_queue(int64_t time_ns) const { return expected_wait_ns(time_ns) <= kStartDelayNs; }
   size_t in_flight_bytes() const { return in_flight_bytes_; }
-  /// When the acknowledgement of the oldest frame should be here, by what the link has shown and how far that
-  /// frame has got: on a slow link it may take seconds. 0 = none waits.
+  /// Returns when the oldest frame's acknowledgement is expected, by the link's estimate and the frame's
+  /// progress; on a slow link that may be seconds. 0 = none waits.
   int64_t oldest_due_ns(int64_t time_ns) const;
 
  private:

@@ -17,12 +17,12 @@
 namespace strandcast {
 
 inline constexpr size_t kMaxQueuedControl = 64;
-/// A session is not read while so many wait: what it asked for before still finds room.
+/// Number of waiting messages at which a session is not read, so that answers to earlier requests still find
+/// room.
 inline constexpr size_t kMostUnreadAnswers = kMaxQueuedControl / 4;
-/// Strand frames that may wait for a relay: a second of them.
+/// Largest number of strand frames that wait for a relay: one second.
 inline constexpr size_t kMaxRelayFrames = 60;
-/// While a chain is given, so many new frames may go behind it for each of its own; then it must have gone
-/// out.
+/// Number of new frames that may queue after each frame of a chain while it is sent.
 inline constexpr size_t kCatchUpFrames = 2;
 
 class SendQueue {
@@ -34,44 +34,46 @@ class SendQueue {
   };
   using Item = std::variant<ServerMessage, EncodedFramePtr>;
 
-  /// False when the queue is full: the session must be closed. A LookChange replaces one that waits.
+  /// Queues a control message; a LookChange replaces a waiting one. Returns false if the queue is full and
+  /// the session must be closed.
   [[nodiscard]] bool push_control(ServerMessage message);
   size_t control_count() const { return control_.size(); }
-  /// First media of a session; strand frames wait until it is written.
+  /// Sets the first media message; strand frames wait until it is written.
   void set_asset(EncodedFramePtr asset);
-  /// Another asset in its place: what waits of the one before is dropped, and strands begin again behind it.
+  /// Replaces the asset: drops waiting frames of the previous one; strands restart after it.
   void renew_asset(EncodedFramePtr asset);
-  /// From now on the session wants strand frames, beginning with a keyframe.
+  /// Starts strand frames, beginning with a keyframe.
   void start_strands();
   Offer offer_strands(const EncodedFramePtr& frame);
-  /// A keyframe and the deltas after it, oldest first, for one that needs a keyframe; else ignored.
+  /// Offers a keyframe and the deltas after it, oldest first; ignored unless the session needs a keyframe.
   Offer offer_chain(std::span<const EncodedFramePtr> chain);
-  /// For a relay: all frames of the chain, and each keyframe that is made for others.
+  /// Makes the queue that of a relay: it takes all frames of the chain, and each keyframe made for others.
   void take_all() { takes_all_ = true; }
-  /// No more strand frames, and none that waits. False when the asset waited: it will not be sent.
+  /// Stops strand frames and drops waiting ones. Returns false if the asset was still waiting; it will not be
+  /// sent.
   bool stop_strands();
-  /// From now on the session wants pictures, beginning with a whole one; again when those of another class
-  /// follow or the client lost what it had. Strands go on until stop_strands().
+  /// Starts pictures with a whole one; call it again for another class or after a loss at the client. Strands
+  /// continue until stop_strands().
   void start_pictures();
-  /// No more pictures, and none that waits.
+  /// Stops pictures and drops a waiting one.
   void stop_pictures();
-  /// The newest picture wins; the one it replaces is counted in dropped_frames(). LostChain when it needs the
-  /// one before it and that was not sent.
+  /// Queues the newest picture; the one it replaces is counted in dropped_frames(). LostChain if its base was
+  /// not sent.
   Offer offer_picture(const PicturePtr& picture);
-  /// True until a whole picture comes.
+  /// Returns true until a whole picture comes.
   bool awaits_picture() const { return pictures_ == Pictures::Waiting; }
-  /// True when a whole picture would be queued at once; false while media is still being written.
+  /// Returns true if a whole picture would be queued at once; false while media is still being written.
   bool needs_picture() const;
-  /// The client lost its state: forget the chain.
+  /// Restarts the chain with a keyframe, because the client lost its state.
   void lose_chain();
-  /// The frames of another class follow, beginning with a keyframe.
+  /// Begins the frames of another class with a keyframe.
   void restart_strands();
-  /// True when a keyframe would be queued at once; false while media is still being written.
+  /// Returns true if a keyframe would be queued at once; false while media is still being written.
   bool needs_keyframe() const;
 
   enum class Media { Allowed, Held };
-  /// Removes what is sent next; control first, media only when allowed. Call written() when it is done,
-  /// before the next one.
+  /// Removes the next message to send: control first, media only if allowed. Call written() when it was sent,
+  /// before the next call.
   std::optional<Item> take_next(Media media = Media::Allowed);
   void written();
   /// Drops everything not yet taken, for closing.

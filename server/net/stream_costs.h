@@ -1,5 +1,5 @@
-// What each strand class by each codec and each picture class takes of a link, learned from the frames as
-// they come. Plain logic on given times; network thread.
+// Learns from frames what each strand class, by each codec, and each picture class takes of a link. Plain
+// logic on given times; network thread.
 #pragma once
 
 #include <cstddef>
@@ -16,15 +16,16 @@ using PictureClass = uint32_t;  // viewers of one class get the same rendered fr
 
 class StrandCosts {
  public:
-  /// A model for each codec that they are served by.
+  /// Makes the costs; there is a model for each served codec.
   StrandCosts(std::vector<StrandClass> classes, std::vector<StrandByteModel> codecs);
 
-  /// Best first.
+  /// Returns the classes, best first.
   const std::vector<StrandClass>& classes() const { return classes_; }
   const std::vector<StrandByteModel>& codecs() const { return codecs_; }
-  /// Keyframes and frames of no class are left out.
+  /// Takes the size of a frame; ignores keyframes and frames of unknown classes.
   void note_frame(const FrameHeader& header, size_t bytes, int64_t time_ns);
-  /// Of every class by this codec, as measured, or estimated from the one measured last; empty at first.
+  /// Returns the bytes/s of every class by this codec, measured or estimated from the one measured last;
+  /// empty at first.
   std::vector<double> bytes_per_s(size_t codec) const;
 
  private:
@@ -39,11 +40,11 @@ class StrandCosts {
 
 class PictureCosts {
  public:
-  /// Classes that have given nothing for long are forgotten.
+  /// Takes the size of a picture; classes without pictures for a long time are forgotten.
   void note_picture(PictureClass picture_class, size_t bytes, int64_t time_ns);
-  /// The class is made otherwise from now on.
+  /// Forgets a class whose coding has changed.
   void forget(PictureClass picture_class) { loads_.erase(picture_class); }
-  /// While the picture changes; 0 = not known yet.
+  /// Returns the bytes/s of a picture class while its picture changes; 0 = not known yet.
   double bytes_per_s(PictureClass picture_class) const;
 
  private:

@@ -1,5 +1,5 @@
-// Subscription: what one viewer gets: strands or rendered frames, of which class, and the change that is
-// under way. The one place that knows: the application chooses, the session follows and says when a change is
+// Subscription: what one viewer gets: strands or pictures, of which class, and the change in progress. It is
+// the only place with this state: the application chooses, the session follows and reports when a change is
 // done. Plain data and logic; network thread.
 #pragma once
 
@@ -14,7 +14,7 @@
 
 namespace strandcast {
 
-/// The rendered frames that a viewer gets, and the ladder of those that it could get.
+/// Pictures that a viewer gets, and the quality ladder of those that it could get.
 struct PictureChoice {
   PictureClass picture_class = 0;
   std::vector<double> costs;  // of each step of the ladder against the first, best first
@@ -26,11 +26,12 @@ class Subscription {
   StrandStream strands;
   PictureChoice pictures;
 
-  /// Whether it gets anything: a source does not, nor who came to say something.
+  /// Returns whether the viewer gets nothing, as a source or a client that only sends commands.
   bool is_empty() const { return is_empty_; }
-  /// Strands or Frames: what it gets now, if anything.
+  /// Returns what the viewer gets now: Strands or Frames.
   StreamMode mode() const { return mode_; }
-  /// What it is about to get: strands or frames go on until the first of the others is there.
+  /// Returns the mode that the viewer changes to; the present one continues until the first frame of the next
+  /// is ready.
   std::optional<StreamMode> next() const { return next_; }
   int64_t changing_since_ns() const { return changing_since_ns_; }
   bool gets(StreamMode kind) const { return !is_empty_ && (mode_ == kind || next_ == kind); }
@@ -39,16 +40,16 @@ class Subscription {
     return gets(StreamMode::Frames) && picture_class == pictures.picture_class;
   }
 
-  /// First of all: who gets nothing will never get anything.
+  /// Begins the subscription before all else; a viewer that gets nothing here never gets anything.
   void begin(const Hello& hello) { is_empty_ = hello.role == Role::Source || hello.gets_no_stream; }
-  /// Before anything is sent.
+  /// Sets the first mode, before anything is sent.
   void start_with(StreamMode mode) { mode_ = mode; }
   void begin_change(StreamMode next, int64_t time_ns) {
     next_ = next;
     changing_since_ns_ = time_ns;
   }
   void give_up_change() { next_.reset(); }
-  /// The first frame of the next mode is here.
+  /// Completes the change, because the first frame of the next mode is ready.
   void finish_change() {
     mode_ = next_.value_or(mode_);
     next_.reset();
