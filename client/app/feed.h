@@ -74,7 +74,7 @@ inline constexpr std::chrono::milliseconds kUnheardTime{2000};
 Result<FeedProgress> feed(std::span<const std::unique_ptr<SteadyClient>> heads, const FeedPlan& plan,
                           const std::atomic<bool>& stop, const FeedListener& listener);
 
-/// Likewise in real time to who says nothing back.
+/// Feeds in real time to a receiver that does not answer.
 FeedProgress feed_moments(const SendMoment& send, const FeedPlan& plan, const std::atomic<bool>& stop,
                           const FeedListener& listener);
 

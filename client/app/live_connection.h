@@ -16,7 +16,7 @@ class LiveConnection {
  public:
   /// The first connection must succeed: its error is the caller's.
   static Result<std::unique_ptr<LiveConnection>> open(const ClientConfig& config);
-  /// Without a session yet: pump() connects.
+  /// Returns a connection without a session; pump() connects it.
   static std::unique_ptr<LiveConnection> begin(const ClientConfig& config);
   LiveConnection(const LiveConnection&) = delete;
   LiveConnection& operator=(const LiveConnection&) = delete;
@@ -36,7 +36,7 @@ class LiveConnection {
   ViewerSession& session() { return *session_; }
   /// What the sessions before that one counted.
   const SessionTotals& earlier() const { return earlier_; }
-  /// There is a session, and the server has said something in the last kSilentServer.
+  /// Returns whether there is a session on which the server said something within kSilentServer.
   bool is_connected() const { return is_open_ && !is_silent(); }
   /// How often the server was found again.
   uint64_t reconnects() const { return attempts_.policy().reconnects(); }

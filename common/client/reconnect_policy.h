@@ -16,7 +16,7 @@ namespace strandcast {
 /// Between two attempts, growing from the first to the longest.
 inline constexpr std::chrono::milliseconds kFirstReconnectDelay{250};
 inline constexpr std::chrono::milliseconds kLongestReconnectDelay{5000};
-/// Of a relay, and of the commands of strandcast-ctl: others wait for them.
+/// Longest delay of a relay and of the commands of strandcast-ctl, since others wait for them.
 inline constexpr std::chrono::milliseconds kLongestUrgentDelay{1000};
 inline constexpr double kReconnectJitter = 0.25;  // relative, +-
 /// A connection that lived this long: start from the first delay.

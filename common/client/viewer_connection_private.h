@@ -24,7 +24,7 @@
 
 namespace strandcast {
 
-/// Of one WebSocket message from the server; what is received is kept in a buffer of this size at most.
+/// Largest WebSocket message from the server, and largest size of the buffer that receives it.
 inline constexpr size_t kMaxMessageBytes = kFrameHeaderBytes + kMaxMediaPayloadBytes;
 
 class ViewerClient::Connection {

@@ -20,7 +20,7 @@ enum class BodyResponse : uint32_t {
   Project,  // vertices move out the shortest way, whatever their segments' lengths
   Force     // velocities gain with depth, as 002 3.3 has it
 };
-/// By number; what scenes call them.
+/// Names of the responses in scenes, in the order of their numbers.
 inline constexpr std::array kBodyResponses = {"turn", "sphere", "project", "force"};
 
 /// No vertex comes nearer to the body, unless it began there.
@@ -51,7 +51,7 @@ struct BodyInput {
   double friction = 0.3;  // Coulomb coefficient
   double tip_clearance_m = kBodyClearanceM;
   double force_per_s2 = 0.0;  // of BodyResponse::Force
-  /// It was not there before: what is inside of it has begun there, and stays as deep as it is.
+  /// Whether it was not there before: strands that begin inside of it keep their depth.
   bool is_new = false;
 
   bool acts() const { return !capsules.empty() || !planes.empty(); }

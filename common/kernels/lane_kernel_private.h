@@ -181,7 +181,7 @@ STRANDCAST_LANES uint max(uint a, uint b) {
 STRANDCAST_LANES uint min(uint a, uint b) {
   return a < b ? a : b;
 }
-/// Of positive numbers.
+/// Returns the highest bit that is set; `value` must be positive.
 STRANDCAST_LANES int findMSB(uint value) {
   return 31 - __builtin_clz(value);
 }
@@ -208,7 +208,7 @@ STRANDCAST_LANES Bool operator&&(Bool a, bool b) {
 #undef uint
 #undef LAW
 #undef float
-/// Of what is the same in all strands.
+/// Hashes a value that is equal in all lanes.
 STRANDCAST_LANES uint mix_u32(uint value) {
 #if KERNEL_PARTS == 2
   return mix_u32(Uint(value)).a.v[0];

@@ -46,7 +46,7 @@ class LaneProgram {
   /// Once for all strands.
   void run(const StepBlock& step, size_t collider_count, const LanePlanes& planes,
            const LaneTables& tables = {});
-  /// Of its own: scratch above all.
+  /// Size of the program's own memory, mostly scratch.
   uint64_t size_bytes() const { return memory_bytes_ * most_workers_; }
 
  private:

@@ -35,7 +35,7 @@ struct StrandParameters {
   double thickness_spread = 0.0;        // largest relative difference of a strand's thickness from the mean
 };
 
-/// Of the strands that a step is for.
+/// Sizes of the strands that a step is for.
 struct StrandCounts {
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;       // per strand

@@ -28,7 +28,7 @@ struct StepKernel {
   std::string shader_path;
   double cost = 1.0;  // of a step with default parameters, against that of dftl
   bool has_twist_variant = false;
-  /// Of the model's own planes those that change from step to step, and those that do not.
+  /// Planes of the model that change from step to step, and those that do not.
   std::vector<PlaneRole> moving = {};
   std::vector<PlaneRole> fixed = {};
   bool carries_way = false;  // Displacement is the way of the last substep, and RodAxis turns with segments
@@ -81,7 +81,7 @@ struct StepScene {
   BustRig bust;                           // that the colliders go along with
   glm::dvec3 mean_wind_mps{0.0};          // waves stand still in air that moves with it
   std::vector<GustWave> waves;            // at time 0 with the head at the origin
-  /// Of a body; where its capsules are is told by ticks.
+  /// Shape of the body; the positions of its capsules come with the ticks.
   BodyInput body;
 
   bool operator==(const StepScene&) const = default;
@@ -92,7 +92,7 @@ inline constexpr uint32_t kMaxSubsteps = 64;
 struct StepTick {
   uint64_t tick = 0;
   Pose world_from_head;  // at its end
-  /// Strands go along as they are to this pose of the head before the first substep.
+  /// Pose of the head to which strands are moved rigidly before the first substep.
   std::optional<Pose> carried_to;
   glm::dvec3 wind_mps{0.0};  // mean wind at the head, world
   bool has_waves = false;
@@ -101,7 +101,7 @@ struct StepTick {
   std::vector<glm::dvec3> body_before_m;  // at its beginning; empty: as at its end
   bool has_body = false;
   bool is_body_new = false;
-  /// How the chest is turned at its end; as before it began, unless that is told.
+  /// Rotation of the chest at the end of the tick; unchanged by default.
   BustCode bust = kRigidBust;
   std::optional<BustTurn> bust_before = {};
 };

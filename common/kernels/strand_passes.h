@@ -1,6 +1,6 @@
-// The kernels that act on strands besides a model's own, around each substep: what they are made of and what
-// they look up. For whoever runs them: the simulation on its executor, the strand codec "step" on lanes. In
-// their order: drag before the model's kernel; bending, follicles, body and head field after it.
+// The kernels that act on strands besides a model's own, around each substep: their parts and inputs. The
+// simulation runs them on its executor, the strand codec "step" on lanes. Their order is: drag before the
+// model's kernel; bending, follicles, body and head field after it.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// ToldField: a distance field as somebody else is told of it who takes the same steps (step_model.h):
-// distances in whole steps, near the surface only. Plain data, any thread.
+// ToldField: a distance field for a viewer that takes the same steps (step_model.h): distances in whole
+// steps, near the surface only. Plain data, any thread.
 #pragma once
 
 #include <cstdint>
@@ -10,10 +10,10 @@
 
 namespace strandcast {
 
-/// Of distances; a third of the finest bound of a stream.
+/// Step of distances: a third of the finest bound of a stream.
 inline constexpr float kToldFieldStepM = 1.0f / 65536.0f;
-/// What is further outside, or deeper inside, is told as this far: no strand is turned there, and none comes
-/// from there. Cells away from the surface then cost next to nothing.
+/// Largest distance that is sent: no strand is turned farther outside, and none comes from deeper inside.
+/// Cells away from the surface then cost next to nothing.
 inline constexpr double kToldOutsideM = 0.015;
 inline constexpr double kToldInsideM = 0.04;
 /// A finer field is not told of: strands are predicted without it.

@@ -51,8 +51,8 @@ class NetStream {
   /// Gives back what was read too far: the next reads begin with it. Not while a read is under way.
   void put_back(std::span<const std::byte> bytes);
 
-  /// From the next read on so many bytes can be read in all, and then reading fails with message_size. Until
-  /// limit_reading(kNoReadLimit), which is how a stream begins.
+  /// Limits the bytes of all later reads together; after them reading fails with message_size. A stream
+  /// begins with kNoReadLimit, which lifts the limit.
   void limit_reading(uint64_t bytes);
   static constexpr uint64_t kNoReadLimit = ~uint64_t{0};
 

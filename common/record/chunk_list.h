@@ -40,7 +40,7 @@ struct ChunkList {
 Status check_is_recording(ByteSource& source);
 /// Begins with the magic and a header of ours, or BadInput.
 Result<ChunkList> list_chunks(ByteSource& source);
-/// Likewise, never by the index.
+/// Lists the chunks by walking over the records, never by the index.
 Result<ChunkList> walk_chunks(ByteSource& source);
 
 /// A chunk in memory, its CRC checked.

@@ -109,7 +109,7 @@ void append(const Header& record, Bytes& bytes);
 void append(const Schema& record, Bytes& bytes);
 void append(const Channel& record, Bytes& bytes);
 void append(const Message& record, Bytes& bytes);
-/// With its records.
+/// Appends the chunk with its records.
 void append(const Chunk& record, Bytes& bytes);
 void append(const MessageIndex& record, Bytes& bytes);
 void append(const ChunkIndex& record, Bytes& bytes);

@@ -1,6 +1,6 @@
 // McapWriter: an MCAP file record by record: schemas and channels first, then chunks, each with the indexes
-// of its messages behind it, and the index of all in the end. Without the end it is a file that readers of
-// streams read. One thread; whoever takes the bytes may write them on another.
+// of its messages after it, and the index of all chunks at the end. Without that end it is a file that
+// readers of streams can read. One thread; the sink may write the bytes on another.
 #pragma once
 
 #include <cstddef>
@@ -40,8 +40,8 @@ class McapWriter {
   McapWriter(ByteSink& sink, const Header& header, std::vector<Schema> schemas,
              std::vector<Channel> channels);
 
-  /// False when there was no room; then nothing of it is in the file. `records` are those of `body` as they
-  /// are to be in the file, and `compression` how: "" or "zstd".
+  /// Returns false if there was no room; then nothing of it is in the file. `records` are those of `body` in
+  /// the form that the file gets, compressed by `compression`: "" or "zstd".
   bool write(const ChunkBody& body, std::span<const std::byte> records, const std::string& compression,
              bool is_vital);
   /// The end: with it the file is whole. Nothing can be written after.

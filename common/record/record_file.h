@@ -1,5 +1,5 @@
-// RecordFile: a new file that is written on a thread of its own. Whoever gives it bytes never waits for the
-// disk: what waits for it is bounded, and what finds no room is refused.
+// RecordFile: a new file that is written on a thread of its own. Its callers never wait for the disk: the
+// bytes that wait are bounded, and bytes without room are refused.
 #pragma once
 
 #include <condition_variable>
@@ -16,7 +16,7 @@
 
 namespace strandcast {
 
-/// What may wait for the disk, and so much more of what is vital.
+/// Bytes that may wait for the disk, and further bytes that are kept for vital chunks.
 inline constexpr uint64_t kMaxWaitingBytes = 64u << 20;
 inline constexpr uint64_t kVitalBytes = 16u << 20;
 

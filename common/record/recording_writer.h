@@ -1,6 +1,6 @@
-// RecordingWriter: puts what happens on a server into the chunks of a recording: what comes often several in
-// one message, compressed where that takes fewer bytes. A keyframe is a chunk of its own, as it is, so that
-// whoever looks for one reads no other. One thread.
+// RecordingWriter: writes the events of a server into the chunks of a recording. Frequent events share a
+// message, and chunks are compressed where that takes fewer bytes. A keyframe is an uncompressed chunk of its
+// own, so that a reader finds it without reading others. One thread.
 #pragma once
 
 #include <cstdint>
@@ -27,14 +27,14 @@ class RecordingWriter {
   void add(int64_t time_ns, const EncodedFrame& frame);
   /// All that was added is given to the sink, as far as it takes it.
   void flush();
-  /// Likewise, then start and asset once more, where damage to the first ones would cost all, and the index.
-  /// Nothing can be added after.
+  /// Does what flush() does, then writes start and asset again, since damage to the first ones would cost the
+  /// whole file, and the index. Nothing can be added after it.
   void finish();
 
   uint64_t size_bytes() const { return file_.size_bytes(); }
-  /// So much was lost since start before it could be added.
+  /// Sets what was lost since the start before it could be added.
   void note_lost(const RecordedLoss& outside) { lost_outside_ = outside; }
-  /// That, and what the sink did not take.
+  /// Returns what was lost before it was added, and what the sink refused.
   RecordedLoss lost() const;
 
  private:

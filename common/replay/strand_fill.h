@@ -15,14 +15,14 @@ namespace strandcast {
 
 class StrandFill {
  public:
-  /// Without a rest shape nothing can be filled in.
+  /// Makes an object without a rest shape, which fills nothing in.
   StrandFill() = default;
   /// `rest_in_head_m`: of all strands, (vertex_count x strand_count), strand fastest.
   StrandFill(std::span<const glm::vec3> rest_in_head_m, uint32_t vertex_count);
 
-  /// Head-space positions of all strands, (vertex_count x strand_count), strand fastest: those of the
-  /// snapshot as they are, the others filled in. Just the snapshot's when it has all strands or nothing is
-  /// known of others.
+  /// Returns head-space positions of all strands, (vertex_count x strand_count), strand fastest. Strands of
+  /// the snapshot are copied, the others are filled in. Returns only the snapshot's strands if it has all, or
+  /// if there is no rest shape.
   std::vector<glm::vec3> positions(const Snapshot& snapshot);
 
  private:

@@ -99,7 +99,7 @@ struct Context {
   /// True when one more may wait for its Hello. One between two requests gives its place first; among
   /// strangers then the oldest of the address that has most.
   bool make_place(const Peer& peer);
-  /// Those that have joined.
+  /// Returns the sessions that have joined.
   SessionList list_sessions(int64_t time_ns) const;
   /// Ends a session; false when there is none of this number.
   bool kick(SessionId id);

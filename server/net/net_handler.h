@@ -41,7 +41,7 @@ struct LinkState {
   std::vector<double> strand_bytes_per_s;  // what each strand class takes by its codec; empty = unknown
 };
 
-/// What a viewer is told about its mode. If its subscription is changing, it is sent before the first frame
+/// Answer to a viewer about its mode. If its subscription is changing, it is sent before the first frame
 /// of the new mode. Otherwise it is sent at once, and a change in progress is cancelled.
 struct ModeAnswer {
   ModeChange change;

@@ -58,7 +58,7 @@ struct NetHead {
 
 class NetServer {
  public:
-  /// Opens the port and closes it again: what listen() would refuse is told before a scene is built.
+  /// Opens the port and closes it again, so that an error of listen() is known before a scene is built.
   static Status check_port(const NetConfig& config);
   /// Opens the port; connections wait until start(). A Hello without a name gets the first of `heads`, whose
   /// handler also answers for /metrics. Unavailable if the port is in use, BadInput for an invalid address,

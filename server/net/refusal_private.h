@@ -1,5 +1,5 @@
-// Why somebody is not let in, or not kept: the word in the log and the counter in /metrics. SECURITY.md says
-// what the words mean to whoever reads the log.
+// Reasons for which a peer is refused or dropped: the word in the log and the counter in /metrics.
+// SECURITY.md explains the words.
 #pragma once
 
 #include <cstdint>

@@ -24,7 +24,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   Session(Context& context, SessionId id, NetStream stream, Peer peer);
 
-  /// Answers the upgrade request. With `has_room` false the session is told so and closed.
+  /// Answers the upgrade request. With `has_room` false the session gets a Goodbye and is closed.
   void start(http::request<http::empty_body> request, bool has_room);
 
   void deliver_strands(const EncodedFramePtr& frame);

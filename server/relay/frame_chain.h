@@ -15,7 +15,7 @@ namespace strandcast {
 inline constexpr int64_t kChainNs = 1'000'000'000;
 /// after so long in any case.
 inline constexpr int64_t kLongestChainNs = 2'000'000'000;
-/// One that does not get it in so many frames or bytes of deltas is of no use any more.
+/// Largest number of deltas that a joining viewer waits for a keyframe; a longer chain is dropped.
 inline constexpr size_t kMaxChainFrames = 240;
 inline constexpr size_t kMaxChainBytes = 16u << 20;
 

@@ -29,7 +29,7 @@ class Relay {
   Relay& operator=(const Relay&) = delete;
 
   uint16_t port() const { return net_->port(); }
-  /// Of all heads, each counted.
+  /// Returns the number of viewers of all heads together.
   uint32_t viewer_count() const;
   UpstreamCounters counters() const;
   NetCounters net_counters() const { return net_->counters(); }

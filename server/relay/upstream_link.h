@@ -56,7 +56,7 @@ class UpstreamLink {
   void request_keyframe();
   /// Ends the present session as if it were lost for this reason.
   void lose(Error error);
-  /// Of the present session.
+  /// Returns the clock offset of the current session.
   ClockOffset clock() const;
   /// Payload of all sessions.
   uint64_t received_bytes() const;

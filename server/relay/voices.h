@@ -20,9 +20,10 @@ namespace strandcast {
 
 /// At once: of the sessions that a server has for one address the relay's streams need some, too.
 inline constexpr size_t kMaxVoices = 40;
-/// Of those who only watch: the others are kept for controllers, sources and admins.
+/// Largest number of voices of sessions that only watch; the others are kept for controllers, sources and
+/// admins.
 inline constexpr size_t kMaxWatchersVoices = 24;
-/// Of one address, of those who only watch, and as many of the others.
+/// Largest number of voices of one address: for sessions that only watch, and again for all others.
 inline constexpr size_t kMaxVoicesPerAddress = 12;
 /// One by which nothing was said for so long ends, unless it brings pictures or what is watched. Longer than
 /// the steps of a command take (kLongestStepsNs).
@@ -32,7 +33,7 @@ inline constexpr size_t kMaxQuestionsOfOne = 4;
 /// After a refusal the next try for the same viewer comes no sooner.
 inline constexpr int64_t kSpeakAgainNs = 2'000'000'000;
 
-/// Who says something at a relay.
+/// Session at a relay that says something.
 struct Speaker {
   SessionId session = 0;
   const Hello& hello;

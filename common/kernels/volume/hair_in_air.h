@@ -66,7 +66,7 @@ inline double carried_air_share(const AirDesc& air, double hairs_per_m2, double 
   return pulled / (pulled + reynolds);
 }
 
-/// Of the drag across a hair, what there is along it (slender bodies at low Reynolds numbers).
+/// Share of the drag across a hair that acts along it (slender bodies at low Reynolds numbers).
 inline constexpr double kAlongShare = 0.5;
 /// Air also goes around hair that lets little through: of its momentum, that of a drag coefficient of 2, a
 /// solid cylinder takes 1.1. 1 - sqrt(1.1 / 2).
@@ -77,8 +77,8 @@ inline double met_wind_share(double carried_share) {
   return 1.0 - kAroundShare * carried_share;
 }
 
-/// Of the speed of a wind, what reaches the hair behind others whose drag adds up over `hairs_per_m` hairs on
-/// a metre across the wind.
+/// Returns the share of a wind's speed that reaches hair behind other hair. The drag of that hair adds up
+/// over `hairs_per_m` hairs on a metre across the wind.
 inline double arriving_wind_share(const AirDesc& air, double hairs_per_m, double speed_mps) {
   return std::exp(-hairs_per_m * stopping_width_m(air, speed_mps));
 }

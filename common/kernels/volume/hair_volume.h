@@ -34,7 +34,7 @@ struct VolumeStrands {
   uint32_t vertex_count = 0;
   /// (vertex_count x strand_count), strand fastest; w = length of the segment before a vertex
   std::span<const glm::vec4> rest_in_head_m;
-  /// Of each strand, how many hairs it stands for, where that is not one; a strand of none is not there.
+  /// Number of hairs that each strand stands for, empty if it is one; a strand of 0 hairs is left out.
   std::span<const float> hairs;
 };
 
@@ -72,7 +72,7 @@ class HairVolume {
   /// (blocks x vertex_count x 16) hair that a vertex stands for, m, or with several samples the segment
   /// before it.
   std::span<const float> sample_lengths_m() const { return length_m_; }
-  /// Of all strands.
+  /// Returns the length of all strands together.
   double length_m() const { return total_length_m_; }
   uint64_t size_bytes() const;
 

@@ -42,8 +42,8 @@ class VolumeLaw {
   void forget_rest_density() { rest_density_ = {}; }
   /// For a model that keeps the way of every vertex in the last substep, or does not.
   KernelDesc kernel(bool has_way) const;
-  /// Fills a table with the volume of the strands as they will be after this substep. Elements behind the
-  /// ones that are returned are left as they are.
+  /// Fills a table with the volume of the strands after this substep. Elements after the returned ones stay
+  /// unchanged.
   std::span<const glm::vec4> fill(const StepBlock& step, const VolumeState& state,
                                   std::span<glm::vec4> table);
 

@@ -15,7 +15,7 @@ namespace strandcast {
 /// Layers of cells that a strand can be in: lattice points -kMaxLayers / 2 to kMaxLayers / 2 along z. What is
 /// farther away, or no number, is outside.
 inline constexpr int32_t kMaxLayers = 2048;
-/// That leaves room for the margins of a grid.
+/// Largest distance from the centre in cells; it leaves room for the margins of a grid.
 inline constexpr float kVolumeReachCells = kMaxLayers / 2 - 32;
 /// Samples of a segment that is longer than a cell, at most.
 inline constexpr uint32_t kMaxSegmentSamples = 8;
@@ -74,7 +74,7 @@ struct VolumeSlab {
   glm::uvec3 nodes{0u};
   double* scratch = nullptr;        // 2 layers of nodes x 4, 64-byte aligned; zero before and after
   uint8_t* scratch_rows = nullptr;  // 2 x nodes.y; zero before and after
-  /// (nodes) velocity x length, length; rows that nothing is in are left as they are.
+  /// (nodes) velocity x length, length; empty rows stay unchanged.
   glm::vec4* sums = nullptr;
   uint8_t* rows = nullptr;  // (nodes.z x nodes.y) whether something is in a row of nodes
   // The layer of nodes behind the last layer of cells, which the next slab sums too.

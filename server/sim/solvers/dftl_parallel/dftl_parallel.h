@@ -1,9 +1,9 @@
 // Odd-even Dynamic Follow-The-Leader: every vertex at once, odd and even ones in turn, a few iterations.
 // Source: document 003, section 4.2.3 (optimised_gpu version), which leaves open where the iterations start
 // and what a placement starts from. Here they start from the predicted directions laid end to end with exact
-// lengths, every placement starts again from the prediction (so two more vertices per strand are final after
-// each iteration, and half as many iterations as vertices give the serial result), and a finish lays the
-// segments end to end once more.
+// lengths. Every placement starts again from the prediction: two more vertices per strand are final after
+// each iteration, and half as many iterations as vertices give the serial result. A finish lays the segments
+// end to end once more.
 #pragma once
 
 #include "server/sim/solver_registry.h"

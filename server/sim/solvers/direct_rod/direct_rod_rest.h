@@ -74,7 +74,7 @@ struct RodJoint {
 RodJoint joint_at(const RodShape& shape, uint32_t i, const RodParameters& parameters,
                   const glm::dvec3& side_when_folded);
 
-/// The parameters with bending and twist so many times as stiff.
+/// Returns the parameters with the stiffness of bending and twist multiplied by `factor`.
 RodParameters stiffened(const RodParameters& parameters, double factor);
 
 RodRest make_rod_rest(const RodShape& shape, const RodParameters& parameters, double stiffening);
@@ -92,10 +92,10 @@ glm::dvec3 untwisted_axis(const glm::dvec3& axis, const glm::dvec3& from, const 
 double soft_length_m(double segment_m, double mean_segment_m);
 
 /// Stiffness of the joint at the clamp, moment per angle over mass per length. With tension T the angle
-/// decays from the clamp over sqrt(b / T); the factor 1 + kappa / 2 + sqrt(1 + kappa^2 / 4), kappa^2 =
-/// T l^2 / b, over b / l is the one with which edges of length l reach the continuous rod's displacement
-/// behind that layer (difference equation c (2 t_i - t_(i-1) - t_(i+1)) = -T l t_i summed up); 2 b / l, the
-/// clamp at the vertex, without tension.
+/// decays from the clamp over sqrt(b / T). The stiffness is b / l times 1 + kappa / 2 + sqrt(1 + kappa^2 / 4)
+/// with kappa^2 = T l^2 / b. With it edges of length l reach the continuous rod's displacement beyond that
+/// layer (sum of the difference equation c (2 t_i - t_(i-1) - t_(i+1)) = -T l t_i). Without tension it is
+/// 2 b / l, the clamp at the vertex.
 double clamp_stiffness(double stiffness_m4ps2, double tension_m2ps2, double segment_m);
 
 // Penalty of the multiplier's update, over (length / step)^2: the square of how often a wave of stretch

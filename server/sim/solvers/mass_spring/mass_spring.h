@@ -20,7 +20,7 @@
 //   0 symplectic Euler   v' = v_p + h f(x) / (m s),  x' = x + h v'
 //   1 Verlet             the same with f at x + h v / 2 and x' = x + h (v + v') / 2: the points where f is
 //                        taken obey 002's x(t + h) = 2 x(t) - x(t - h) + a h^2
-//   2 backward Euler     m s (x' - p) = h^2 f(x'), by Newton's method from the motion going on as it is,
+//   2 backward Euler     m s (x' - p) = h^2 f(x'), by Newton's method from the unchanged motion,
 //                        with the lengths that the springs have; springs under pressure without their
 //                        negative stiffness, so that the matrix stays positive
 // Then segments longer or shorter than the limit are cut to it from root to tip (Selle section 4.2), and
@@ -49,7 +49,7 @@ struct MassSpringParameters {
   double stretch_limit = 0.0;        // relative
 };
 
-/// Of a spring to inertia, h^2 k / m, in backward Euler.
+/// Largest ratio of a spring to inertia, h^2 k / m, in backward Euler.
 inline constexpr double kMaxImplicitRatio = 3e4;
 // Largest curvature of the energies over that of a stretch spring with the same constant (times L^2 for
 // bending): |x_(i-1) - 2 x_i + x_(i+1)|^2 against |x_i - x_(i-1)|^2 on a zigzag, 16 to 4; three unit
@@ -61,9 +61,8 @@ MassSpringParameters read_mass_spring(const SolverParameters& parameters);
 
 /// Largest h^2 k / m + 2 h c / m of the stiffest combination of springs on the lightest vertex; explicit
 /// steps are stable up to 1. With m = density x shortest segment, sum |x_i - x_(i-1)|^2 <= 4 m^-1 sum m_i
-/// |x_i|^2, so that the square of the highest frequency is at most 4 (k + 4 K / L^2 + 9 a) / m, and h^2 w^2 +
-/// 2 h d < 4 is where z^2 - (2 - h d - h^2 w^2) z + 1 - h d has its roots inside the unit circle, d = 4 c /
-/// m.
+/// |x_i|^2. So the square of the highest frequency is at most 4 (k + 4 K / L^2 + 9 a) / m. The roots of
+/// z^2 - (2 - h d - h^2 w^2) z + 1 - h d lie inside the unit circle where h^2 w^2 + 2 h d < 4, d = 4 c / m.
 double explicit_load(const MassSpringParameters& parameters, double substep_s);
 
 SolverRow mass_spring_row();
