@@ -13,8 +13,9 @@
 // direction of a segment turns with the one before.
 //
 // There and back, because that is stable at any step. A sweep changes the strand by B times the gradient,
-// with B symmetric and below the inverse of the second derivative. So a mode's factor per step has the square 1 -
-// (its share) < 1. From root to tip alone B is not symmetric, and strands of 16 vertices never come to rest.
+// with B symmetric and below the inverse of the second derivative. So a mode's factor per step has the
+// square 1 - (its share) < 1. From root to tip alone B is not symmetric, and strands of 16 vertices never
+// come to rest.
 //
 // Known faults that stay: a segment turns as if those beyond only moved along with it, which makes it too
 // heavy, so a strand falls and swings too slowly unless the sweep is repeated; without end it is the
