@@ -31,9 +31,10 @@ inline constexpr int64_t kRecordFlushNs = 1'000'000'000;
 /// that decoding up to any moment may take; it bounds the longest interval. A keyframe takes as many bytes as
 /// many seconds of deltas.
 inline constexpr int64_t kRecordKeyframeNs = 2'000'000'000;
-/// A keyframe is due after so long whatever decoding takes: damage to one frame costs no more than that.
-inline constexpr int64_t kRecordMostKeyframeNs = 5'000'000'000;
 inline constexpr double kRecordSeekMs = 170.0;
+/// A keyframe is requested after this time whatever decoding takes, and comes within a second: damage to one
+/// frame costs at most 5 s.
+inline constexpr int64_t kRecordMostKeyframeNs = 4'000'000'000;
 /// Decoding costs per vertex: of a frame without prediction, of a predicted frame without its steps, and of a
 /// step of dftl. Measured by scrub_bench.
 inline constexpr double kRecordDecodeNs = 36.0;

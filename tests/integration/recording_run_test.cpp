@@ -123,8 +123,11 @@ TEST_F(RecordedRun, HasAKeyframeWithinFiveSeconds) {
   recorded.is_lockstep = true;
   ASSERT_TRUE(start(recorded));
   constexpr double kRunS = 12.0;
-  const auto count = static_cast<uint32_t>(kRunS * recorded.scene.step_rate_hz);
-  EXPECT_EQ(run_command(ctl_target(), ControlCommand{Command::StepOnce, count}), kDoneExit);
+  // In pieces, so that the keyframe that is requested comes soon in simulated time too.
+  constexpr double kPieceS = 0.5;
+  const auto count = static_cast<uint32_t>(kPieceS * recorded.scene.step_rate_hz);
+  for (double done_s = 0.0; done_s < kRunS; done_s += kPieceS)
+    EXPECT_EQ(run_command(ctl_target(), ControlCommand{Command::StepOnce, count}), kDoneExit);
   server_->stop();
   server_.reset();
   const auto reader = RecordingReader::open(path_);
@@ -133,8 +136,7 @@ TEST_F(RecordedRun, HasAKeyframeWithinFiveSeconds) {
   times_ns.push_back((*reader)->info().last_sim_time_ns);
   EXPECT_GE(times_ns.back(), static_cast<int64_t>(0.9 * kRunS * kNsPerS));
   for (size_t i = 1; i < times_ns.size(); ++i)
-    EXPECT_LE(times_ns[i] - times_ns[i - 1], kRecordMostKeyframeNs + static_cast<int64_t>(0.2 * kNsPerS))
-        << "a keyframe comes a few frames after it was asked for";
+    EXPECT_LE(times_ns[i] - times_ns[i - 1], static_cast<int64_t>(5.0 * kNsPerS));
 }
 
 TEST_F(RecordedRun, SaysWhoChangedWhatAndWhatCameIn) {

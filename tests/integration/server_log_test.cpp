@@ -87,7 +87,7 @@ TEST_F(ServerLog, ABlockAndARateHaveTheirLines) {
   config.limits.connections_per_s = 3.0;
   start(config);
   say_hello(hello(Role::Viewer, "wrong"));
-  say_hello(hello(Role::Viewer, kToken));
+  say_hello(hello(Role::Viewer, "wrong too"));
   EXPECT_EQ(refused("blocked"), 1u);
   constexpr int kAttempts = 50;
   for (int i = 0; i < kAttempts && refused("rate") == 0; ++i)

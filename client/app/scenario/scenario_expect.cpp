@@ -272,6 +272,8 @@ void ScenarioRun::expect_picture(const ScenarioExpect& expect) {
     if (!lies_below(golden_path, scenario_.folder))
       return report(what, "written anew",
                     fmt::format("{} does not lie below the scenario's folder", golden_path.string()), false);
+    std::error_code ignored;  // save_png() says what is wrong with the folder
+    std::filesystem::create_directories(golden_path.parent_path(), ignored);
     const Status saved = save_png(golden_path, *seen);
     return report(what, "written anew", saved ? golden_path.string() : saved.error().to_string(), saved.ok());
   }
