@@ -14,7 +14,8 @@ Result<VideoFrameInfo> read_vp8_info(std::span<const std::byte> frame);
 
 Result<std::unique_ptr<VideoEncoder>> make_h264_encoder(const VideoConfig& config);
 Result<std::unique_ptr<VideoDecoder>> make_h264_decoder();
-/// Whether the build has H.264 and its library is there, which is loaded only where it has to be searched for.
+/// Whether the build has H.264 and its library is there, which is loaded only where it has to be searched
+/// for.
 bool is_h264_installed();
 
 /// Size of the rate control's buffer in seconds, by which both codecs may exceed the bit rate for a while.

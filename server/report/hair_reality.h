@@ -1,5 +1,5 @@
-// Compares simulated hair in air with known results: hairs and locks that lean in a steady wind, air held back
-// by a bundle, and the sway of a ponytail under a head that moves up and down.
+// Compares simulated hair in air with known results: hairs and locks that lean in a steady wind, air held
+// back by a bundle, and the sway of a ponytail under a head that moves up and down.
 #pragma once
 
 #include <functional>

@@ -30,8 +30,8 @@ Groom simulated_groom(const Groom& groom, const SimulatedPart& part);
 
 class FollowedSolver : public Solver {
  public:
-  /// Wraps `guides`, which must own its strands. `head_field` is what they collide with besides spheres; null:
-  /// nothing.
+  /// Wraps `guides`, which must own its strands. `head_field` is what they collide with besides spheres;
+  /// null: nothing.
   FollowedSolver(std::unique_ptr<Solver> guides, SimulatedPart part,
                  std::shared_ptr<const DistanceField> head_field = nullptr)
       : guides_(std::move(guides)), part_(part) {

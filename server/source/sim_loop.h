@@ -58,8 +58,9 @@ struct SimLoopConfig {
   int64_t longest_steps_ns = kLongestStepsNs;
 };
 
-/// Largest number of commands that may wait for the simulation thread; each can require a new solver. Sessions
-/// take turns. If it is reached, the session with most commands gives up one for a session with fewer.
+/// Largest number of commands that may wait for the simulation thread; each can require a new solver.
+/// Sessions take turns. If it is reached, the session with most commands gives up one for a session with
+/// fewer.
 inline constexpr size_t kMaxPendingJobs = 32;
 /// Largest share of the time that commands may take, so that many changes of solver do not stop the hair.
 inline constexpr double kJobShare = 0.25;
