@@ -31,7 +31,8 @@ fleet() { python3 deploy/fleet/strandcast-fleet "$@"; }
 pids=()
 stop_all() {
   trap - EXIT INT TERM
-  for name in one two three; do fleet stop $name > /dev/null 2>&1 || true; done
+  # Those that somebody started by hand meanwhile too.
+  for folder in "$STRANDCAST_FLEET"/sessions/*/; do fleet stop "$(basename "$folder")" > /dev/null 2>&1 || true; done
   # Slurm ends jobs; without it their last steps would wait for it.
   for _ in $(seq 150); do [ -n "$(squeue --noheader 2> /dev/null)" ] || break; sleep 0.1; done
   for ((i = ${#pids[@]} - 1; i >= 0; --i)); do kill "${pids[i]}" 2> /dev/null || true; done

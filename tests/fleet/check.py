@@ -81,6 +81,12 @@ def row(name):
     return next((line for line in fleet("list").splitlines() if line.split()[0] == name), "")
 
 
+def server_of(name):
+    """Number of its process, below the job's own."""
+    parent = (work / "slurm" / (work / f"fleet/sessions/{name}/server/job").read_text() / "pid").read_text()
+    return int(Path(f"/proc/{parent}/task/{parent}/children").read_text().split()[0])
+
+
 def stop(child):
     child.send_signal(signal.SIGTERM)
     child.wait(20)
@@ -105,8 +111,11 @@ def main():
     said = fleet("start", "one", *SMALL)
     assert "one is ready after" in said, said
     assert get("/s/one/readyz") == (200, "ready\n")
-    token = next(line.split()[1] for line in said.splitlines() if line.split()[0] == "viewer")
-    looked = subprocess.run([programs / "strandcast-ctl", "--connect", f"ws://127.0.0.1:{port}/s/one", "--token", token,
+    tokens = (work / "fleet/sessions/one/tokens").read_text().split()[1::2]
+    assert len(tokens) == 4 and not any(token in said for token in tokens), "tokens are in files alone"
+    token_file = work / "fleet/sessions/one/viewer_token"
+    assert f"--token-file {token_file}" in said and token_file.stat().st_mode & 0o077 == 0, said
+    looked = subprocess.run([programs / "strandcast-ctl", "--connect", f"ws://127.0.0.1:{port}/s/one", "--token-file", token_file,
                              "check", "--frames", "20"], capture_output=True, text=True, timeout=60, check=False)
     assert looked.returncode == 0, looked.stdout + looked.stderr
     assert get("/s/other/")[0] == 404 and get("/")[0] == 404
@@ -116,8 +125,11 @@ def main():
     assert "is no name of a session" in fleet("start", "../one", expect=2)
     assert "there is no session called two" in fleet("stop", "two", expect=2)
     said = fleet("start", "wrong", "--", "--set", "nonsense=1", expect=2)
+    assert "strandcast-fleet: strandcast-server: --set nonsense=1: a scene has no field" in said, said
+    assert not row("wrong"), "nothing was queued"
+    said = fleet("start", "wrong", "--unchecked", "--", "--set", "nonsense=1", expect=2)
     assert "wrong failed: strandcast-server: --set nonsense=1: a scene has no field" in said, said
-    assert "failed:" in row("wrong")
+    assert "failed:" in row("wrong") and "(exit code 2)" in row("wrong"), row("wrong")
     until(lambda: get("/s/wrong/")[0] == 404, "nobody waits for it")
     fleet("stop", "wrong")
 
@@ -148,11 +160,17 @@ def main():
     until(lambda: row("three").split()[2] == "1" and not relay.exists(), "another relay")
     until(lambda: get("/s/three/readyz")[0] == 200, "it answers")
 
-    # A server that dies is said to have, and nothing leads to it.
-    job = (work / "slurm" / (work / "fleet/sessions/one/server/job").read_text() / "pid").read_text()
-    os.killpg(int(job), signal.SIGKILL)
-    until(lambda: "failed:" in row("one"), "it has died")
-    until(lambda: get("/s/one/readyz")[0] in (404, 503), "nobody is led there")
+    # A server that crashes is started again where it was, and its relay finds it; a job that is lost is submitted again.
+    crashed = server_of("three")
+    os.kill(crashed, signal.SIGSEGV)
+    until(lambda: "ready, started again 1 time: killed by SIGSEGV" in row("three"), "it is back")
+    until(lambda: row("three").split()[2] == "1", "its relay too")
+    assert server_of("three") != crashed
+    lost = (work / "fleet/sessions/one/server/job").read_text()
+    os.killpg(int((work / "slurm" / lost / "pid").read_text()), signal.SIGKILL)
+    until(lambda: "ready, started again 1 time: its job was lost" in row("one"), "another job")
+    assert (work / "fleet/sessions/one/server/job").read_text() != lost
+    until(lambda: get("/s/one/readyz")[0] == 200, "it is led to")
 
     # Drained: nobody is in it, so it goes.
     fleet("drain", "three")
