@@ -26,6 +26,28 @@ if(STRANDCAST_SANITIZE)
   target_link_options(strandcast_flags INTERFACE -fsanitize=${STRANDCAST_SANITIZE})
 endif()
 
+# Kernels are compiled for several instruction sets (common/simd/variants.h), or for the widest that this machine has.
+set(strandcast_has_sets OFF)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64" AND NOT STRANDCAST_SANITIZE)
+  set(strandcast_has_sets ON)
+  set(strandcast_sets plain avx2 avx512)
+  if(STRANDCAST_INSTRUCTION_SETS STREQUAL "native")
+    execute_process(COMMAND ${CMAKE_CXX_COMPILER} -march=native -dM -E -x c++ /dev/null OUTPUT_VARIABLE native_macros
+      COMMAND_ERROR_IS_FATAL ANY)
+    set(only_set 0)
+    if(native_macros MATCHES "__AVX512F__" AND native_macros MATCHES "__AVX512VL__"
+        AND native_macros MATCHES "__AVX512DQ__" AND native_macros MATCHES "__AVX512BW__")
+      set(only_set 2)
+    elseif(native_macros MATCHES "__AVX2__")
+      set(only_set 1)
+    endif()
+    list(GET strandcast_sets ${only_set} strandcast_sets)
+    target_compile_definitions(strandcast_flags INTERFACE STRANDCAST_ONLY_SET=${only_set})
+  elseif(NOT STRANDCAST_INSTRUCTION_SETS STREQUAL "all")
+    message(FATAL_ERROR "STRANDCAST_INSTRUCTION_SETS is all or native, not ${STRANDCAST_INSTRUCTION_SETS}")
+  endif()
+endif()
+
 # lld links in a quarter of the time of ld; it does not read what GCC leaves for optimisation at link time.
 find_program(STRANDCAST_LLD ld.lld)
 if(STRANDCAST_LLD AND NOT CMAKE_INTERPROCEDURAL_OPTIMIZATION AND NOT EMSCRIPTEN)

@@ -90,7 +90,7 @@ trap 'stop_all; exit 0' INT TERM
 run() { "$@" & groups+=("$!"); wait "$!"; }
 
 build() {
-  cmake --preset release -DBUILD_TESTING=OFF ${web:+-DSTRANDCAST_WEB=ON} >/dev/null \
+  cmake --preset release -DBUILD_TESTING=OFF -DSTRANDCAST_INSTRUCTION_SETS=native ${web:+-DSTRANDCAST_WEB=ON} >/dev/null \
     && cmake --build --preset release --target strandcast-server strandcast-view strandcast-ctl
 }
 run build >"$out/build.log" 2>&1 \

@@ -7,6 +7,7 @@
 #include "client/app/ctl_table.h"
 #include "client/app/stop_signal.h"
 #include "client/app/view_options.h"
+#include "common/base/command_line_error.h"
 #include "common/base/output_file.h"
 #include "common/base/version.h"
 #include "common/log/log.h"
@@ -60,6 +61,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", fmt::format("strandcast-ctl {}", version()));
   CtlCommandLine line;
   std::string log_level = "warn";
+  app.failure_message(command_line_failure);
   app.require_subcommand(1);
   app.fallthrough();  // --connect may stand behind the sub-command too
   declare_target(app, line.target);

@@ -308,7 +308,7 @@ Status render_snapshots(const ViewOptions& options, const Drawn& scene, const Co
   if (options.clip.empty()) return {};
   ASSIGN_OR_RETURN(ClipWriter clip, ClipWriter::make(options.clip, options.clip_fps));
   const auto& snapshots = collected.clip.snapshots();
-  Progress progress({"drawing the clip"});
+  Progress progress({"drawing the clip", false, "picture"});
   progress.expect(static_cast<uint32_t>(snapshots.size()), static_cast<double>(snapshots.size()));
   for (size_t i = 0; i < snapshots.size(); ++i) {
     if (stop) return {};

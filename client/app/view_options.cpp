@@ -7,6 +7,7 @@
 
 #include "client/app/recording_film.h"
 #include "client/app/step_speed.h"
+#include "common/base/command_line_error.h"
 #include "common/base/version.h"
 #include "common/client/client_token.h"
 #include "common/strands/strand_codec.h"
@@ -224,6 +225,7 @@ ViewCommandLine read_view_command_line(int argc, const char* const* argv) {
   CLI::App app("Strandcast viewer: shows the hair of a running strandcast-server, or of a recording.",
                "strandcast-view");
   app.set_version_flag("--version", fmt::format("strandcast-view {}", version()));
+  app.failure_message(command_line_failure);
   RawOptions raw;
   ViewOptions options;
   declare(app, raw, options);

@@ -179,6 +179,12 @@ std::string to_summary(const ViewReport& report) {
                                           v("dropped_by_server"), v("missed_frames"), v("dropped_by_client"));
   const std::string slow = v("server_slow_motion");
   const bool was_away = v("reconnects") != "0" || v("outage_s") != "0.00";
+  const std::string motion =
+      v("motion_samples_seen") == "0"
+          ? std::string("no head motion came")
+          : fmt::format("{} ms median, {} ms p99 ({} samples, clock +-{} ms)",
+                        v("motion_to_decoded_ms_median"), v("motion_to_decoded_ms_p99"),
+                        v("motion_samples_seen"), v("clock_error_ms"));
   const std::string outage = was_away
                                  ? fmt::format("  connection      found again {} times, {} s without one\n",
                                                v("reconnects"), v("outage_s"))
@@ -189,14 +195,13 @@ std::string to_summary(const ViewReport& report) {
       "  decoded         {} frames in {} s ({} per second), {} bytes per frame, {} Mbit/s\n"
       "  decode          {} ms (p99 {} ms)\n"
       "  render          {} ms ({} frames)\n"
-      "  motion->decoded {} ms median, {} ms p99 ({} samples, clock +-{} ms)\n"
+      "  motion->decoded {}\n"
       "  dropped         {}\n"
       "  server          {} ms per step, realtime factor {}\n{}{}",
       v("scene"), v("strands"), v("vertices_per_strand"), v("mode"), v("codec"), v("mode_reason"),
       v("decoded_frames"), v("seconds"), v("frames_per_s"), v("bytes_per_frame"), v("mbit_per_s"),
-      v("decode_ms_median"), v("decode_ms_p99"), v("render_ms_median"), v("rendered_pictures"),
-      v("motion_to_decoded_ms_median"), v("motion_to_decoded_ms_p99"), v("motion_samples_seen"),
-      v("clock_error_ms"), dropped, v("server_sim_ms"), v("server_realtime_factor"), outage,
+      v("decode_ms_median"), v("decode_ms_p99"), v("render_ms_median"), v("rendered_pictures"), motion,
+      dropped, v("server_sim_ms"), v("server_realtime_factor"), outage,
       slow == "none" || slow == "?" ? std::string() : fmt::format("  {}\n", slow));
 }
 

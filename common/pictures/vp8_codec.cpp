@@ -18,9 +18,17 @@ namespace {
 constexpr int kCpuUsed = -12;                // negative: a fixed speed, not one that follows the load
 constexpr uint32_t kFinestVp8Quantizer = 4;  // of 0..63
 constexpr uint32_t kCoarsestQuantizer = 63;
+constexpr uint32_t kFirstQuantizer = 30;
 constexpr double kVp8TicksPerS = 1000.0;
 /// What a keyframe may take, in percent of what an average frame does; about what it needs to look alike.
 constexpr uint32_t kKeyframePercent = 500;
+// libvpx guesses quantizers from pictures that are harder than hair before a plain ground. Its keyframes take
+// a tenth of what they may, and it needs ten pictures to learn that. So keyframes are encoded up to three
+// times until one fits, and the coarsest quantizer of the next picture follows the bytes of the last one.
+constexpr int kKeyframeTries = 3;
+constexpr double kLeastBudget = 0.25;        // of an average picture's bytes, while a debt is paid back
+constexpr double kKeyframeFill = 0.7;        // of what it may take: near enough
+constexpr double kQuantizersPerHalf = 11.0;  // steps of the quantizer by which the bytes of a picture halve
 constexpr auto kBufferMs = static_cast<unsigned>(1e3 * kVideoBufferS);
 constexpr unsigned kBufferInitialMs = 400, kBufferOptimalMs = 500;
 constexpr size_t kTagBytes = 3;
@@ -97,7 +105,48 @@ class Vp8Encoder : public VideoEncoder {
  private:
   Result<std::vector<std::byte>> code(const Image& image, VideoFrame frame, VideoRate rate) override {
     fill_planes(image, planes_of(*planes_));
-    RETURN_IF_ERROR(set_rate(rate));
+    if (frame == VideoFrame::Keyframe && rate == VideoRate::Target) return code_keyframe();
+    const uint32_t coarsest = rate == VideoRate::Finest ? kFinestVp8Quantizer : next_coarsest();
+    RETURN_IF_ERROR(set_rate({kFinestVp8Quantizer, coarsest}));
+    return code_planes(frame);
+  }
+
+  double average_bytes() const { return config().bits_per_s / config().rate_hz / 8.0; }
+
+  /// Returns the quantizer at which the next picture takes an average one's bytes, less what the last ones
+  /// took too much.
+  uint32_t next_coarsest() const {
+    const double average = average_bytes();
+    const double pictures_in_buffer = std::max(kVideoBufferS * config().rate_hz, 1.0);
+    const double budget = std::max(average - debt_bytes_ / pictures_in_buffer, kLeastBudget * average);
+    // Not finer than the last keyframe: a picture that changes as a whole would take more than that.
+    return std::max(coarser(last_quantizer_, last_bytes_ / budget), keyframe_quantizer_);
+  }
+
+  /// Returns the quantizer of pictures of 1 / `share` of the bytes.
+  static uint32_t coarser(uint32_t quantizer, double share) {
+    const double wanted = quantizer + kQuantizersPerHalf * std::log2(std::max(share, 1e-3));
+    return static_cast<uint32_t>(
+        std::clamp(std::lround(wanted), long{kFinestVp8Quantizer}, long{kCoarsestQuantizer}));
+  }
+
+  Result<std::vector<std::byte>> code_keyframe() {
+    const double budget_bytes = average_bytes() * kKeyframePercent / 100.0;
+    for (int i = 1;; ++i) {
+      const uint32_t quantizer = keyframe_quantizer_;
+      RETURN_IF_ERROR(set_rate({quantizer, quantizer}));
+      ASSIGN_OR_RETURN(std::vector<std::byte> bytes, code_planes(VideoFrame::Keyframe));
+      const double share = static_cast<double>(bytes.size()) / budget_bytes;
+      const bool fits = share <= 1.0 && share >= kKeyframeFill;
+      if (!fits) keyframe_quantizer_ = coarser(quantizer, share / ((1.0 + kKeyframeFill) / 2.0));
+      if (fits || i == kKeyframeTries || quantizer == keyframe_quantizer_) {
+        debt_bytes_ = 0.0;
+        return bytes;
+      }
+    }
+  }
+
+  Result<std::vector<std::byte>> code_planes(VideoFrame frame) {
     const vpx_enc_frame_flags_t flags = frame == VideoFrame::Keyframe ? VPX_EFLAG_FORCE_KF : 0;
     if (vpx_codec_encode(codec_.get(), planes_.get(), time_ticks_, static_cast<unsigned long>(frame_ticks_),
                          flags, VPX_DL_REALTIME) != VPX_CODEC_OK)
@@ -111,15 +160,25 @@ class Vp8Encoder : public VideoEncoder {
       bytes.insert(bytes.end(), begin, begin + packet->data.frame.sz);
     }
     if (bytes.empty()) return make_error(ErrorCode::Internal, "the VP8 encoder dropped a picture");
+    int quantizer = 0;
+    if (vpx_codec_control(codec_.get(), VP8E_GET_LAST_QUANTIZER_64, &quantizer) == VPX_CODEC_OK)
+      last_quantizer_ = static_cast<uint32_t>(std::clamp(quantizer, 0, static_cast<int>(kCoarsestQuantizer)));
+    last_bytes_ = static_cast<double>(bytes.size());
+    debt_bytes_ = std::max(debt_bytes_ + last_bytes_ - average_bytes(), 0.0);
     return bytes;
   }
 
-  Status set_rate(VideoRate rate) {
+  struct Quantizers {
+    uint32_t finest, coarsest;
+  };
+  Status set_rate(Quantizers allowed) {
     const unsigned target = kilobits(config().bits_per_s);
-    const uint32_t coarsest = rate == VideoRate::Finest ? kFinestVp8Quantizer : kCoarsestQuantizer;
-    if (target == vpx_.rc_target_bitrate && coarsest == vpx_.rc_max_quantizer) return {};
+    if (target == vpx_.rc_target_bitrate && allowed.finest == vpx_.rc_min_quantizer &&
+        allowed.coarsest == vpx_.rc_max_quantizer)
+      return {};
     vpx_.rc_target_bitrate = target;
-    vpx_.rc_max_quantizer = coarsest;
+    vpx_.rc_min_quantizer = allowed.finest;
+    vpx_.rc_max_quantizer = allowed.coarsest;
     if (vpx_codec_enc_config_set(codec_.get(), &vpx_) != VPX_CODEC_OK)
       return vpx_error("cannot change the VP8 encoder", codec_.get(), ErrorCode::Internal);
     return {};
@@ -130,6 +189,8 @@ class Vp8Encoder : public VideoEncoder {
   std::unique_ptr<vpx_image_t, FreePlanes> planes_;
   const int64_t frame_ticks_;
   int64_t time_ticks_ = 0;
+  uint32_t keyframe_quantizer_ = kFirstQuantizer, last_quantizer_ = kFirstQuantizer;
+  double last_bytes_ = 0.0, debt_bytes_ = 0.0;
 };
 
 class Vp8Decoder : public VideoDecoder {

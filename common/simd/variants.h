@@ -10,11 +10,12 @@
 
 namespace strandcast::simd {
 
-/// Instruction sets from the narrowest to the widest. Plain is the baseline of the architecture (SSE2, NEON).
-enum class InstructionSet { Plain, Sse4, Avx2, Avx512 };
+/// Instruction sets from the narrowest to the widest. Plain is the least that a build needs: SSE4.2 or NEON.
+enum class InstructionSet { Plain, Avx2, Avx512 };
 
 const char* to_string(InstructionSet set);
-/// Returns the sets that this processor supports, the widest last.
+/// Returns the sets that this build has and this processor supports, the widest last. Where there is none it
+/// ends the program, with a sentence on the standard error stream.
 std::span<const InstructionSet> instruction_sets();
 inline InstructionSet widest_set() {
   return instruction_sets().back();
@@ -28,39 +29,47 @@ inline InstructionSet widest_set() {
 #define STRANDCAST_HAS_SETS 0
 #endif
 
-#if STRANDCAST_HAS_SETS
-#define STRANDCAST_KERNEL(name, Arguments)                                                          \
-  __attribute__((flatten)) static void name##_plain(const Arguments& arguments) {                   \
-    name##_lanes(arguments);                                                                        \
-  }                                                                                                 \
-  __attribute__((flatten, target("sse4.2"))) static void name##_sse4(const Arguments& arguments) {  \
-    name##_lanes(arguments);                                                                        \
-  }                                                                                                 \
-  __attribute__((flatten, target("avx2"))) static void name##_avx2(const Arguments& arguments) {    \
-    name##_lanes(arguments);                                                                        \
-  }                                                                                                 \
-  __attribute__((flatten, target("avx512f,avx512vl,avx512dq,avx512bw"))) static void name##_avx512( \
-      const Arguments& arguments) {                                                                 \
-    name##_lanes(arguments);                                                                        \
-  }                                                                                                 \
-  void name(::strandcast::simd::InstructionSet set, const Arguments& arguments) {                   \
-    switch (set) {                                                                                  \
-      case ::strandcast::simd::InstructionSet::Plain:                                               \
-        return name##_plain(arguments);                                                             \
-      case ::strandcast::simd::InstructionSet::Sse4:                                                \
-        return name##_sse4(arguments);                                                              \
-      case ::strandcast::simd::InstructionSet::Avx2:                                                \
-        return name##_avx2(arguments);                                                              \
-      case ::strandcast::simd::InstructionSet::Avx512:                                              \
-        return name##_avx512(arguments);                                                            \
-    }                                                                                               \
-  }                                                                                                 \
+#define STRANDCAST_TARGET_PLAIN target("sse4.2")
+#define STRANDCAST_TARGET_AVX2 target("avx2")
+#define STRANDCAST_TARGET_AVX512 target("avx512f,avx512vl,avx512dq,avx512bw")
+
+#if STRANDCAST_HAS_SETS && !defined(STRANDCAST_ONLY_SET)
+#define STRANDCAST_KERNEL(name, Arguments)                                                                   \
+  __attribute__((flatten, STRANDCAST_TARGET_PLAIN)) static void name##_plain(const Arguments& arguments) {   \
+    name##_lanes(arguments);                                                                                 \
+  }                                                                                                          \
+  __attribute__((flatten, STRANDCAST_TARGET_AVX2)) static void name##_avx2(const Arguments& arguments) {     \
+    name##_lanes(arguments);                                                                                 \
+  }                                                                                                          \
+  __attribute__((flatten, STRANDCAST_TARGET_AVX512)) static void name##_avx512(const Arguments& arguments) { \
+    name##_lanes(arguments);                                                                                 \
+  }                                                                                                          \
+  void name(::strandcast::simd::InstructionSet set, const Arguments& arguments) {                            \
+    switch (set) {                                                                                           \
+      case ::strandcast::simd::InstructionSet::Plain:                                                        \
+        return name##_plain(arguments);                                                                      \
+      case ::strandcast::simd::InstructionSet::Avx2:                                                         \
+        return name##_avx2(arguments);                                                                       \
+      case ::strandcast::simd::InstructionSet::Avx512:                                                       \
+        return name##_avx512(arguments);                                                                     \
+    }                                                                                                        \
+  }                                                                                                          \
   static_assert(true)
 #else
-#define STRANDCAST_KERNEL(name, Arguments)                                    \
-  void name(::strandcast::simd::InstructionSet, const Arguments& arguments) { \
-    name##_lanes(arguments);                                                  \
-  }                                                                           \
+// One set: the only one that was asked for (STRANDCAST_INSTRUCTION_SETS=native), or the compiler's own.
+#if !STRANDCAST_HAS_SETS
+#define STRANDCAST_KERNEL_ATTRIBUTES
+#elif STRANDCAST_ONLY_SET == 2
+#define STRANDCAST_KERNEL_ATTRIBUTES __attribute__((flatten, STRANDCAST_TARGET_AVX512))
+#elif STRANDCAST_ONLY_SET == 1
+#define STRANDCAST_KERNEL_ATTRIBUTES __attribute__((flatten, STRANDCAST_TARGET_AVX2))
+#else
+#define STRANDCAST_KERNEL_ATTRIBUTES __attribute__((flatten, STRANDCAST_TARGET_PLAIN))
+#endif
+#define STRANDCAST_KERNEL(name, Arguments)                                                                 \
+  STRANDCAST_KERNEL_ATTRIBUTES void name(::strandcast::simd::InstructionSet, const Arguments& arguments) { \
+    name##_lanes(arguments);                                                                               \
+  }                                                                                                        \
   static_assert(true)
 #endif
 

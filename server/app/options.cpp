@@ -5,6 +5,7 @@
 #include <iterator>
 #include <variant>
 
+#include "common/base/command_line_error.h"
 #include "common/base/version.h"
 #include "common/log/log.h"
 #include "common/scene/scene_file.h"
@@ -227,9 +228,10 @@ void add_record_options(CLI::App& app, ServerOptions& options, RawRunOptions& ra
                      "into its own, run.mcap and for a head ben run-ben.mcap");
   app.add_flag("--record-replace", raw.replaces_recording, "the file of --record may be there: replace it")
       ->needs(path);
-  auto* folder = app.add_option("--record-dir", raw.record_folder,
-                                "who controls may begin and end recordings in this folder (strandcast-ctl "
-                                "record start NAME, record stop), of each head one at a time");
+  auto* folder = app.add_option(
+      "--record-dir", raw.record_folder,
+      "who controls may begin and end recordings in this folder, made if need be (strandcast-ctl "
+      "record start NAME, record stop), of each head one at a time");
   auto* replay =
       app.add_option("--replay", options.replay_path,
                      "simulate this recording again, compare the hash of every state, and leave: exit "
@@ -330,7 +332,7 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
   } catch (const CLI::CallForVersion&) {
     options.help = version_text() + "\n";
   } catch (const CLI::ParseError& error) {
-    return make_error(ErrorCode::BadInput, "{} (--help lists the options)", error.what());
+    return make_error(ErrorCode::BadInput, "{} (--help lists the options)", command_line_error(error));
   }
   constexpr double kBytesPerMbit = 125e3;
   options.config.net.limits.viewer_bytes_per_s = raw.viewer_mbit * kBytesPerMbit;

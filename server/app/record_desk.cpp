@@ -90,9 +90,10 @@ Result<std::unique_ptr<RecordDesk>> RecordDesk::make(const std::optional<RecordC
   if (whole) {
     std::error_code failure;
     whole->path = std::filesystem::absolute(whole->path, failure);
+    if (!failure) std::filesystem::create_directories(whole->path, failure);
     if (failure || !std::filesystem::is_directory(whole->path, failure))
       return at(folder->path.string(),
-                make_error(ErrorCode::NotFound, "there is no such folder for recordings (--record-dir)"));
+                make_error(ErrorCode::NotFound, "no folder for recordings can be made here (--record-dir)"));
   }
   std::unique_ptr<RecordDesk> desk(new RecordDesk(std::move(whole)));
   if (first) {

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <exception>
 
+#include "common/base/command_line_error.h"
 #include "common/log/log.h"
 #include "server/report/report_commands.h"
 
@@ -31,7 +32,8 @@ int run(int argc, const char* const* argv) {
     fmt::print("{}", app.help());
     return 0;
   } catch (const CLI::ParseError& error) {
-    fmt::print(stderr, "strandcast-report: {} (--help lists the commands and options)\n", error.what());
+    fmt::print(stderr, "strandcast-report: {} (--help lists the commands and options)\n",
+               command_line_error(error));
     return kExitBadInput;
   }
   init_log("warn");

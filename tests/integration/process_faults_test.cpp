@@ -201,7 +201,7 @@ TEST_F(ProcessFaults, ASignalEndsAViewerThatDrawsItsClip) {
       folder_.path() / "viewer.txt");
   const auto said = [&] { return text_of("viewer.txt"); };
   ASSERT_TRUE(eventually(
-      [&] { return viewer.has_ended() || said().find("drawing the clip: run 1 of ") != std::string::npos; }));
+      [&] { return viewer.has_ended() || said().find("drawing the clip: picture 1 of ") != std::string::npos; }));
   viewer.send_signal(SIGINT);
   EXPECT_TRUE(eventually([&] { return viewer.has_ended(); })) << said();
   EXPECT_FALSE(std::filesystem::exists(clip)) << "a clip is whole or not there";
@@ -239,7 +239,7 @@ TEST_F(ProcessFaults, ASignalToTheRunScriptEndsAllThatItStarted) {
                       folder_.path() / "script.txt");
   const auto said = [&] { return text_of("script.txt"); };
   const auto has_said = [&](const char* what) { return said().find(what) != std::string::npos; };
-  ASSERT_TRUE(eventually([&] { return script.has_ended() || has_said("drawing the clip: run 1 of "); }))
+  ASSERT_TRUE(eventually([&] { return script.has_ended() || has_said("drawing the clip: picture 1 of "); }))
       << said();
   if (test::lacks_gl(said())) GTEST_SKIP() << "needs OpenGL 4.5: " << said();
   script.send_signal(SIGTERM);

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include <atomic>
+#include <fstream>
 #include <map>
 
 #include "client/app/recording_commands.h"
@@ -231,11 +232,22 @@ TEST_F(RecordCommands, NeedAFolder) {
   EXPECT_THAT(stop_recording().text, HasSubstr("--record-dir"));
   EXPECT_TRUE(server_->counters().record);
   ServerConfig nowhere = config();
-  nowhere.record_folder->path = file("nowhere");
+  std::ofstream(file("in_the_way")) << "a file";
+  nowhere.record_folder->path = file("in_the_way") / "takes";
   nowhere.net.port = 0;
   const auto refused = Server::start(nowhere);
   ASSERT_FALSE(refused);
-  EXPECT_THAT(refused.error().to_string(), HasSubstr("no such folder"));
+  EXPECT_THAT(refused.error().to_string(), HasSubstr("no folder for recordings can be made here"));
+}
+
+TEST_F(RecordCommands, MakeAFolderThatIsMissing) {
+  ServerConfig missing = config();
+  missing.record_folder->path = file("deep") / "takes";
+  if (!start(missing)) return;
+  EXPECT_FALSE(start_recording("take").is_error);
+  record_states(5);
+  EXPECT_FALSE(stop_recording().is_error);
+  EXPECT_GT(check(file("deep") / "takes" / "take.mcap").states, 4u);
 }
 
 TEST_F(RecordCommands, EndWhereTheDiskGetsFull) {

@@ -10,7 +10,7 @@ cmake -S . -B "$folder/build" -DCMAKE_BUILD_TYPE=Release -DBUILD_TESTING=OFF >/d
 cmake --build "$folder/build" --target strandcast_lane_texts >/dev/null
 lanes="$folder/build/common/kernels/lanes"
 count=0
-for source in "$lanes"/lane_kernel_*_sse4.cpp; do
+for source in "$lanes"/lane_kernel_*_plain.cpp; do
   sed 's/^#define KERNEL_SET .*/#define KERNEL_SET 0/' "$source" >"$folder/kernel.cpp"
   aarch64-linux-gnu-g++ -std=c++20 -O1 -Wall -Wextra -Werror -Wno-psabi -ffp-contract=off -DSTRANDCAST_LANE_COUNT=4 -I"$lanes" \
     -Ishaders -I. -c "$folder/kernel.cpp" -o "$folder/kernel.o"

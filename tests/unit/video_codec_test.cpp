@@ -2,6 +2,9 @@
 // given what it made, whole, late or damaged.
 #include "common/pictures/video_codec.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "common/pictures/picture_decoder.h"
 #include "tests/support/test_pictures.h"
 
@@ -107,6 +110,41 @@ TEST_P(Video, TheRateIsKeptAndMayChangeWithoutAKeyframe) {
   encoder->set_bits_per_s(4e5);
   (void)mean_bytes(90, 30);
   EXPECT_NEAR(mean_bytes(120, 60), 4e5 / 30.0 / 8.0, 0.25 * 4e5 / 30.0 / 8.0);
+}
+
+/// A disc of waving lines before a plain ground, as a head of hair is.
+Image disc_of_lines(double phase) {
+  constexpr double kRadius = 0.2 * kHeight;
+  Image image = waving_lines(kWidth, kHeight, phase);
+  for (uint32_t y = 0; y < kHeight; ++y)
+    for (uint32_t x = 0; x < kWidth; ++x)
+      if (std::hypot(x - 0.5 * kWidth, y - 0.5 * kHeight) > kRadius)
+        for (size_t channel = 0; channel < 3; ++channel)
+          image.rgba[(size_t{y} * kWidth + x) * 4 + channel] = 90;
+  return image;
+}
+
+TEST_P(Video, FirstPicturesLookLikeLaterOnes) {
+  constexpr int kFirst = 5, kAll = 40;
+  constexpr double kRateHz = 15.0, kBitsPerPixel = 0.25, kStepRad = 0.02;
+  const double bits_per_s = kBitsPerPixel * kWidth * kHeight * kRateHz;
+  const auto encoder = *make_video_encoder(codec_, {kWidth, kHeight, kRateHz, bits_per_s});
+  const auto decoder = make_decoder();
+  double worst_first = 1e9, mean_late = 0.0;
+  size_t bytes = 0;
+  for (int i = 0; i < kAll; ++i) {
+    const Image image = disc_of_lines(kStepRad * i);
+    const auto frame = encoder->encode(image, VideoFrame::Delta, VideoRate::Target);
+    ASSERT_TRUE(frame);
+    const double quality_db = psnr(image, *decoder->decode(*frame));
+    if (i < kFirst) worst_first = std::min(worst_first, quality_db);
+    if (i >= kAll - kFirst) mean_late += quality_db / kFirst;
+    bytes += frame->size();
+  }
+  EXPECT_GT(worst_first, mean_late - 4.0);
+  EXPECT_GT(worst_first, 28.0);
+  // A keyframe takes up to five pictures' worth.
+  EXPECT_LT(static_cast<double>(bytes), 1.1 * (kAll + 4) * bits_per_s / kRateHz / 8.0);
 }
 
 TEST_P(Video, AKeyframeComesWhenAskedForAndStandsAlone) {

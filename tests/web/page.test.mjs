@@ -194,6 +194,8 @@ check('a token leaves the address', () => {
   assert.equal(wishes.token, 's+e cret');
   assert.equal(wishes.mode, 0);
   assert.deepEqual(wishes.camera.offset, [0.2, 0.1, 0.6]);
+  assert.equal(wishes.keepsToken, false);
+  assert.equal(page.readFragment('#token=a&keep-token').keepsToken, true);
   const rest = page.withoutToken('#token=secret&mode=strands&view-only');
   assert.equal(rest, '#mode=strands&view-only');
   const link = page.linkTo('http://h:1/', wishes.camera, 0);

@@ -253,7 +253,24 @@ const all = {
     }
     const referring = tab.requests.filter((one) => Object.keys(one.headers).some((name) => name.toLowerCase() === 'referer' && one.headers[name]));
     assert.deepEqual(referring, [], 'nobody is told where a request comes from');
+    // After a reload the token is asked for, unless the tab was told to keep it.
+    const reload = async (one) => {
+      await one.evaluate('window.isBefore = true');
+      await one.send('Page.reload');
+      await one.until(async () => !(await one.evaluate('window.isBefore')), 'the page anew');
+    };
+    await reload(tab);
+    await tab.until((now) => /token/i.test(now.error ?? ''), 'the question');
     await tab.close();
+    const keeping = await browser.open(`${strict.url}#token=${right}&keep-token&mode=strands`);
+    await keeping.until((now) => now.states > 3, 'states');
+    await reload(keeping);
+    await keeping.until((now) => now.states > 0 && now.isConnected, 'states without a question');
+    assert.equal(await keeping.evaluate('Object.keys(localStorage).length + document.cookie.length'), 0);
+    await keeping.close();
+    const other = await browser.open(`${strict.url}#mode=strands`);
+    await other.until((now) => /token/i.test(now.error ?? ''), 'another tab is asked');
+    await other.close();
     await strict.end();
   },
   async 'a page of another origin is refused, and may not show this one'() {

@@ -4,6 +4,7 @@ import type { Camera, Vec3 } from './messages';
 
 export interface Wishes {
   token: string;
+  keepsToken: boolean; // over a reload, as long as the tab is open
   mode: number; // of wire.ts; auto where nothing is said
   camera?: Camera;
   codec: string;
@@ -20,7 +21,7 @@ const DIGITS = 4;
 export function readFragment(fragment: string): Wishes {
   const words = new URLSearchParams(fragment.replace(/^#/, ''));
   const wishes: Wishes = {
-    token: words.get('token') ?? '', mode: MODES[words.get('mode') ?? 'auto'] ?? 2, codec: words.get('codec') ?? '',
+    token: words.get('token') ?? '', keepsToken: words.has('keep-token'), mode: MODES[words.get('mode') ?? 'auto'] ?? 2, codec: words.get('codec') ?? '',
     head: words.get('head') ?? '', draw: words.get('draw') ?? '', pictures: words.get('pictures') ?? '', isViewOnly: words.has('view-only'),
   };
   const numbers = (words.get('view') ?? '').split(',').map(Number);
@@ -44,4 +45,25 @@ export function linkTo(base: string, camera: Camera, mode: number, head = ''): s
   const view = [...camera.offset, ...camera.target, camera.fov].map((n) => Number(n.toFixed(DIGITS))).join(',');
   const name = Object.keys(MODES).find((one) => MODES[one] === mode);
   return `${base}#view=${view}${name && name !== 'auto' ? `&mode=${name}` : ''}${head && `&head=${encodeURIComponent(head)}`}`;
+}
+
+const KEPT_TOKEN = `strandcast-token ${typeof location === 'undefined' ? '' : location.pathname}`;
+
+/** The token that this tab keeps for this page; empty where it keeps none, or may keep nothing. */
+export function keptToken(): string {
+  try {
+    return sessionStorage.getItem(KEPT_TOKEN) ?? '';
+  } catch {
+    return '';
+  }
+}
+
+/** Keeps a token for this tab alone, until it is closed; an empty one forgets. */
+export function keepToken(token: string): void {
+  try {
+    if (token) sessionStorage.setItem(KEPT_TOKEN, token);
+    else sessionStorage.removeItem(KEPT_TOKEN);
+  } catch {
+    // Storage is switched off: the tab asks again after a reload.
+  }
 }

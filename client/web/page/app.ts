@@ -1,6 +1,6 @@
 // The page: its window, controls and measurements. The connection and the drawing are in workers (session.ts,
 // drawer.ts); what comes here is small, but for the server's pictures.
-import { linkTo, readFragment, withoutToken } from './address';
+import { keepToken, keptToken, linkTo, readFragment, withoutToken } from './address';
 import { compileCore } from './core';
 import type { Asked, Camera, DrawFigures, FromDraw, FromNet, NetFigures, ToDraw, ToNet } from './messages';
 import { Hud, Row, Warnings } from './ui/hud';
@@ -19,6 +19,8 @@ const QUIET_MS = 1500; // so long a picture may stand without a word about the c
 // The token leaves the address before anything is asked for.
 const wishes = readFragment(location.hash);
 history.replaceState(null, '', location.pathname + location.search + withoutToken(location.hash));
+if (wishes.token && wishes.keepsToken) keepToken(wishes.token);
+wishes.token ||= keptToken();
 
 const at = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 const stage = at('stage');
@@ -274,7 +276,10 @@ class Viewer {
     at('trouble-next').textContent = state === 'connecting' ? 'Waiting for its answer.' : '';
     at('try-now').hidden = state !== 'waiting' && !(state === 'ended' && !isTokenWanted);
     at('token-form').hidden = !isTokenWanted;
-    if (isTokenWanted) at('token').focus();
+    if (isTokenWanted) {
+      keepToken(''); // it was refused
+      at('token').focus();
+    }
     if (state === 'open' && wasAway && this.shown >= 0) warnings.say('Connected again.');
     this.tick();
   }
@@ -466,6 +471,7 @@ class Viewer {
       event.preventDefault();
       const field = at<HTMLInputElement>('token');
       this.asked = { ...this.asked, token: field.value.trim(), role: wishes.isViewOnly ? Role.viewer : Role.controller };
+      keepToken(at<HTMLInputElement>('keep-token').checked ? this.asked.token : '');
       field.value = '';
       this.toNet({ kind: 'reconnect', asked: this.asked });
     });
