@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/base/quantile.h"
+#include "common/math/turn.h"
 
 namespace strandcast {
 namespace {
@@ -14,16 +15,12 @@ namespace {
 constexpr double kCoastS = 0.6;
 // From one length of the way back to the next that is tried.
 constexpr double kLonger = 1.2;
+// Steps of the simulation, about: what is shorter no strand feels.
+constexpr double kStartSampleS = 1.0 / 60.0;
 // Of the clip's speeds and accelerations, what this share keeps to: the rest may be the capture's noise.
 constexpr double kUsualShare = 0.98;
 // A clip that hardly moves is no measure: a way back may always be as lively as this.
 constexpr MotionPeaks kGentle{0.1, 1.0, 0.5, 5.0};
-
-/// 0 to 1, a quintic with no slope and no curvature at either end.
-double ease(double x) {
-  x = std::clamp(x, 0.0, 1.0);
-  return x * x * x * (10.0 + x * (6.0 * x - 15.0));
-}
 
 /// Integral of ease() from 0 to x, for x within 0..1: 1/2 at 1.
 double eased_area(double x) {
@@ -35,22 +32,6 @@ double eased_area(double x) {
 double coasted_s(double passed_s, double coast_s) {
   const double x = std::clamp(passed_s / coast_s, 0.0, 1.0);
   return coast_s * (x - eased_area(x));
-}
-
-/// Axis times angle of the shortest rotation from a to b, world axes.
-glm::dvec3 turn_between(const glm::dquat& a, const glm::dquat& b) {
-  glm::dquat turn = b * glm::conjugate(a);
-  if (turn.w < 0.0) turn = -turn;
-  const glm::dvec3 sine(turn.x, turn.y, turn.z);
-  const double length = glm::length(sine);
-  if (length == 0.0) return glm::dvec3(0.0);
-  return sine * (2.0 * std::atan2(length, turn.w) / length);
-}
-
-glm::dquat turned(const glm::dquat& from, const glm::dvec3& turn_rad) {
-  const double angle_rad = glm::length(turn_rad);
-  if (angle_rad == 0.0) return from;
-  return glm::normalize(glm::angleAxis(angle_rad, turn_rad / angle_rad) * from);
 }
 
 }  // namespace
@@ -92,6 +73,7 @@ MotionPeaks peaks_of(const std::vector<Pose>& poses, double step_s, double share
 ClipPath::ClipPath(MotionClip clip, const ClipPathOptions& options)
     : clip_(std::move(clip)), options_(options) {
   const std::vector<Pose>& poses = clip_.world_from_head;
+  if (options_.blend_s > 0.0) start_s_ = choose_start_s();
   if (!options_.is_looped || !(options_.blend_s > 0.0) || poses.size() < 2) return;
   const Pose &first = poses[0], &second = poses[1];
   const Pose &last = poses.back(), &before = poses[poses.size() - 2];
@@ -103,12 +85,12 @@ ClipPath::ClipPath(MotionClip clip, const ClipPathOptions& options)
 }
 
 double ClipPath::duration_s() const {
-  return clip_.duration_s() + (options_.blend_s > 0.0 ? 0.5 * options_.blend_s : 0.0);
+  return clip_.duration_s() + 0.5 * start_s_;
 }
 
 /// Time of the clip; beyond its duration it is on the way back.
 double ClipPath::place_in_loop_s(double t_s) const {
-  const double played_s = time_from_rest_s(t_s, options_.blend_s);
+  const double played_s = time_from_rest_s(t_s, start_s_);
   const double period_s = clip_.duration_s() + way_back_s_;
   return options_.is_looped && period_s > 0.0 ? std::fmod(played_s, period_s) : played_s;
 }
@@ -133,6 +115,18 @@ Pose ClipPath::way_back(double passed_s, double whole_s) const {
   const glm::dquat to = turned(start.rotation, -towards_s * start_rad_per_s_) * side;
   pose.rotation = glm::normalize(glm::mix(turned(end.rotation, on_s * end_rad_per_s_), to, blend));
   return pose;
+}
+
+/// A clip that is more violent than an easy start throughout takes the longest: hair is under way by then.
+double ClipPath::choose_start_s() const {
+  for (double wanted_s = options_.blend_s;; wanted_s *= kLonger) {
+    if (wanted_s >= kLongestStartS) return std::max(options_.blend_s, kLongestStartS);
+    std::vector<Pose> start(2, clip_.sample(0.0));
+    for (double t_s = 0.0; t_s < wanted_s; t_s += kStartSampleS)
+      start.push_back(clip_.sample(time_from_rest_s(t_s, wanted_s)));
+    const MotionPeaks peaks = peaks_of(start, kStartSampleS);
+    if (peaks.mps2 <= kEasyStart.mps2 && peaks.rad_per_s2 <= kEasyStart.rad_per_s2) return wanted_s;
+  }
 }
 
 /// As short as the clip's own speeds and accelerations allow; whole frames.

@@ -11,8 +11,10 @@
 
 namespace strandcast {
 
-/// Time in which a motion accelerates from rest, and the shortest way back in a loop, in seconds.
+/// Shortest time in which a motion accelerates from rest, and shortest way back in a loop, in seconds.
 inline constexpr double kClipBlendS = 0.3;
+/// Longest time in which a motion accelerates from rest.
+inline constexpr double kLongestStartS = 2.0;
 /// Longest duration of the way back in a loop.
 inline constexpr double kLongestWayBackS = 10.0;
 
@@ -33,13 +35,17 @@ struct MotionPeaks {
   bool is_within(const MotionPeaks& other, double factor) const;
 };
 
+/// What a head reaches that gets under way without haste: half of gravity, and a nod.
+inline constexpr MotionPeaks kEasyStart{.mps2 = 5.0, .rad_per_s2 = 20.0};
+
 /// Returns the peaks of poses that are `step_s` apart. With a `share` below 1, the values that this share of
 /// the samples does not exceed.
 MotionPeaks peaks_of(const std::vector<Pose>& poses, double step_s, double share = 1.0);
 
 struct ClipPathOptions {
   bool is_looped = false;
-  double blend_s = kClipBlendS;  // 0: the clip as it is, with a jump where it begins and starts over
+  double blend_s =
+      kClipBlendS;  // at least; 0: the clip as it is, with a jump where it begins and starts over
 };
 
 class ClipPath {
@@ -55,18 +61,23 @@ class ClipPath {
   /// Returns the duration of the head's way from the clip's end to its start, s; 0 if it is not looped or not
   /// blended.
   double way_back_s() const { return way_back_s_; }
+  /// Returns the time in which the head gets under way, s: the shortest with the accelerations of an easy
+  /// start, at most kLongestStartS; 0 if it is not blended.
+  double start_s() const { return start_s_; }
   const MotionClip& clip() const { return clip_; }
 
  private:
   double place_in_loop_s(double t_s) const;
   Pose way_back(double passed_s, double whole_s) const;
   double choose_way_back_s() const;
+  double choose_start_s() const;
 
   MotionClip clip_;
   ClipPathOptions options_;
   glm::dvec3 end_mps_{0.0}, start_mps_{0.0};              // of the head at the clip's end and start
   glm::dvec3 end_rad_per_s_{0.0}, start_rad_per_s_{0.0};  // world axes
   double way_back_s_ = 0.0;
+  double start_s_ = 0.0;
 };
 
 }  // namespace strandcast

@@ -217,6 +217,7 @@ void InputHub::forget(Stream<Value>& stream, uint64_t source_id) {
 void InputHub::remove_source(uint64_t source_id) {
   const std::lock_guard lock(mutex_);
   if (held_) return held_->leave(source_id);
+  has_left_ = has_left_ || motion_.owner == source_id;
   forget(motion_, source_id);
   forget(wind_, source_id);
 }
@@ -227,7 +228,7 @@ bool InputHub::update_pose(int64_t server_time_ns) {
   if (samples.empty()) return false;
   const auto delay = motion_.owner ? delays_ns_.find(*motion_.owner) : delays_ns_.end();
   const int64_t delay_ns = delay != delays_ns_.end() ? delay->second : 0;
-  const int64_t time_ns = motion_.clock.to_source_ns(server_time_ns) - delay_ns;
+  const int64_t time_ns = steadied_ns(motion_.clock.to_source_ns(server_time_ns) - delay_ns, server_time_ns);
   const size_t index = motion_.track.index_at(time_ns);
   bool has_jumped = false;
   // Everything older than the last frame's sample is gone from the track, so this looks at each pair once.
@@ -258,6 +259,21 @@ bool InputHub::update_pose(int64_t server_time_ns) {
   note_used(samples[newest].arrival_ns, samples[newest].time_ns + motion_.clock.offset_ns());
   motion_.track.use(index, newest);
   return has_jumped;
+}
+
+/// The time to show: as late behind `time_ns` as samples have been of late. A steady source is as late in
+/// each frame, so it is held as its newest sample and waits for nothing.
+int64_t InputHub::steadied_ns(int64_t time_ns, int64_t server_time_ns) {
+  if (motion_.is_cut) steady_delay_ns_ = 0.0;
+  const double passed_ns =
+      last_frame_ns_ ? static_cast<double>(std::max<int64_t>(server_time_ns - *last_frame_ns_, 0)) : 0.0;
+  const double usual_ns = std::max(motion_.usual_spacing_ns, motion_.usual_wait_ns);
+  const double most_ns = kMostSteadiedSpacings * usual_ns;
+  if (most_ns > static_cast<double>(kMostSteadiedNs)) return time_ns;
+  steady_delay_ns_ = std::max(0.0, steady_delay_ns_ - kSteadyShrink * passed_ns);
+  const auto late_ns = static_cast<double>(time_ns - motion_.track.samples().back().time_ns);
+  if (late_ns > kUnseenLateNs && late_ns <= most_ns) steady_delay_ns_ = std::max(steady_delay_ns_, late_ns);
+  return time_ns - static_cast<int64_t>(steady_delay_ns_);
 }
 
 /// True when the frame shows motion of a longer time than passed since the last one.
@@ -301,6 +317,7 @@ void InputHub::take_held(int64_t time_ns) {
     if (due.wind) take(due.source_id, *due.wind, due.arrival_ns);
   }
   for (const uint64_t source_id : held_->take_left()) {
+    has_left_ = has_left_ || motion_.owner == source_id;
     forget(motion_, source_id);
     forget(wind_, source_id);
   }
@@ -316,7 +333,8 @@ InputFrame InputHub::sample(int64_t server_time_ns) {
   frame_.has_motion = frame_.has_motion || is_first;
   frame_.motion_speed = motion_speed_;
   // The first pose replaces none: strands must not be dragged there from the origin.
-  finish_teleport_check(before, now_ns, has_jumped || is_first);
+  const bool has_left = std::exchange(has_left_, false);
+  finish_teleport_check(before, now_ns, has_jumped || is_first || has_left);
   frame_.is_motion_stale = !motion_.owner || now_ns - motion_.accepted_ns > kMotionStaleNs;
 
   const auto& winds = wind_.track.samples();

@@ -9,8 +9,10 @@
 // * One source at a time drives the head, and one the wind. It is the first that sends a valid sample, until
 //   it is removed or silent for kMotionStaleNs / kWindStaleNs. Meanwhile samples of others are refused.
 // * Between two samples the pose is interpolated (lerp, slerp). If no sample is later, the newest is held, so
-//   that live feeding adds no delay. Without motion for kMotionStaleNs the frame is marked stale and the last
-//   pose stays. Without wind for kWindStaleNs the scene's own wind returns.
+//   that live feeding adds no delay. Samples that arrive unevenly are shown as late as the latest of the last
+//   seconds (kSteadyShrink), so that the head's speed does not jump from frame to frame. Without motion for
+//   kMotionStaleNs the frame is marked stale and the last pose stays. Without wind for kWindStaleNs the
+//   scene's own wind returns.
 // * Refused and counted: samples not newer than the newest one used, duplicates, impossible values, more than
 //   kMaxSampleRateHz per source and kind, more than kMaxInputSources sources. Buffers are bounded; the oldest
 //   samples are dropped first.
@@ -20,8 +22,9 @@
 //   if both samples name the same joints, but never across a jump of the head.
 // * A jump beyond kTeleportSpeedMps or kTeleportTurnRadPerS between samples or frames is carried out in one
 //   frame, flagged as a teleport and never interpolated.
-// * Two changes are teleports however short they are. One is the first pose of another source, or of one
-//   whose clock stepped. The other is the return of a source that was silent: the frame then advances by more
+// * Three changes are teleports however short they are. One is the first pose of another source, or of one
+//   whose clock stepped. Another is the first frame without the source that drove the head. The third is the
+//   return of a source that was silent: the frame then advances by more
 //   than kCatchUpNs beyond the elapsed time, and by more than kCatchUpSpacings of the usual sample spacing.
 #pragma once
 
@@ -53,6 +56,11 @@ inline constexpr double kTeleportShortestS = 1e-3;  // closer samples count as t
 inline constexpr double kTeleportLongestS = 0.1;    // a pause between frames is not time to travel in
 inline constexpr int64_t kCatchUpNs = 40'000'000;  // of motion that is shown in one frame, beyond the frame's
 inline constexpr double kCatchUpSpacings = 3.0;
+/// Lateness that is made up for at most, in time and in usual sample spacings; what is later was held up.
+inline constexpr int64_t kMostSteadiedNs = 50'000'000;
+inline constexpr double kMostSteadiedSpacings = 1.5;
+inline constexpr double kUnseenLateNs = 1e6;    // less makes no head's speed uneven
+inline constexpr double kSteadyShrink = 0.002;  // of the passing time by which a delay shrinks again
 inline constexpr double kMaxSampleRateHz = 1000.0;
 inline constexpr double kMaxSampleBurst = 1000.0;  // samples at once, after a second of silence
 inline constexpr size_t kMaxInputSources = 64;
@@ -138,6 +146,7 @@ class InputHub {
   template <class Value>
   void note_spacing(Stream<Value>& stream);
   bool update_pose(int64_t server_time_ns);
+  int64_t steadied_ns(int64_t time_ns, int64_t server_time_ns);
   bool has_caught_up(int64_t shown_ns, int64_t server_time_ns);
   void note_used(int64_t arrival_ns, int64_t made_ns);
   void finish_teleport_check(const Pose& before, int64_t server_time_ns, bool has_jumped);
@@ -159,6 +168,8 @@ class InputHub {
   int64_t newest_arrival_ns_ = 0;
   std::optional<int64_t> last_frame_ns_;
   std::optional<int64_t> shown_ns_;  // time of the head's source that the last frame shows
+  double steady_delay_ns_ = 0.0;     // by which uneven samples are shown later
+  bool has_left_ = false;            // the source that drove the head, since the last frame
   double motion_speed_ = 1.0;        // as the owner said last
   InputFrame frame_;                 // the last one given out
   InputCounters counters_;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/base/hash.h"
+#include "common/math/turn.h"
 
 namespace strandcast {
 namespace {
@@ -183,19 +184,14 @@ void StepBuilder::begin(const InputFrame& input, double end_time_s, double input
   if (input.has_motion && scene_.place_m != glm::dvec3(0.0)) target.position_m += scene_.place_m;
   // The first pose is a jump too: until then the head stood at its place.
   const bool has_jumped = input.has_motion && (input.has_teleported || !has_motion_);
-  const double felt = has_jumped ? 0.0 : felt_share(input_rate * input.motion_speed);
-  felt_ = felt;
-  Pose from = world_from_head_;
-  if (has_jumped)
-    from = target;
-  else if (felt < 1.0)
-    from = interpolate(world_from_head_, target, 1.0 - felt);
+  const double step_s = 1.0 / scene_.step_rate_hz;
+  const Pose from = place_before(target, has_jumped, felt_share(input_rate * input.motion_speed));
   step_.carried_to_rotation.reset();
-  if (input.has_motion && felt < 1.0) step_.carried_to_rotation = from.rotation;
+  const bool is_carried = felt_ < 1.0 || felt_motion_.share() < 1.0;
+  if (input.has_motion && is_carried) step_.carried_to_rotation = from.rotation;
   has_motion_ = has_motion_ || input.has_motion;
 
   const auto count = static_cast<double>(step_.substeps.size());
-  const double step_s = 1.0 / scene_.step_rate_hz;
   Pose previous = from;
   for (size_t i = 0; i < step_.substeps.size(); ++i) {
     const double blend = static_cast<double>(i + 1) / count;
@@ -223,15 +219,30 @@ void StepBuilder::begin(const InputFrame& input, double end_time_s, double input
   move_bust(input, has_jumped);
 }
 
+/// Where the head was before the step, as strands feel it: `share` of its way, and after a cut that a source
+/// made, no sudden change of speed.
+Pose StepBuilder::place_before(const Pose& target, bool has_jumped, double share) {
+  const HeadMovement moved{target.position_m - world_from_head_.position_m,
+                           turn_between(world_from_head_.rotation, target.rotation)};
+  const HeadMovement felt = felt_motion_.feel(has_jumped ? HeadMovement{} : moved, input_.has_teleported,
+                                              1.0 / scene_.step_rate_hz);
+  felt_ = has_jumped ? 0.0 : share;
+  if (felt_motion_.share() < 1.0)
+    return {target.position_m - share * felt.shift_m, turned(target.rotation, -share * felt.turn_rad)};
+  if (has_jumped) return target;
+  return share < 1.0 ? interpolate(world_from_head_, target, 1.0 - share) : world_from_head_;
+}
+
 /// Neck and chest of the step, before what collides is placed.
-void StepBuilder::move_bust(const InputFrame& input, bool is_carried) {
+void StepBuilder::move_bust(const InputFrame& input, bool has_jumped) {
   for (StepInput& substep : step_.substeps) substep.bust = {};
   if (!has_bust()) return;
-  if (!is_carried) bust_follower_.follow(world_from_head_.rotation, input.joints, 1.0 / scene_.step_rate_hz);
+  if (!has_jumped) bust_follower_.follow(world_from_head_.rotation, input.joints, 1.0 / scene_.step_rate_hz);
   const BustTurn before = std::exchange(bust_turn_, BustTurn(0.0));
   bust_ = bust_code(bust_follower_.world_from_chest());
   bust_turn_ = bust_turn(bust_, world_from_head_.rotation);
-  const BustTurn from = is_carried ? bust_turn_ : before;
+  // What is carried along takes its bust with it, as codec `step` has it.
+  const BustTurn from = step_.carried_to_rotation ? bust_turn_ : before;
   const auto count = static_cast<double>(step_.substeps.size());
   for (size_t i = 0; i < step_.substeps.size(); ++i)
     step_.substeps[i].bust = {bust_rig_, between(from, bust_turn_, static_cast<double>(i + 1) / count),

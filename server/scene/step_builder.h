@@ -11,6 +11,7 @@
 #include "common/scene/scene_desc.h"
 #include "server/input/input_frame.h"
 #include "server/scene/bust_follower.h"
+#include "server/scene/felt_motion.h"
 #include "server/sim/solver.h"
 
 namespace strandcast {
@@ -19,7 +20,8 @@ struct SceneStep {
   Pose world_from_head;             // at the end of the step
   std::vector<StepInput> substeps;  // scene.substeps of them
   /// Rotation of the head (world from head) to which strands are carried rigidly (Solver::rebase()) before
-  /// the first substep. Set if the head jumped, or if inputs pass faster than the simulation.
+  /// the first substep. Set if the head jumped, in the second after a cut that changed its speed, or if
+  /// inputs pass faster than the simulation.
   std::optional<glm::dquat> carried_to_rotation;
 };
 
@@ -75,7 +77,8 @@ class StepBuilder {
 
  private:
   bool has_bust() const { return bust_rig_.exists() && scene_.colliders.empty(); }
-  void move_bust(const InputFrame& input, bool is_carried);
+  Pose place_before(const Pose& target, bool has_jumped, double share);
+  void move_bust(const InputFrame& input, bool has_jumped);
 
   SceneDesc scene_;
   // The groom is made for an upright head under the gravity that the scene begins with; later changes act on
@@ -85,6 +88,7 @@ class StepBuilder {
   std::optional<GustGenerator> gust_generator_;
   std::vector<GustWave> waves_;  // at time 0 with the head at the origin
   Pose world_from_head_;
+  FeltMotion felt_motion_;
   BustRig bust_rig_;
   BustFollower bust_follower_;
   BustCode bust_ = kRigidBust;

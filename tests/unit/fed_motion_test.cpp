@@ -2,14 +2,17 @@
 // and leaves out frames that are not of the motion.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/app/ctl_commands.h"
 #include "common/base/file.h"
+#include "common/motion/clip_path.h"
 #include "common/motion/motion_glitches.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/temporary_folder.h"
@@ -123,12 +126,52 @@ TEST_F(FedMotion, BeginsFromRest) {
   EXPECT_GT(peaks_of(fed(options, 1.0), 1.0 / kRateHz).mps2, 20.0);
 }
 
+/// In the middle of a stride from its first frame on.
+MotionClip run_of(double speed_mps, double spin_rad_per_s) {
+  MotionClip clip;
+  clip.frame_s = 1.0 / kRateHz;
+  for (int i = 0; i < 600; ++i) {
+    const double t_s = i * clip.frame_s;
+    clip.world_from_head.push_back({{speed_mps * t_s, 0.03 * std::sin(12.6 * t_s), 0.0},
+                                    glm::angleAxis(spin_rad_per_s * t_s, glm::dvec3(0.0, 1.0, 0.0))});
+  }
+  return clip;
+}
+
+// The faster a clip begins, the longer the head takes to get under way.
+TEST(ClipStart, NeedsNoMoreThanAnEasyStart) {
+  EXPECT_EQ(ClipPath(run_of(0.0, 0.0), {}).start_s(), kClipBlendS);
+  for (const auto& [speed_mps, spin_rad_per_s] : {std::pair{2.3, 0.0}, {0.0, 6.0}, {1.3, 3.0}}) {
+    const auto peaks_until = [&](const ClipPath& path, double until_s) {
+      std::vector<Pose> poses;
+      for (double t_s = -0.1; t_s < until_s; t_s += 1.0 / 60.0)
+        poses.push_back(path.sample(std::max(t_s, 0.0)));
+      return peaks_of(poses, 1.0 / 60.0);
+    };
+    const ClipPath path(run_of(speed_mps, spin_rad_per_s), {});
+    EXPECT_LT(path.start_s(), kLongestStartS);
+    const MotionPeaks own = peaks_until(path, path.start_s());
+    EXPECT_LE(own.mps2, 1.05 * kEasyStart.mps2);
+    EXPECT_LE(own.rad_per_s2, 1.05 * kEasyStart.rad_per_s2);
+    // The counter-example: in the shortest time that a start takes it is a blow.
+    MotionClip clip = run_of(speed_mps, spin_rad_per_s);
+    std::vector<Pose> hasty(6, clip.sample(0.0));
+    for (double t_s = 0.0; t_s < kClipBlendS; t_s += 1.0 / 60.0)
+      hasty.push_back(clip.sample(time_from_rest_s(t_s, kClipBlendS)));
+    const MotionPeaks blow = peaks_of(hasty, 1.0 / 60.0);
+    EXPECT_TRUE(blow.mps2 > 1.4 * kEasyStart.mps2 || blow.rad_per_s2 > 1.4 * kEasyStart.rad_per_s2);
+  }
+  EXPECT_EQ(ClipPath(run_of(20.0, 0.0), {}).start_s(), kLongestStartS) << "nothing takes longer";
+}
+
 TEST_F(FedMotion, IsAllOfTheClipOnce) {
   const FedClip& walk = clips_.front();
   const auto plan = make_feed_plan(options_for(walk));
   ASSERT_TRUE(plan);
   const MotionClip clip = clip_of(walk);
-  EXPECT_EQ(plan->motion_s, clip.duration_s() + 0.5 * kClipBlendS);
+  const double start_s = ClipPath(clip, {}).start_s();
+  EXPECT_GE(start_s, kClipBlendS);
+  EXPECT_EQ(plan->motion_s, clip.duration_s() + 0.5 * start_s) << "a start lags by half of itself";
   EXPECT_EQ(plan->motion(plan->motion_s), clip.world_from_head.back());
   EXPECT_EQ(plan->motion(0.0), clip.world_from_head.front());
 }

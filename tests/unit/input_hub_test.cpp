@@ -206,6 +206,56 @@ TEST(InputHub, AJumpAcrossSkippedSamplesOrAGapIsStillATeleport) {
   EXPECT_TRUE(hub.sample(kStart + 5016 * kMsInNs).has_teleported);
 }
 
+/// How much the speed changes from one frame to the next, of 60 a second, of a head at 1 m/s. Its samples, so
+/// many a second, take 0 to 6 ms on the way. The first second, in which the delay is found, is left out.
+double most_uneven_mps(double rate_hz) {
+  constexpr double kFrameS = 1.0 / 60.0;
+  InputHub hub;
+  std::mt19937 random(5);
+  std::vector<double> shown_m;
+  int64_t next = 0, arrival_ns = 0, last_ns = 0;
+  for (int frame = 0; frame < 300; ++frame) {
+    const auto now_ns = static_cast<int64_t>(frame * kFrameS * 1e9);
+    while (true) {
+      const auto made_ns = static_cast<int64_t>(static_cast<double>(next) / rate_hz * 1e9);
+      if (arrival_ns == 0)
+        arrival_ns = std::max(last_ns, made_ns + static_cast<int64_t>(random() % 7) * kMsInNs);
+      if (arrival_ns > now_ns) break;
+      hub.push(1, motion(made_ns, pose_at(static_cast<double>(made_ns) * 1e-9)), kStart + arrival_ns);
+      last_ns = std::exchange(arrival_ns, 0);
+      ++next;
+    }
+    shown_m.push_back(hub.sample(kStart + now_ns).world_from_head.position_m.x);
+  }
+  double most_mps = 0.0;
+  for (size_t i = 62; i < shown_m.size(); ++i)
+    most_mps = std::max(most_mps, std::abs(shown_m[i] - 2.0 * shown_m[i - 1] + shown_m[i - 2]) / kFrameS);
+  return most_mps;
+}
+
+// Samples fall unevenly into frames: as their newest the head would stand in one frame and make up for it in
+// the next, which is 6 g at a walk. The counter-example: samples too far apart to wait for are held.
+TEST(InputHub, AHeadWhoseSamplesComeUnevenlyMovesEvenly) {
+  EXPECT_LT(most_uneven_mps(120.0), 0.2);
+  EXPECT_LT(most_uneven_mps(50.0), 0.2) << "fewer samples than frames";
+  EXPECT_GT(most_uneven_mps(20.0), 0.9);
+}
+
+TEST(InputHub, AHeadWithoutItsSourceIsCutOnce) {
+  InputHub hub;
+  hub.push(1, motion(0, pose_at(0.0)), kStart);
+  hub.sample(kStart);
+  hub.push(1, motion(16 * kMsInNs, pose_at(0.03)), kStart + 16 * kMsInNs);
+  EXPECT_FALSE(hub.sample(kStart + 16 * kMsInNs).has_teleported);
+  hub.remove_source(2);
+  EXPECT_FALSE(hub.sample(kStart + 33 * kMsInNs).has_teleported) << "it did not drive the head";
+  hub.remove_source(1);
+  const InputFrame left = hub.sample(kStart + 50 * kMsInNs);
+  EXPECT_TRUE(left.has_teleported) << "no head stops from one step to the next";
+  EXPECT_EQ(left.world_from_head, pose_at(0.03));
+  EXPECT_FALSE(hub.sample(kStart + 66 * kMsInNs).has_teleported);
+}
+
 /// What 60 frames a second show of a head at 1 m/s whose samples come so far apart, and in bursts of so many;
 /// for 300 ms in the middle none come.
 struct Shown {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -77,6 +78,41 @@ TEST(StepBuilder, JumpsAndTheFirstPoseMoveStrandsRigidly) {
     EXPECT_NEAR(angle_between_rad(substep.world_from_head_rotation, jump.world_from_head.rotation), 0.0, 1e-7)
         << "the jump turns nothing within the step";
   }
+}
+
+/// The greatest acceleration that strands feel, m/s^2, of a head that goes at `before_mps`, jumps by 3 m
+/// where its source is cut, and goes on at `after_mps`.
+double most_felt_mps2(double before_mps, double after_mps, bool is_cut) {
+  SceneDesc scene = still_scene();
+  scene.substeps = 1;
+  StepBuilder builder(scene, {});
+  const double h_s = 1.0 / scene.step_rate_hz;
+  double most_mps2 = 0.0, x_m = 0.0;
+  glm::dvec3 felt_mps(before_mps, 0.0, 0.0);
+  builder.build(moved(glm::dvec3(0.0), 0.0), {}, 0.0);
+  for (int i = 1; i < 180; ++i) {
+    const bool jumps = i == 60 && is_cut;
+    x_m += jumps ? 3.0 : h_s * (i <= 60 ? before_mps : after_mps);
+    InputFrame input = moved({x_m, 0.0, 0.0}, 0.0);
+    input.has_teleported = jumps;
+    const SceneStep& step = builder.build(input, {}, 0.0);
+    EXPECT_EQ(step.world_from_head.position_m.x, x_m) << "the head is where it is";
+    const glm::dvec3 mps = step.substeps[0].head_shift_m / h_s;
+    most_mps2 = std::max(most_mps2, glm::length(mps - felt_mps) / h_s);
+    felt_mps = mps;
+  }
+  EXPECT_NEAR(felt_mps.x, after_mps, 1e-9) << "in the end all is felt";
+  return most_mps2;
+}
+
+// A source that joins, comes back or leaves changes the head's speed at once. Strands feel the change over a
+// second: 1.875 is a quintic's steepest slope. The same change of one source is felt as it is.
+TEST(StepBuilder, ACutChangesTheFeltSpeedGently) {
+  const double gently_mps2 = 1.01 * 1.875 * 2.3 / kSettleS;
+  EXPECT_LT(most_felt_mps2(0.0, 2.3, true), gently_mps2) << "a head at rest";
+  EXPECT_LT(most_felt_mps2(2.3, 0.0, true), gently_mps2) << "a head that stops";
+  EXPECT_LT(most_felt_mps2(2.3, 2.3, true), 1e-6) << "a cut within a flight";
+  EXPECT_GT(most_felt_mps2(0.0, 2.3, false), 20.0 * gently_mps2);
 }
 
 /// What the strands feel of a head that swings to and fro, when in each step `rate` steps of its motion pass:
