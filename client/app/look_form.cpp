@@ -29,55 +29,57 @@ struct Shown {
   std::string_view help = {};
 };
 
-constexpr std::string_view kColor = "Colour";
 constexpr std::string_view kStyle = "Style";
 constexpr std::string_view kShading = "Shading";
-constexpr std::string_view kLight = "Light";
-constexpr std::string_view kDetail = "Detail";
 constexpr std::string_view kOther = "Other";
-constexpr std::array kSections{kColor, kStyle, kShading, kLight, kDetail, kOther};
+constexpr std::array<std::string_view, 6> kSections{"Colour", kStyle, kShading, "Light", "Detail", kOther};
 
-// The one table between fields and what a person sees of them. A field without a row is shown by its name.
+// Between fields and what a person sees of them. A field without a row is shown by its name.
+// schema begin: look form
+// clang-format off
 constexpr std::array kShown{
-    Shown{"hair_color", kColor, "hair colour", 0.0,
+    Shown{"hair_color", "Colour", "hair colour", 0.0,
           "custom: root and tip colour; melanin: the two amounts; or a colour by name"},
-    Shown{"root_color", kColor, "root colour", 0.0, "of the hair colour custom"},
-    Shown{"tip_color", kColor, "tip colour", 0.0, "of the hair colour custom"},
-    Shown{"eumelanin", kColor, "brown melanin", 8.0,
+    Shown{"root_color", "Colour", "root colour", 0.0, "of the hair colour custom"},
+    Shown{"tip_color", "Colour", "tip colour", 0.0, "of the hair colour custom"},
+    Shown{"eumelanin", "Colour", "brown melanin", 8.0,
           "of the hair colour melanin; 0.3 blond, 1.3 brown, 8 black"},
-    Shown{"pheomelanin", kColor, "red melanin", 4.0, "of the hair colour melanin"},
-    Shown{"skin_color", kColor, "skin"},
-    Shown{"background", kColor, ""},
-    Shown{"style.clump", kStyle, "", 0.0, "how far tips are drawn together into locks"},
-    Shown{"style.locks", kStyle, "", 0.0, "in each triangle of roots"},
-    Shown{"style.spread", kStyle, "", 0.1, "how far a tip strays from its lock, of a strand's length"},
-    Shown{"style.wave_m", kStyle, "waves", 0.02, "at the tip; a lock's strands share them"},
-    Shown{"style.wave_count", kStyle, "waves along it", 16.0},
-    Shown{"style.frizz_m", kStyle, "frizz", 0.005, "small waves, each strand's own"},
-    Shown{"style.frizz_count", kStyle, "frizz along it", 32.0},
-    Shown{"style.stray_share", kStyle, "strays", 0.3, "of all strands: they leave their lock"},
-    Shown{"style.stray_spread", kStyle, "strays go further", 10.0},
-    Shown{"style.length_spread", kStyle, "uneven lengths"},
-    Shown{"style.short_share", kStyle, "short ones", 0.5, "of all strands: broken off"},
-    Shown{"style.tip_fade", kStyle, "tips fade over"},
-    Shown{"shading.wetness", kShading, "", 0.0, "0 dry, 1 dripping"},
-    Shown{"shading.diffuse", kShading, "", 2.0},
-    Shown{"shading.scatter", kShading, "", 2.0, "light that comes through other strands"},
-    Shown{"shading.highlight", kShading, "", 4.0, "of the light's colour, from the surface"},
-    Shown{"shading.transmission", kShading, "", 4.0, "seen against the light"},
-    Shown{"shading.second_highlight", kShading, "", 4.0, "coloured, nearer to the root"},
-    Shown{"light_direction", kLight, "key from", 0.0, "about the head from the front, and above the horizon"},
-    Shown{"light_color", kLight, "key colour", 4.0},
-    Shown{"rim_direction", kLight, "rim from", 0.0, "about the head from the front, and above the horizon"},
-    Shown{"rim_color", kLight, "rim colour", 4.0, "black: there is none"},
-    Shown{"ambient", kLight, ""},
-    Shown{"exposure", kLight, "", 4.0},
-    Shown{"followers", kDetail, "", 0.0, "drawn strands between each three simulated ones"},
-    Shown{"segments", kDetail, "", 0.0, "drawn between two simulated vertices"},
-    Shown{"strand_radius_m", kDetail, "radius", 0.0005,
+    Shown{"pheomelanin", "Colour", "red melanin", 4.0, "of the hair colour melanin"},
+    Shown{"strand_radius_m", "Detail", "radius", 0.0005,
           "as drawn: a drawn strand stands for several real ones"},
-    Shown{"tip_scale", kDetail, "radius at the tip", 0.0, "over that at the root"},
+    Shown{"tip_scale", "Detail", "radius at the tip", 0.0, "over that at the root"},
+    Shown{"followers", "Detail", "", 0.0, "drawn strands between each three simulated ones"},
+    Shown{"segments", "Detail", "", 0.0, "drawn between two simulated vertices"},
+    Shown{"light_direction", "Light", "key from", 0.0,
+          "about the head from the front, and above the horizon"},
+    Shown{"light_color", "Light", "key colour", 4.0},
+    Shown{"rim_direction", "Light", "rim from", 0.0, "about the head from the front, and above the horizon"},
+    Shown{"rim_color", "Light", "rim colour", 4.0, "black: there is none"},
+    Shown{"ambient", "Light", "", 0.0},
+    Shown{"exposure", "Light", "", 4.0},
+    Shown{"background", "Colour", "", 0.0},
+    Shown{"skin_color", "Colour", "skin", 0.0},
+    Shown{"style.clump", "Style", "", 0.0, "how far tips are drawn together into locks"},
+    Shown{"style.locks", "Style", "", 0.0, "in each triangle of roots"},
+    Shown{"style.spread", "Style", "", 0.1, "how far a tip strays from its lock, of a strand's length"},
+    Shown{"style.wave_m", "Style", "waves", 0.02, "at the tip; a lock's strands share them"},
+    Shown{"style.wave_count", "Style", "waves along it", 16.0},
+    Shown{"style.frizz_m", "Style", "frizz", 0.005, "small waves, each strand's own"},
+    Shown{"style.frizz_count", "Style", "frizz along it", 32.0},
+    Shown{"style.stray_share", "Style", "strays", 0.3, "of all strands: they leave their lock"},
+    Shown{"style.stray_spread", "Style", "strays go further", 10.0},
+    Shown{"style.length_spread", "Style", "uneven lengths", 0.0},
+    Shown{"style.short_share", "Style", "short ones", 0.5, "of all strands: broken off"},
+    Shown{"style.tip_fade", "Style", "tips fade over", 0.0},
+    Shown{"shading.diffuse", "Shading", "", 2.0},
+    Shown{"shading.scatter", "Shading", "", 2.0, "light that comes through other strands"},
+    Shown{"shading.highlight", "Shading", "", 4.0, "of the light's colour, from the surface"},
+    Shown{"shading.transmission", "Shading", "", 4.0, "seen against the light"},
+    Shown{"shading.second_highlight", "Shading", "", 4.0, "coloured, nearer to the root"},
+    Shown{"shading.wetness", "Shading", "", 0.0, "0 dry, 1 dripping"},
 };
+// clang-format on
+// schema end
 
 const Shown* find_shown(std::string_view path) {
   const auto row =

@@ -45,40 +45,64 @@ std::vector<uint16_t> make_half_depths() {
   return halves;
 }
 
-LookDesc look_of(const StrandPictureLook& n, std::string hair_color) {
-  const auto vec = [](const float* v) { return glm::vec3(v[0], v[1], v[2]); };
-  const auto count = [](float v) { return v > 0.0f && v < 1e6f ? static_cast<uint32_t>(v) : 0u; };
-  LookDesc look;
-  look.hair_color = std::move(hair_color);
-  look.root_color = vec(n.root_color);
-  look.tip_color = vec(n.tip_color);
-  look.eumelanin = n.eumelanin;
-  look.pheomelanin = n.pheomelanin;
+uint32_t count(float value, uint32_t least, uint32_t most) {
+  if (!(value > static_cast<float>(least))) return least;
+  return value < static_cast<float>(most) ? static_cast<uint32_t>(value) : most;
+}
+
+// schema begin: look block reader
+// clang-format off
+/// Sets the numbers of a look. Counts that are no numbers within their limits become the nearest limit.
+void set_numbers(LookDesc& look, const StrandPictureLook& n) {
+  look.root_color = {n.root_color[0], n.root_color[1], n.root_color[2]};
+  look.tip_color = {n.tip_color[0], n.tip_color[1], n.tip_color[2]};
   look.strand_radius_m = n.strand_radius_m;
   look.tip_scale = n.tip_scale;
-  look.followers = count(n.followers);
-  look.segments = count(n.segments);
-  look.light_direction = vec(n.light_direction);
-  look.light_color = vec(n.light_color);
+  look.followers = count(n.followers, 0, 64);
+  look.segments = count(n.segments, 1, 8);
+  look.light_direction = {n.light_direction[0], n.light_direction[1], n.light_direction[2]};
+  look.light_color = {n.light_color[0], n.light_color[1], n.light_color[2]};
   look.ambient = n.ambient;
-  look.background = vec(n.background);
-  look.skin_color = vec(n.skin_color);
-  look.rim_direction = vec(n.rim_direction);
-  look.rim_color = vec(n.rim_color);
+  look.background = {n.background[0], n.background[1], n.background[2]};
+  look.skin_color = {n.skin_color[0], n.skin_color[1], n.skin_color[2]};
+  look.eumelanin = n.eumelanin;
+  look.pheomelanin = n.pheomelanin;
+  look.rim_direction = {n.rim_direction[0], n.rim_direction[1], n.rim_direction[2]};
+  look.rim_color = {n.rim_color[0], n.rim_color[1], n.rim_color[2]};
   look.exposure = n.exposure;
-  look.style = {n.clump,        n.locks > 1.0f ? count(n.locks) : 1u,
-                n.spread,       n.wave_m,
-                n.wave_count,   n.frizz_m,
-                n.frizz_count,  n.stray_share,
-                n.stray_spread, n.length_spread,
-                n.short_share,  n.tip_fade};
-  look.shading = {n.diffuse,          n.scatter,
-                  n.highlight,        n.transmission,
-                  n.second_highlight, n.highlight_width_deg,
-                  n.cuticle_deg,      n.cuticle_spread_deg,
-                  n.root_darkening,   n.strand_variation,
-                  n.lock_variation,   n.warmth_variation,
-                  n.wetness};
+  look.style.clump = n.style_clump;
+  look.style.locks = count(n.style_locks, 1, 16);
+  look.style.spread = n.style_spread;
+  look.style.wave_m = n.style_wave_m;
+  look.style.wave_count = n.style_wave_count;
+  look.style.frizz_m = n.style_frizz_m;
+  look.style.frizz_count = n.style_frizz_count;
+  look.style.stray_share = n.style_stray_share;
+  look.style.stray_spread = n.style_stray_spread;
+  look.style.length_spread = n.style_length_spread;
+  look.style.short_share = n.style_short_share;
+  look.style.tip_fade = n.style_tip_fade;
+  look.shading.diffuse = n.shading_diffuse;
+  look.shading.scatter = n.shading_scatter;
+  look.shading.highlight = n.shading_highlight;
+  look.shading.transmission = n.shading_transmission;
+  look.shading.second_highlight = n.shading_second_highlight;
+  look.shading.highlight_width_deg = n.shading_highlight_width_deg;
+  look.shading.cuticle_deg = n.shading_cuticle_deg;
+  look.shading.cuticle_spread_deg = n.shading_cuticle_spread_deg;
+  look.shading.root_darkening = n.shading_root_darkening;
+  look.shading.strand_variation = n.shading_strand_variation;
+  look.shading.lock_variation = n.shading_lock_variation;
+  look.shading.warmth_variation = n.shading_warmth_variation;
+  look.shading.wetness = n.shading_wetness;
+}
+// clang-format on
+// schema end
+
+LookDesc look_of(const StrandPictureLook& numbers, std::string hair_color) {
+  LookDesc look;
+  look.hair_color = std::move(hair_color);
+  set_numbers(look, numbers);
   return drawable(std::move(look));
 }
 

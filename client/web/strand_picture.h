@@ -9,24 +9,54 @@
 struct StrandPicture;
 
 /// A look's numbers: all of LookDesc (common/scene/scene_desc.h) except its colour name and methods.
+// schema begin: look block
+// clang-format off
 struct StrandPictureLook {
-  float root_color[3], tip_color[3];                            // 0
-  float eumelanin, pheomelanin, strand_radius_m, tip_scale;     // 6
-  float followers, segments;                                    // 10
-  float light_direction[3], light_color[3];                     // 12
-  float ambient;                                                // 18
-  float background[3], skin_color[3];                           // 19
-  float rim_direction[3], rim_color[3];                         // 25
-  float exposure;                                               // 31
-  float clump, locks, spread, wave_m, wave_count, frizz_m;      // 32, in the order of StrandStyle
-  float frizz_count, stray_share, stray_spread, length_spread;  // 38
-  float short_share, tip_fade;                                  // 42
-  float diffuse, scatter, highlight, transmission;              // 44, in the order of HairShading
-  float second_highlight, highlight_width_deg, cuticle_deg;     // 48
-  float cuticle_spread_deg, root_darkening, strand_variation;   // 51
-  float lock_variation, warmth_variation, wetness;              // 54
+  float root_color[3];  // 0
+  float tip_color[3];  // 3
+  float strand_radius_m;  // 6
+  float tip_scale;  // 7
+  float followers;  // 8
+  float segments;  // 9
+  float light_direction[3];  // 10
+  float light_color[3];  // 13
+  float ambient;  // 16
+  float background[3];  // 17
+  float skin_color[3];  // 20
+  float eumelanin;  // 23
+  float pheomelanin;  // 24
+  float rim_direction[3];  // 25
+  float rim_color[3];  // 28
+  float exposure;  // 31
+  float style_clump;  // 32
+  float style_locks;  // 33
+  float style_spread;  // 34
+  float style_wave_m;  // 35
+  float style_wave_count;  // 36
+  float style_frizz_m;  // 37
+  float style_frizz_count;  // 38
+  float style_stray_share;  // 39
+  float style_stray_spread;  // 40
+  float style_length_spread;  // 41
+  float style_short_share;  // 42
+  float style_tip_fade;  // 43
+  float shading_diffuse;  // 44
+  float shading_scatter;  // 45
+  float shading_highlight;  // 46
+  float shading_transmission;  // 47
+  float shading_second_highlight;  // 48
+  float shading_highlight_width_deg;  // 49
+  float shading_cuticle_deg;  // 50
+  float shading_cuticle_spread_deg;  // 51
+  float shading_root_darkening;  // 52
+  float shading_strand_variation;  // 53
+  float shading_lock_variation;  // 54
+  float shading_warmth_variation;  // 55
+  float shading_wetness;  // 56
 };
 static_assert(sizeof(StrandPictureLook) == 57 * sizeof(float));
+// clang-format on
+// schema end
 
 /// View and size of one picture.
 struct StrandPictureView {

@@ -23,25 +23,31 @@ LightDirections light_directions(const LookDesc& look, const glm::dquat& world_f
 ShadingNumbers shading_numbers(const LookDesc& look) {
   const HairColors colors = colors_of(look);
   const HairShadingDesc& s = look.shading;
-  return {colors.root,
-          colors.tip,
-          s.diffuse,
-          s.scatter,
-          s.highlight,
-          s.transmission,
-          s.second_highlight,
-          glm::radians(s.highlight_width_deg),
-          glm::radians(s.cuticle_deg),
-          glm::radians(s.cuticle_spread_deg),
-          s.root_darkening,
-          s.strand_variation,
-          s.lock_variation,
-          s.warmth_variation,
-          s.wetness,
-          look.exposure * look.light_color,
-          look.exposure * look.rim_color,
-          look.skin_color,
-          look.exposure * look.ambient};
+  ShadingNumbers n;
+  n.root_color = colors.root;
+  n.tip_color = colors.tip;
+  // schema begin: set shading
+  // clang-format off
+  n.diffuse = s.diffuse;
+  n.scatter = s.scatter;
+  n.highlight = s.highlight;
+  n.transmission = s.transmission;
+  n.second_highlight = s.second_highlight;
+  n.width_rad = glm::radians(s.highlight_width_deg);
+  n.tilt_rad = glm::radians(s.cuticle_deg);
+  n.tilt_spread_rad = glm::radians(s.cuticle_spread_deg);
+  n.root_darkening = s.root_darkening;
+  n.strand_variation = s.strand_variation;
+  n.lock_variation = s.lock_variation;
+  n.warmth_variation = s.warmth_variation;
+  n.wetness = s.wetness;
+  // clang-format on
+  // schema end
+  n.key_color = look.exposure * look.light_color;
+  n.rim_color = look.exposure * look.rim_color;
+  n.skin_color = look.skin_color;
+  n.ambient = look.exposure * look.ambient;
+  return n;
 }
 
 }  // namespace strandcast

@@ -27,13 +27,27 @@ LightDirections light_directions(const LookDesc& look, const glm::dquat& world_f
 
 /// The look as the parameters of shaders/lib/hair_light.glsl.
 struct ShadingNumbers {
-  glm::vec3 root_color, tip_color;
-  float diffuse, scatter, highlight, transmission, second_highlight;
-  float width_rad, tilt_rad, tilt_spread_rad;
-  float root_darkening, strand_variation, lock_variation, warmth_variation, wetness;
-  glm::vec3 key_color, rim_color;
-  glm::vec3 skin_color;
-  float ambient;
+  glm::vec3 root_color{0.0f}, tip_color{0.0f};
+  // schema begin: shading numbers
+  // clang-format off
+  float diffuse = 0.0f;
+  float scatter = 0.0f;
+  float highlight = 0.0f;
+  float transmission = 0.0f;
+  float second_highlight = 0.0f;
+  float width_rad = 0.0f;
+  float tilt_rad = 0.0f;
+  float tilt_spread_rad = 0.0f;
+  float root_darkening = 0.0f;
+  float strand_variation = 0.0f;
+  float lock_variation = 0.0f;
+  float warmth_variation = 0.0f;
+  float wetness = 0.0f;
+  // clang-format on
+  // schema end
+  glm::vec3 key_color{0.0f}, rim_color{0.0f};
+  glm::vec3 skin_color{0.0f};
+  float ambient = 0.0f;
 };
 ShadingNumbers shading_numbers(const LookDesc& look);
 

@@ -128,67 +128,63 @@ struct HeadDesc {
   bool operator==(const HeadDesc&) const = default;
 };
 
-/// How drawn strands lie between and beside simulated ones. Shares are relative to strand length unless
-/// stated otherwise; all offsets vanish at the root.
+// schema begin: look
+// clang-format off
+/// How drawn strands lie between and beside the simulated ones; none of it moves a root.
 struct StrandStyleDesc {
-  float clump = 0.8f;       // 0..1: how far tips are drawn together into locks
-  uint32_t locks = 5;       // per root triangle, 1..16
-  float spread = 0.012f;    // how far a tip strays from its lock, of the mean strand length
-  float wave_m = 0.004f;    // amplitude of the waves that a lock's strands share, at the tip
+  float clump = 0.8f;  // 0..1: how far tips are drawn together into locks
+  uint32_t locks = 5;  // per root triangle, 1..16
+  float spread = 0.012f;  // how far a tip strays from its lock, of the mean strand length
+  float wave_m = 0.004f;  // amplitude of the waves that a lock's strands share, at the tip
   float wave_count = 3.0f;  // waves along a strand
   float frizz_m = 0.0006f;  // amplitude of each strand's own small waves
   float frizz_count = 9.0f;
-  float stray_share = 0.04f;    // of strands: they leave their lock
-  float stray_spread = 3.5f;    // how much further than others they stray
+  float stray_share = 0.04f;  // of strands: they leave their lock
+  float stray_spread = 3.5f;  // how much further than others these stray
   float length_spread = 0.18f;  // 0..1: largest part that a strand is shorter by
-  float short_share = 0.1f;     // of strands: broken ones, much shorter
-  float tip_fade = 0.2f;        // last part of a strand, over which it fades out
-
+  float short_share = 0.1f;  // of strands: broken ones, much shorter
+  float tip_fade = 0.2f;  // last part of a strand, over which it fades out
   bool operator==(const StrandStyleDesc&) const = default;
 };
-
-/// How a strand reflects light: weights of the terms, and variation between strands.
+/// How a strand takes the light.
 struct HairShadingDesc {
   float diffuse = 0.42f;
-  float scatter = 0.5f;           // light that comes through other strands
-  float highlight = 1.0f;         // R: the light's colour, from the surface
-  float transmission = 1.0f;      // TT: seen against the light
+  float scatter = 0.5f;  // light that comes through other strands
+  float highlight = 1.0f;  // R: the light's colour, from the surface
+  float transmission = 1.0f;  // TT, seen against the light
   float second_highlight = 1.0f;  // TRT: coloured, nearer to the root
   float highlight_width_deg = 7.5f;
-  float cuticle_deg = 3.5f;         // tilt of the scales: moves the highlights apart
+  float cuticle_deg = 3.5f;  // tilt of the scales: moves the highlights apart
   float cuticle_spread_deg = 5.0f;  // from strand to strand
-  float root_darkening = 0.45f;     // 0..1, over the first quarter of a strand
-  float strand_variation = 0.22f;   // 0..1, of brightness from strand to strand
-  float lock_variation = 0.12f;     // from lock to lock
-  float warmth_variation = 0.08f;   // 0..1, of red against blue
-  float wetness = 0.0f;             // 0 dry .. 1 dripping: darker, clumped, sharp highlights
-
+  float root_darkening = 0.45f;  // 0..1, over the first quarter of a strand
+  float strand_variation = 0.22f;  // 0..1, of brightness from strand to strand
+  float lock_variation = 0.12f;  // from lock to lock
+  float warmth_variation = 0.08f;  // 0..1, of red against blue
+  float wetness = 0.0f;  // 0 dry .. 1 dripping: darker, clumped, sharp highlights
   bool operator==(const HairShadingDesc&) const = default;
 };
-
 struct LookDesc {
-  std::string hair_color = "custom";  // "custom": root and tip colour; "melanin"; or a preset's name
+  // "custom": root_color and tip_color; "melanin": eumelanin and pheomelanin; or a preset: black, brown, ...
+  std::string hair_color = "custom";
   glm::vec3 root_color{0.075f, 0.036f, 0.017f};  // linear RGB, 0..1
   glm::vec3 tip_color{0.26f, 0.125f, 0.05f};
-  float eumelanin = 1.3f;            // concentrations; brown to black
-  float pheomelanin = 0.0f;          // yellow to red
+  float eumelanin = 1.3f;  // concentrations; brown to black
+  float pheomelanin = 0.0f;  // yellow to red
   float strand_radius_m = 0.00012f;  // as drawn: a drawn strand stands for several real ones
-  float tip_scale = 0.25f;           // radius at the tip over radius at the root
-  uint32_t followers = 3;            // drawn strands per root triangle, beside the key strands
-  uint32_t segments = 3;             // drawn segments between two simulated vertices, 1..8
+  float tip_scale = 0.25f;  // radius at the tip over radius at the root
+  uint32_t followers = 3;  // drawn strands per root triangle, beside the key strands
+  uint32_t segments = 3;  // drawn segments between two simulated vertices, 1..8
   StrandStyleDesc style;
   HairShadingDesc shading;
   glm::vec3 light_direction{-0.45f, -0.75f, -0.5f};  // travels this way, world
   glm::vec3 light_color{1.0f, 0.97f, 0.92f};
   glm::vec3 rim_direction{0.55f, -0.45f, 0.8f};  // the second light's
-  glm::vec3 rim_color{0.45f, 0.48f, 0.55f};      // black: there is none
+  glm::vec3 rim_color{0.45f, 0.48f, 0.55f};  // black: there is none
   float ambient = 0.22f;
   float exposure = 1.0f;
   glm::vec3 background{0.11f, 0.12f, 0.135f};
   glm::vec3 skin_color{0.55f, 0.38f, 0.29f};
   RenderMethodsDesc methods;
-
-  // Out of line: copied and taken apart in many files, which need no copy of that code.
   LookDesc();
   LookDesc(const LookDesc&);
   LookDesc(LookDesc&&) noexcept;
@@ -197,15 +193,18 @@ struct LookDesc {
   ~LookDesc();
   bool operator==(const LookDesc&) const;
 };
-
-/// Camera that follows the head's position, but not its rotation.
+// clang-format on
+// schema end
+// schema begin: camera
+// clang-format off
 struct CameraDesc {
   glm::vec3 offset_m{0.22f, 0.07f, 0.62f};  // from the point looked at, world axes
   glm::vec3 target_m{0.0f, -0.055f, 0.0f};  // from the head joint, world axes
   float fov_y_rad = 0.61f;
-
   bool operator==(const CameraDesc&) const = default;
 };
+// clang-format on
+// schema end
 
 struct StreamDesc {
   std::string codec = "step";  // "step" (fewest bits), "tangent", "delta" (least time) or "raw"

@@ -73,24 +73,8 @@ inline constexpr Range kWindSpeed{-100.0, 100.0, "m/s"};
 inline constexpr Range kGustIntensity{0.0, 3.0, ""};
 inline constexpr Range kGustLength{0.1, 1000.0, "m"};
 inline constexpr Range kFraction{0.0, 1.0, ""};
-inline constexpr Range kLightColor{0.0, 100.0, ""};
-inline constexpr Range kDrawnRadius{1e-6, 0.01, "m"};
-inline constexpr Range kFollowers{0, 64, ""};
-inline constexpr Range kSegments{1, 8, ""};
-inline constexpr Range kLocks{1, 16, ""};
-inline constexpr Range kStyleAmplitude{0.0, 0.1, "m"};
-inline constexpr Range kStyleCount{0.0, 64.0, "waves"};
-inline constexpr Range kStraySpread{0.0, 20.0, ""};
-inline constexpr Range kMelanin{0.0, 10.0, ""};
-inline constexpr Range kShadingWeight{0.0, 10.0, ""};
-inline constexpr Range kHighlightWidth{1.0, 45.0, "degrees"};
-inline constexpr Range kCuticle{-15.0, 15.0, "degrees"};
-inline constexpr Range kCuticleSpread{0.0, 30.0, "degrees"};
-inline constexpr Range kExposure{0.0, 100.0, ""};
 inline constexpr Range kDirection{-1e3, 1e3, ""};
-inline constexpr Range kCameraOffset{-100.0, 100.0, "m"};
 inline constexpr Range kHeadPlace{-1000.0, 1000.0, "m"};
-inline constexpr Range kFieldOfView{0.02, 2.8, "rad"};
 inline constexpr Range kStreamBound{2e-5, 5e-4, "m"};
 inline constexpr Range kFrameWidth{kMinPictureSide, kMaxPictureWidth, "pixels"};
 inline constexpr Range kFrameHeight{kMinPictureSide, kMaxPictureHeight, "pixels"};
@@ -145,39 +129,6 @@ void visit_groom(Visitor& v, GroomDesc& groom) {
 }
 
 template <class Visitor>
-void visit_style(Visitor& v, StrandStyleDesc& style) {
-  v.number("clump", style.clump, kFraction);
-  v.number("locks", style.locks, kLocks);
-  v.number("spread", style.spread, kFraction);
-  v.number("wave_m", style.wave_m, kStyleAmplitude);
-  v.number("wave_count", style.wave_count, kStyleCount);
-  v.number("frizz_m", style.frizz_m, kStyleAmplitude);
-  v.number("frizz_count", style.frizz_count, kStyleCount);
-  v.number("stray_share", style.stray_share, kFraction);
-  v.number("stray_spread", style.stray_spread, kStraySpread);
-  v.number("length_spread", style.length_spread, kFraction);
-  v.number("short_share", style.short_share, kFraction);
-  v.number("tip_fade", style.tip_fade, kFraction);
-}
-
-template <class Visitor>
-void visit_shading(Visitor& v, HairShadingDesc& shading) {
-  v.number("diffuse", shading.diffuse, kShadingWeight);
-  v.number("scatter", shading.scatter, kShadingWeight);
-  v.number("highlight", shading.highlight, kShadingWeight);
-  v.number("transmission", shading.transmission, kShadingWeight);
-  v.number("second_highlight", shading.second_highlight, kShadingWeight);
-  v.number("highlight_width_deg", shading.highlight_width_deg, kHighlightWidth);
-  v.number("cuticle_deg", shading.cuticle_deg, kCuticle);
-  v.number("cuticle_spread_deg", shading.cuticle_spread_deg, kCuticleSpread);
-  v.number("root_darkening", shading.root_darkening, kFraction);
-  v.number("strand_variation", shading.strand_variation, kFraction);
-  v.number("lock_variation", shading.lock_variation, kFraction);
-  v.number("warmth_variation", shading.warmth_variation, kFraction);
-  v.number("wetness", shading.wetness, kFraction);
-}
-
-template <class Visitor>
 void visit_methods(Visitor& v, RenderMethodsDesc& methods) {
   const auto method = [&](const char* name, std::string& chosen, const auto& table) {
     v.text(name, chosen, kMaxNameBytes);
@@ -198,42 +149,79 @@ void visit_methods(Visitor& v, RenderMethodsDesc& methods) {
   v.require("transparency", *conflict == '\0', conflict);
 }
 
-template <class Visitor>
-void visit_look(Visitor& v, LookDesc& look) {
-  v.text("hair_color", look.hair_color, kMaxNameBytes);
-  v.require("hair_color", is_hair_color(look.hair_color), kHairColorSentence);
-  v.color("root_color", look.root_color, kFraction);
-  v.color("tip_color", look.tip_color, kFraction);
-  v.number("eumelanin", look.eumelanin, kMelanin);
-  v.number("pheomelanin", look.pheomelanin, kMelanin);
-  v.number("strand_radius_m", look.strand_radius_m, kDrawnRadius);
-  v.number("tip_scale", look.tip_scale, kFraction);
-  v.number("followers", look.followers, kFollowers);
-  v.number("segments", look.segments, kSegments);
-  v.group("style", [&] { visit_style(v, look.style); });
-  v.group("shading", [&] { visit_shading(v, look.shading); });
-  v.vector("light_direction", look.light_direction, kDirection);
-  v.require("light_direction", glm::length(look.light_direction) >= kMinDirectionLength,
-            "must point somewhere");
-  v.color("light_color", look.light_color, kLightColor);
-  v.vector("rim_direction", look.rim_direction, kDirection);
-  v.require("rim_direction", glm::length(look.rim_direction) >= kMinDirectionLength, "must point somewhere");
-  v.color("rim_color", look.rim_color, kLightColor);
-  v.number("ambient", look.ambient, kFraction);
-  v.number("exposure", look.exposure, kExposure);
-  v.color("background", look.background, kFraction);
-  v.color("skin_color", look.skin_color, kFraction);
-  v.group("methods", [&] { visit_methods(v, look.methods); });
+/// Returns whether a direction or offset is long enough to have a direction.
+inline bool points_somewhere(const glm::vec3& way) {
+  return glm::length(way) >= static_cast<float>(kMinDirectionLength);
 }
 
+// schema begin: look fields
+// clang-format off
 template <class Visitor>
-void visit_camera(Visitor& v, CameraDesc& camera) {
-  v.vector("offset_m", camera.offset_m, kCameraOffset);
-  v.require("offset_m", glm::length(camera.offset_m) >= kMinDirectionLength,
-            "is almost zero, it must be at least 0.001 m long");
-  v.vector("target_m", camera.target_m, kCameraOffset);
-  v.number("fov_y_rad", camera.fov_y_rad, kFieldOfView);
+void visit_style(Visitor& v, StrandStyleDesc& m) {
+  v.number("clump", m.clump, Range{0, 1, ""});
+  v.number("locks", m.locks, Range{1, 16, ""});
+  v.number("spread", m.spread, Range{0, 1, ""});
+  v.number("wave_m", m.wave_m, Range{0, 0.1, "m"});
+  v.number("wave_count", m.wave_count, Range{0, 64, "waves"});
+  v.number("frizz_m", m.frizz_m, Range{0, 0.1, "m"});
+  v.number("frizz_count", m.frizz_count, Range{0, 64, "waves"});
+  v.number("stray_share", m.stray_share, Range{0, 1, ""});
+  v.number("stray_spread", m.stray_spread, Range{0, 20, ""});
+  v.number("length_spread", m.length_spread, Range{0, 1, ""});
+  v.number("short_share", m.short_share, Range{0, 1, ""});
+  v.number("tip_fade", m.tip_fade, Range{0, 1, ""});
 }
+template <class Visitor>
+void visit_shading(Visitor& v, HairShadingDesc& m) {
+  v.number("diffuse", m.diffuse, Range{0, 10, ""});
+  v.number("scatter", m.scatter, Range{0, 10, ""});
+  v.number("highlight", m.highlight, Range{0, 10, ""});
+  v.number("transmission", m.transmission, Range{0, 10, ""});
+  v.number("second_highlight", m.second_highlight, Range{0, 10, ""});
+  v.number("highlight_width_deg", m.highlight_width_deg, Range{1, 45, "degrees"});
+  v.number("cuticle_deg", m.cuticle_deg, Range{-15, 15, "degrees"});
+  v.number("cuticle_spread_deg", m.cuticle_spread_deg, Range{0, 30, "degrees"});
+  v.number("root_darkening", m.root_darkening, Range{0, 1, ""});
+  v.number("strand_variation", m.strand_variation, Range{0, 1, ""});
+  v.number("lock_variation", m.lock_variation, Range{0, 1, ""});
+  v.number("warmth_variation", m.warmth_variation, Range{0, 1, ""});
+  v.number("wetness", m.wetness, Range{0, 1, ""});
+}
+template <class Visitor>
+void visit_look(Visitor& v, LookDesc& m) {
+  v.text("hair_color", m.hair_color, kMaxNameBytes);
+  v.require("hair_color", is_hair_color(m.hair_color), kHairColorSentence);
+  v.color("root_color", m.root_color, Range{0, 1, ""});
+  v.color("tip_color", m.tip_color, Range{0, 1, ""});
+  v.number("eumelanin", m.eumelanin, Range{0, 10, ""});
+  v.number("pheomelanin", m.pheomelanin, Range{0, 10, ""});
+  v.number("strand_radius_m", m.strand_radius_m, Range{1e-6, 0.01, "m"});
+  v.number("tip_scale", m.tip_scale, Range{0, 1, ""});
+  v.number("followers", m.followers, Range{0, 64, ""});
+  v.number("segments", m.segments, Range{1, 8, ""});
+  v.group("style", [&] { visit_style(v, m.style); });
+  v.group("shading", [&] { visit_shading(v, m.shading); });
+  v.vector("light_direction", m.light_direction, Range{-1e3, 1e3, ""});
+  v.require("light_direction", points_somewhere(m.light_direction), "must point somewhere");
+  v.color("light_color", m.light_color, Range{0, 100, ""});
+  v.vector("rim_direction", m.rim_direction, Range{-1e3, 1e3, ""});
+  v.require("rim_direction", points_somewhere(m.rim_direction), "must point somewhere");
+  v.color("rim_color", m.rim_color, Range{0, 100, ""});
+  v.number("ambient", m.ambient, Range{0, 1, ""});
+  v.number("exposure", m.exposure, Range{0, 100, ""});
+  v.color("background", m.background, Range{0, 1, ""});
+  v.color("skin_color", m.skin_color, Range{0, 1, ""});
+  v.group("methods", [&] { visit_methods(v, m.methods); });
+}
+template <class Visitor>
+void visit_camera(Visitor& v, CameraDesc& m) {
+  v.vector("offset_m", m.offset_m, Range{-100, 100, "m"});
+  v.require("offset_m", points_somewhere(m.offset_m), "is almost zero, it must be at least 0.001 m long");
+  v.vector("target_m", m.target_m, Range{-100, 100, "m"});
+  v.number("fov_y_rad", m.fov_y_rad, Range{0.02, 2.8, "rad"});
+}
+// clang-format on
+// schema end
 
 template <class Visitor>
 void visit_stream(Visitor& v, StreamDesc& stream) {

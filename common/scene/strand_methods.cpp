@@ -1,6 +1,8 @@
 #include "common/scene/strand_methods.h"
 
+#include <algorithm>
 #include <array>
+#include <string_view>
 
 namespace strandcast {
 namespace {
@@ -30,6 +32,18 @@ constexpr std::array<MethodRow, 2> kShadowDetails{{
     {"coarse", "strands chosen for the texels of the light's map cast them"},
 }};
 
+// Fields of a look that only the main method draws.
+// schema begin: main only
+// clang-format off
+constexpr std::array<std::string_view, 15> kMainOnly{"style.clump", "style.locks", "style.spread",
+                                                     "style.wave_m", "style.wave_count", "style.frizz_m",
+                                                     "style.frizz_count", "style.stray_share",
+                                                     "style.stray_spread", "style.length_spread",
+                                                     "style.short_share", "style.tip_fade",
+                                                     "shading.lock_variation", "rim_direction", "rim_color"};
+// clang-format on
+// schema end
+
 }  // namespace
 
 const MethodTable<CurveMethod>& curve_methods() {
@@ -58,7 +72,7 @@ const MethodTable<ShadowDetail>& shadow_details() {
 }
 
 bool is_drawn_by_methods(std::string_view field) {
-  return !(field.starts_with("style.") || field.starts_with("rim_") || field == "shading.lock_variation");
+  return std::find(kMainOnly.begin(), kMainOnly.end(), field) == kMainOnly.end();
 }
 
 }  // namespace strandcast

@@ -6,34 +6,10 @@ std::string codec_text(const Welcome& welcome) {
   return welcome.codec_reason.empty() ? welcome.codec : welcome.codec_reason;
 }
 
-const char* to_string(StreamMode mode) {
-  switch (mode) {
-    case StreamMode::Strands:
-      return "strands";
-    case StreamMode::Frames:
-      return "frames";
-    case StreamMode::Auto:
-      return "auto";
-  }
-  return "unknown";
-}
-
-const char* to_string(DrawingDevice device) {
-  switch (device) {
-    case DrawingDevice::Unknown:
-      return "unknown";
-    case DrawingDevice::None:
-      return "none";
-    case DrawingDevice::Software:
-      return "software";
-    case DrawingDevice::Hardware:
-      return "hardware";
-  }
-  return "unknown";
-}
-
-const char* to_string(Role role) {
-  switch (role) {
+// schema begin: names
+// clang-format off
+const char* to_string(Role value) {
+  switch (value) {
     case Role::Viewer:
       return "viewer";
     case Role::Controller:
@@ -45,5 +21,31 @@ const char* to_string(Role role) {
   }
   return "unknown";
 }
+const char* to_string(StreamMode value) {
+  switch (value) {
+    case StreamMode::Strands:
+      return "strands";
+    case StreamMode::Frames:
+      return "frames";
+    case StreamMode::Auto:
+      return "auto";
+  }
+  return "unknown";
+}
+const char* to_string(DrawingDevice value) {
+  switch (value) {
+    case DrawingDevice::Unknown:
+      return "unknown";
+    case DrawingDevice::None:
+      return "none";
+    case DrawingDevice::Software:
+      return "software";
+    case DrawingDevice::Hardware:
+      return "hardware";
+  }
+  return "unknown";
+}
+// clang-format on
+// schema end
 
 }  // namespace strandcast

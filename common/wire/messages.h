@@ -1,7 +1,7 @@
 // Control messages as domain types; protobuf types never leave common/wire. Decoding checks every field:
 // finite numbers, ranges, counts, text. The only exception is the values of motion and wind samples. They are
 // passed on unchecked, NaN included, because the server's input hub checks and counts them. No I/O. Sizes and
-// versions: proto/WIRE.md.
+// versions: proto/WIRE.md. proto/schema.py makes the parts marked `schema` from proto/strandcast/v1.
 #pragma once
 
 #include <cstddef>
@@ -20,67 +20,43 @@
 namespace strandcast {
 
 inline constexpr const char* kWebSocketProtocol = "strandcast.v1";
-inline constexpr size_t kMaxControlBytes = 64u << 10;
-inline constexpr uint32_t kMaxSamplesPerMessage = 256;
 inline constexpr uint16_t kDefaultPort = 7878;
-inline constexpr size_t kMaxNameChars = 64;    // names of clients, scenes, codecs, versions
+// schema begin: limits
+// clang-format off
+inline constexpr size_t kMaxControlBytes = 65'536;
+inline constexpr uint32_t kMaxSamplesPerMessage = 256;
+inline constexpr size_t kMaxNameChars = 64;  // names of clients, scenes, codecs, versions
 inline constexpr size_t kMaxTextChars = 1024;  // reasons and notices
 inline constexpr size_t kMaxTokenBytes = 256;
 inline constexpr size_t kMaxAssignmentBytes = 4096;  // SetParameter
-inline constexpr size_t kMaxSceneTextBytes = 60u << 10;
+inline constexpr size_t kMaxSceneTextBytes = 61'440;
 inline constexpr size_t kSessionIdChars = 16;
 inline constexpr uint32_t kMaxRateDivisor = 64;
-// A full SessionList stays below kMaxControlBytes.
-inline constexpr uint32_t kMaxListedSessions = 256;
+inline constexpr uint32_t kMaxListedSessions = 256;  // a full SessionList stays below kMaxControlBytes
 inline constexpr size_t kMaxListedNameChars = 32;
 inline constexpr size_t kMaxAddressChars = 64;
 inline constexpr double kMaxReportedMs = 60'000.0;  // ViewerReport
 inline constexpr double kMaxReportedPx = 100'000.0;
-inline constexpr double kMaxReportedHz = 1'000.0;
-// A ServerStatus with kMaxLiveInputs full inputs stays below kMaxControlBytes.
+inline constexpr double kMaxReportedHz = 1000.0;
+// a ServerStatus with kMaxLiveInputs full inputs stays below kMaxControlBytes
 inline constexpr size_t kMaxLiveInputChars = 128;
 inline constexpr size_t kMaxLiveSubjectsChars = 512;
 inline constexpr size_t kMaxLiveValues = 16;
 inline constexpr size_t kMaxLiveValueChars = 120;
-inline constexpr double kMaxStepNs = 1e6;           // Hello
+inline constexpr double kMaxStepNs = 1'000'000.0;  // Hello
 inline constexpr uint32_t kMaxStepCount = 100'000;  // ControlCommand
-inline constexpr double kMaxBanS = 7.0 * 86'400.0;  // AdminCommand
-// A full ParameterList stays below kMaxControlBytes.
-inline constexpr uint32_t kMaxListedParameters = 64;
+inline constexpr double kMaxBanS = 604'800.0;  // AdminCommand
+inline constexpr uint32_t kMaxListedParameters = 64;  // a full ParameterList stays below kMaxControlBytes
 inline constexpr size_t kMaxParameterPathBytes = 96;
 inline constexpr size_t kMaxParameterTextBytes = 160;
-// Full StateTimes stay below kMaxControlBytes.
-inline constexpr uint32_t kMaxStateTimes = 512;
+inline constexpr uint32_t kMaxStateTimes = 512;  // full StateTimes stay below kMaxControlBytes
 inline constexpr size_t kMaxRelays = 8;  // one behind another
 inline constexpr uint32_t kMaxListedClasses = 64;
 inline constexpr size_t kMaxListedCodecs = 4;
-inline constexpr double kMaxSolverCost = 1e3;
+inline constexpr double kMaxSolverCost = 1000.0;
+// clang-format on
+// schema end
 
-enum class Role { Viewer, Controller, Source, Admin };
-enum class StreamMode { Strands, Frames, Auto };
-
-// ---- client to server ----
-struct Hello {               // first message; answered by Welcome or Goodbye
-  Role role = Role::Viewer;  // a Controller views and may steer; a Source sends motion and wind; an Admin all
-  StreamMode mode = StreamMode::Strands;
-  std::string name;                            // shown in logs, at most 64 characters
-  std::string token;                           // empty on loopback
-  uint32_t frame_width = 0, frame_height = 0;  // frames mode; 0 = server's choice
-  bool acknowledges = false;                   // will send a FrameAck for every media message it can use
-  PictureCodecs picture_codecs = 0;            // what it decodes besides whole JPEG pictures
-  bool gets_no_stream = false;                 // neither strands nor frames: it came to say something
-  // What one vertex of one solver step takes on its machine, one thread, at most kMaxStepNs; 0 = it cannot
-  // predict: an older viewer, a browser, a build without kernels.
-  double step_ns = 0.0;
-  std::string codec_wish = {};  // strand codec that it insists on; empty = the server chooses
-  bool keeps_camera = false;    // nobody else moves its camera
-  std::string head = {};        // of those that the server has, by its name; empty = the first
-  // Of a relay, which passes on what it gets: its session_id. It is told the StreamList, and gets the strands
-  // of one class, whatever its link. Empty: a viewer.
-  std::string relay_id = {};
-  uint32_t strand_class = 0;  // that a relay wants, by its place in the StreamList
-  bool operator==(const Hello&) const = default;
-};
 struct MotionSamples {  // from a Source
   struct Sample {
     int64_t time_ns = 0;  // source clock, monotonic
@@ -105,101 +81,138 @@ struct WindSamples {  // from a Source
   std::vector<Sample> samples;
   bool operator==(const WindSamples&) const = default;
 };
-struct CameraChange {  // to the server: where this viewer looks from; to a viewer: where it is to look from
+
+// schema begin: messages
+// clang-format off
+enum class Role { Viewer, Controller, Source, Admin };
+enum class StreamMode { Strands, Frames, Auto };
+enum class Command { Pause, Resume, StepOnce, Reset };
+enum class AdminAction { ListSessions, Kick, ShutDown };
+enum class DrawingDevice { Unknown, None, Software, Hardware };
+enum class LiveAction { ChooseSubject, Calibrate, Reset };
+/// First message; answered by Welcome or Goodbye.
+struct Hello {
+  Role role = Role::Viewer;  // a Controller views and may steer; a Source sends motion and wind; an Admin all
+  StreamMode mode = StreamMode::Strands;
+  std::string name = {};  // shown in logs, at most 64 characters
+  std::string token = {};  // empty on loopback
+  uint32_t frame_width = 0;  // frames mode; 0 = server's choice
+  uint32_t frame_height = 0;
+  bool acknowledges = false;  // sends a FrameAck for every media message
+  PictureCodecs picture_codecs = 0;  // bit 1 << PictureCodec
+  bool gets_no_stream = false;  // neither strands nor frames
+  double step_ns = 0.0;  // of one vertex in one solver step here, one thread; 0 = cannot predict
+  std::string codec_wish = {};  // strand codec that is insisted on; empty = the server chooses
+  bool keeps_camera = false;  // nobody else moves its camera
+  std::string head = {};  // of those that the server has, by its name; empty = the first
+  std::string relay_id = {};  // of a relay: its session_id; empty = a viewer
+  uint32_t strand_class = 0;  // that a relay wants, by its place in the StreamList
+  bool operator==(const Hello&) const = default;
+};
+/// A camera. To the server: where this viewer looks from; to a viewer: where it is to look from.
+struct CameraChange {
   CameraDesc camera;
   bool operator==(const CameraChange&) const = default;
 };
+/// Asks for a frame that can be entered.
 struct KeyframeRequest {
   bool operator==(const KeyframeRequest&) const = default;
 };
-struct FrameAck {  // of every media message that was used
+/// Acknowledges a media message that was used.
+struct FrameAck {
   uint32_t sequence = 0;
   int64_t receive_time_ns = 0;  // client clock
   uint32_t decode_us = 0;
   uint16_t stream_id = 0;  // of its header
   bool operator==(const FrameAck&) const = default;
 };
-struct Ping {  // clock probe
+/// Clock probe.
+struct Ping {
   int64_t client_time_ns = 0;
   bool operator==(const Ping&) const = default;
 };
-enum class Command { Pause, Resume, StepOnce, Reset };
-struct ControlCommand {  // from a Controller
+/// From a Controller.
+struct ControlCommand {
   Command command = Command::Pause;
-  // Of StepOnce: so many steps, answered when they are done and their last state is published; 0 = one,
-  // answered at once.
+  // of COMMAND_STEP_ONCE: so many, answered when done and published; 0 = one, answered at once
   uint32_t step_count = 0;
   bool operator==(const ControlCommand&) const = default;
 };
-struct SetParameter {  // from a Controller: scene field path, value as text ("solver.name=dftl")
-  std::string assignment;
+/// From a Controller: scene field path, value as text ("solver.name=dftl").
+struct SetParameter {
+  std::string assignment = {};
   bool operator==(const SetParameter&) const = default;
 };
-enum class AdminAction { ListSessions, Kick, ShutDown };
-struct AdminCommand {  // from an Admin; answered by a SessionList or a Notice
+/// From an Admin; answered by a SessionList or a Notice.
+struct AdminCommand {
   AdminAction action = AdminAction::ListSessions;
-  uint64_t session = 0;  // whom to kick
-  double ban_s = 0.0;    // how long nobody of that address is let in again, at most kMaxBanS
+  uint64_t session = 0;  // of a kick
+  double ban_s = 0.0;  // and how long nobody of its address is let in again
   bool operator==(const AdminCommand&) const = default;
 };
-enum class DrawingDevice { Unknown, None, Software, Hardware };
-struct ViewerReport {      // about once a second: what this machine makes of what it gets; 0 = not measured
+/// About once a second: what this machine makes of what it gets; 0 = not measured.
+struct ViewerReport {
   double decode_ms = 0.0;  // median per state of strands
-  double draw_ms = 0.0;    // median per picture of strands, of the size that is drawn in motion
+  double draw_ms = 0.0;  // median per picture of strands, of the size that is drawn in motion
   double picture_decode_ms = 0.0;  // median per picture of the server's
-  double shown_hz = 0.0;           // different pictures shown per second
+  double shown_hz = 0.0;  // different pictures shown per second
   DrawingDevice device = DrawingDevice::Unknown;
-  double hair_px = 0.0;  // of strands: how high the hair is on the screen
+  double hair_px = 0.0;  // of strands: how high the hair is on the screen; 0 = not told
   double step_ns = 0.0;  // as in Hello, of who could not predict then; 0 = as in Hello
   bool operator==(const ViewerReport&) const = default;
 };
-struct ModeRequest {  // answered by a ModeChange
+/// Answered by a ModeChange.
+struct ModeRequest {
   StreamMode mode = StreamMode::Auto;
   bool operator==(const ModeRequest&) const = default;
 };
-struct SceneRequest {  // from a Controller; answered by a SceneText or a Notice
+/// From a Controller; answered by a SceneText or a Notice.
+struct SceneRequest {
   bool operator==(const SceneRequest&) const = default;
 };
-enum class LiveAction { ChooseSubject, Calibrate, Reset };
-struct LiveCommand {  // from a Controller, about live motion capture; answered by a Notice
+/// From a Controller, about live motion capture; answered by a Notice.
+struct LiveCommand {
   LiveAction action = LiveAction::ChooseSubject;
-  std::string subject = {};  // of ChooseSubject; empty = one named head, else the first one seen
+  // that drives the head from now on; empty = one named head, else the first one seen
+  std::string subject = {};
   bool operator==(const LiveCommand&) const = default;
 };
-struct ParameterRequest {    // from who watches; answered by a ParameterList
-  std::string prefix;        // of the paths to list: "look.", "solver"; empty = all
-  uint32_t first = 0;        // so many of them are left out: a list has kMaxListedParameters at most
+/// From who watches; answered by a ParameterList.
+struct ParameterRequest {
+  std::string prefix = {};  // of the paths to list: "look.", "solver"; empty = all
+  uint32_t first = 0;  // so many of them are left out
   bool is_watching = false;  // and again, with what is other, whenever something changes
   bool operator==(const ParameterRequest&) const = default;
 };
-struct CameraCommand {   // from a Controller: where others look from; answered by a Notice
+/// Where viewers look from. Who controls may say it of others.
+struct CameraCommand {
   uint64_t session = 0;  // whose; 0 = of all that view, but of who says it
   CameraDesc camera;
   bool operator==(const CameraCommand&) const = default;
 };
-struct StateTimesRequest {  // from who watches: StateTimes with every status from now on, or no more
-  bool is_wanted = true;
+/// From who watches: StateTimes with every status from now on, or no more.
+struct StateTimesRequest {
+  bool is_wanted = true;  // from now on StateTimes come with every status, or no more
   bool operator==(const StateTimesRequest&) const = default;
 };
-struct RecordCommand {    // from a Controller; answered by a Notice
+/// From a Controller; answered by a Notice.
+struct RecordCommand {
   bool is_wanted = true;  // to begin; false: to end the recording
-  std::string name =
-      {};  // of the file, in the folder of the server's recordings; empty = the server's choice
+  std::string name = {};  // of the file; empty = the server's choice
   bool operator==(const RecordCommand&) const = default;
 };
 using ClientMessage =
     std::variant<Hello, MotionSamples, WindSamples, CameraChange, KeyframeRequest, FrameAck, Ping,
-                 ControlCommand, SetParameter, ViewerReport, ModeRequest, AdminCommand, SceneRequest,
+                 ControlCommand, SetParameter, AdminCommand, ViewerReport, ModeRequest, SceneRequest,
                  LiveCommand, ParameterRequest, CameraCommand, StateTimesRequest, RecordCommand>;
-
-// ---- server to client ----
+/// Answer to a Hello.
 struct Welcome {
-  std::string session_id;  // 16 hex digits, new for every server start
-  std::string server_version;
-  std::string scene_name;
+  std::string session_id = {};  // 16 hex digits, new for every server start
+  std::string server_version = {};
+  std::string scene_name = {};
   StreamMode mode = StreamMode::Strands;  // what was chosen for `Auto`
-  std::string mode_reason;
-  std::string codec;              // of strands, as long as the connection lasts
+  std::string mode_reason = {};
+  std::string codec = {};  // of strands, as long as the connection lasts
   std::string codec_reason = {};  // for a person: why this one
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
@@ -207,17 +220,17 @@ struct Welcome {
   double step_rate_hz = 60.0;
   LookDesc look;
   CameraDesc camera;
-  uint32_t frame_width = 0, frame_height = 0;
+  uint32_t frame_width = 0;
+  uint32_t frame_height = 0;
   std::string sim_device = {};  // for a person: what simulates; empty = nothing does
-  Role role = Role::Viewer;     // as granted
-  // Names of all heads, the first first, at most kMaxHeads; none where there is one. scene_name is that of
-  // this session's.
+  Role role = Role::Viewer;  // as granted
+  // names of all that the server has, the first first; none where it has one
   std::vector<std::string> heads = {};
-  // The session_id of each relay on the way, from the one at the server that simulates, whose session_id is
-  // above, to the one that says this; at most kMaxRelays.
+  // session_id of each on the way, from the one at the server that simulates
   std::vector<std::string> relays = {};
   bool operator==(const Welcome&) const = default;
 };
+/// Answer to a Ping.
 struct Pong {
   int64_t client_time_ns = 0;  // echoed
   int64_t server_receive_ns = 0;
@@ -225,96 +238,94 @@ struct Pong {
   bool operator==(const Pong&) const = default;
 };
 struct LiveValue {
-  std::string text;
+  std::string text = {};
   bool operator==(const LiveValue&) const = default;
 };
-struct LiveInputStatus {  // a live input: what its sender says, and how well it comes
-  std::string input;      // for a person
-  std::string sender;     // address and port; empty = nobody sends
-  std::string subject;    // that drives the head; empty = none yet
-  std::string subjects;   // all that were seen lately, for a person
-  bool is_stale = true;   // nothing of the subject for kMotionStaleNs
+/// A live input: what its sender says, and how well it comes.
+struct LiveInputStatus {
+  std::string input = {};  // for a person
+  std::string sender = {};  // address and port; empty = nobody sends
+  std::string subject = {};  // that drives the head; empty = none yet
+  std::string subjects = {};  // all that were seen lately, for a person
+  bool is_stale = true;  // nothing of the subject for a second
   bool is_calibrated = false;
-  double rate_hz = 0.0;    // packets
+  double rate_hz = 0.0;  // packets
   double jitter_ms = 0.0;  // of their arrival
-  double age_ms = 0.0;     // of the newest
+  double age_ms = 0.0;  // of the newest
   uint64_t packets = 0;
   uint64_t received_bytes = 0;
   uint64_t malformed = 0;
-  uint64_t refused = 0;                // of senders that may not, or while another one is heard
-  uint64_t over_rate = 0;              // more than a source may send
-  uint64_t impossible = 0;             // poses that are no numbers, or no rotation
-  uint64_t clamped = 0;                // poses that were faster than a head
-  uint64_t gated = 0;                  // poses not believed: the body was somewhere else at once
-  uint64_t resequenced = 0;            // put back into their order
-  uint64_t late = 0;                   // came twice, or too late to be used
-  uint64_t lost = 0;                   // numbers of frames that never came
-  std::vector<LiveValue> values = {};  // of the last packet, as it was sent, at most kMaxLiveValues
+  uint64_t refused = 0;  // of senders that may not, or while another one is heard
+  uint64_t over_rate = 0;  // more than a source may send
+  uint64_t impossible = 0;  // poses that are no numbers, or no rotation
+  uint64_t clamped = 0;  // poses that were faster than a head
+  uint64_t gated = 0;  // poses not believed: the body was somewhere else at once
+  uint64_t resequenced = 0;  // put back into their order
+  uint64_t late = 0;  // came twice, or too late to be used
+  uint64_t lost = 0;  // numbers of frames that never came
+  std::vector<LiveValue> values = {};  // of the last packet, as it was sent
   bool operator==(const LiveInputStatus&) const = default;
 };
-struct ServerStatus {  // about twice a second to every viewer
+/// About twice a second to every viewer.
+struct ServerStatus {
   uint64_t tick = 0;
   double sim_ms = 0.0;  // median per step
   double encode_ms = 0.0;
-  double render_ms = 0.0;        // 0 when nothing is rendered
+  double render_ms = 0.0;  // 0 when nothing is rendered
   double realtime_factor = 0.0;  // simulated over wall time, last second
   bool is_paused = false;
   bool is_motion_stale = true;  // no motion sample for kMotionStaleS
   uint32_t viewer_count = 0;
-  uint64_t dropped_frames = 0;    // for this client
+  uint64_t dropped_frames = 0;  // for this client
   uint64_t rejected_samples = 0;  // motion and wind samples refused so far
-  double queue_delay_ms = 0.0;    // how long data for this client waits on its way; 0 = unknown
-  // Strands put back to rest so far; one may count many times.
-  uint64_t quarantined_strands = 0;    // without usable numbers
+  double queue_delay_ms = 0.0;  // how long data for this client waits on its way; 0 = unknown
+  uint64_t quarantined_strands = 0;  // without usable numbers
   uint64_t overstretched_strands = 0;  // stretched too far
-  std::string slow_motion = {};        // for a person: how slow, and the cheapest ways out; empty = real time
-  // Who gets pictures: of those drawn since the last status, at most kMaxPictureMotions, oldest first.
+  std::string slow_motion = {};  // for a person: how slow, and the cheapest ways out; empty = real time
   std::vector<PictureMotion> picture_motions = {};
-  std::string detail = {};  // for a person: how much is simulated, and why not all; empty = all of it
+  std::string detail = {};  // for a person: how much is simulated, and why not all of it; empty = all
   std::vector<LiveInputStatus> live_inputs = {};  // at most kMaxLiveInputs
-  std::string recording = {};  // for a person: the file that is written, and how long it is; empty = none
+  std::string recording = {};  // for a person: the file that is written; empty = none
   bool operator==(const ServerStatus&) const = default;
 };
-struct StreamQuality {        // how strands are coded for this viewer from the next keyframe on
-  uint16_t stream_id = 0;     // of the frames it is about
+/// The server closes right after it.
+struct Goodbye {
+  std::string reason = {};  // one sentence
+  bool operator==(const Goodbye&) const = default;
+};
+/// Answer to SetParameter and ControlCommand, or a warning.
+struct Notice {
+  bool is_error = false;
+  std::string text = {};
+  uint64_t tick = 0;  // of the answer to counted steps: where the simulation is now
+  uint64_t state_hash = 0;  // and the hash of that state
+  bool operator==(const Notice&) const = default;
+};
+/// How strands are coded for this viewer from the next keyframe on.
+struct StreamQuality {
+  uint16_t stream_id = 0;  // of the frames it is about
   uint32_t rate_divisor = 1;  // every so many simulation steps
   float strand_share = 1.0f;  // in (0, 1]
-  float bound_m = 0.0f;       // Euclidean error
-  std::string reason;         // for a person
-  std::string codec = {};     // of these frames; empty = as before
+  float bound_m = 0.0f;  // Euclidean error
+  std::string reason = {};  // for a person
+  std::string codec = {};  // of these frames; empty = as before
   bool operator==(const StreamQuality&) const = default;
 };
-struct ModeChange {                       // what the client gets from the next frame on, and why
-  StreamMode mode = StreamMode::Strands;  // never Auto
-  std::string reason;                     // for a person
-  uint32_t frame_width = 0, frame_height = 0;
-  bool operator==(const ModeChange&) const = default;
-};
-struct FrameQuality {      // how pictures are made for this viewer from the next whole one on
+/// How pictures are made for this viewer from the next whole one on.
+struct FrameQuality {
   uint16_t stream_id = 0;  // of the frames it is about
-  uint32_t width = 0, height = 0;
+  uint32_t width = 0;
+  uint32_t height = 0;
   double rate_hz = 0.0;  // at most
   uint32_t quality = 0;  // 1..100, as in JPEG
   PictureCodec codec = PictureCodec::Jpeg;
-  std::string reason;  // for a person
+  std::string reason = {};  // for a person
   bool operator==(const FrameQuality&) const = default;
-};
-struct Goodbye {       // the server closes right after it
-  std::string reason;  // one sentence
-  bool operator==(const Goodbye&) const = default;
-};
-struct Notice {  // answer to SetParameter and ControlCommand, or a warning
-  bool is_error = false;
-  std::string text;
-  // Of the answer to steps that were counted: where the simulation is now, and the hash of that state.
-  uint64_t tick = 0;
-  uint64_t state_hash = 0;
-  bool operator==(const Notice&) const = default;
 };
 struct SessionInfo {
   uint64_t id = 0;
-  std::string name;     // shortened to kMaxListedNameChars
-  std::string address;  // of the peer, without its port
+  std::string name = {};  // shortened to kMaxListedNameChars
+  std::string address = {};  // of the peer, without its port
   Role role = Role::Viewer;
   StreamMode mode = StreamMode::Strands;
   uint64_t sent_bytes = 0;
@@ -322,71 +333,87 @@ struct SessionInfo {
   double connected_s = 0.0;
   bool operator==(const SessionInfo&) const = default;
 };
-struct SessionList {                  // answer to an AdminCommand
-  std::vector<SessionInfo> sessions;  // at most kMaxListedSessions
+/// Answer to an AdminCommand.
+struct SessionList {
+  std::vector<SessionInfo> sessions = {};  // at most kMaxListedSessions
   bool operator==(const SessionList&) const = default;
 };
-struct LookChange {  // what the scene looks like from now on, and its own camera
+/// What the client gets from the next frame on, and why.
+struct ModeChange {
+  StreamMode mode = StreamMode::Strands;  // never Auto
+  std::string reason = {};  // for a person
+  uint32_t frame_width = 0;
+  uint32_t frame_height = 0;
+  bool operator==(const ModeChange&) const = default;
+};
+/// What the scene looks like from now on, and its own camera.
+struct LookChange {
   LookDesc look;
   CameraDesc camera;
   bool operator==(const LookChange&) const = default;
 };
-struct SceneText {   // the scene as it runs
-  std::string text;  // as in a scene file, in one line
+/// The scene as it runs.
+struct SceneText {
+  std::string text = {};  // as in a scene file, in one line
   bool operator==(const SceneText&) const = default;
 };
 struct ParameterInfo {
-  std::string path;         // as in an assignment
-  std::string value;        // as in a scene file
-  std::string unset_value;  // where the scene does not say; empty = none
-  std::string unit;         // empty = no dimension, or no number
+  std::string path = {};  // as in an assignment
+  std::string value = {};  // as in a scene file
+  std::string unset_value = {};  // where the scene does not say; empty = none
+  std::string unit = {};  // empty = no dimension, or no number
   bool has_range = false;
-  double minimum = 0.0, maximum = 0.0;
-  bool is_live = false;   // can be changed while the server runs
+  double minimum = 0.0;
+  double maximum = 0.0;
+  bool is_live = false;  // can be changed while the server runs
   std::string note = {};  // for a person
   bool operator==(const ParameterInfo&) const = default;
 };
-struct ParameterList {                    // answer to a ParameterRequest
-  std::vector<ParameterInfo> parameters;  // at most kMaxListedParameters
-  uint32_t total = 0;                     // with that prefix
-  bool is_change = false;                 // no answer: these have other values now
+/// Answer to a ParameterRequest.
+struct ParameterList {
+  std::vector<ParameterInfo> parameters = {};  // at most kMaxListedParameters
+  uint32_t total = 0;  // with that prefix
+  bool is_change = false;  // no answer: these have other values now
   bool operator==(const ParameterList&) const = default;
 };
-/// Times at which a state passed the stages of the server, in ns of the server's clock; 0 = not known.
+/// When a state was where on its way through the server; server clock, 0 = not known.
 struct StateTime {
   uint64_t tick = 0;
-  int64_t sim_time_ns = 0;   // simulation time
-  int64_t source_ns = 0;     // its newest motion sample was made
-  int64_t motion_ns = 0;     // and arrived
+  int64_t sim_time_ns = 0;  // simulation time
+  int64_t source_ns = 0;  // its newest motion sample was made
+  int64_t motion_ns = 0;  // and arrived
   int64_t published_ns = 0;  // simulated
-  int64_t encoded_ns = 0;    // its first frame of strands
+  int64_t encoded_ns = 0;  // its first frame of strands
   bool operator==(const StateTime&) const = default;
 };
-struct StateTimes {               // of states that were not told yet
-  std::vector<StateTime> states;  // at most kMaxStateTimes, oldest first
+/// States that were not told yet.
+struct StateTimes {
+  std::vector<StateTime> states = {};  // at most kMaxStateTimes, oldest first
   bool operator==(const StateTimes&) const = default;
 };
-struct StreamList {  // to a relay, after its Welcome and when it changes: the streams of strands there are
+/// Streams for a relay, after its Welcome and when they change: all there are.
+struct StreamList {
   struct Class {
     uint32_t rate_divisor = 1;  // every so many simulation steps
     float strand_share = 1.0f;  // in (0, 1]: the first so many strands
-    uint32_t coarsening = 1;    // lattice steps per step of the published lattice
-    float bound_m = 1e-4f;      // announced Euclidean error
+    uint32_t coarsening = 1;  // lattice steps per step of the published lattice
+    float bound_m = 1e-4f;  // announced Euclidean error
     double frame_rate_hz = 60.0;
     bool operator==(const Class&) const = default;
   };
-  std::vector<Class> classes;       // best first, at most kMaxListedClasses
-  std::vector<std::string> codecs;  // that each is served by, at most kMaxListedCodecs
-  std::string reason = {};          // of a change, for a person
-  // What decides whether a viewer can predict.
+  std::vector<Class> classes = {};  // best first
+  std::vector<std::string> codecs = {};  // that each is served by
+  std::string reason = {};
   std::string solver = {};
-  double solver_cost = 0.0;  // of its step, against the one that step_ns is measured with
+  double solver_cost = 0.0;
   uint32_t substeps = 1;
   bool operator==(const StreamList&) const = default;
 };
 using ServerMessage =
-    std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality, ModeChange, SessionList,
-                 FrameQuality, LookChange, SceneText, ParameterList, CameraChange, StateTimes, StreamList>;
+    std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality, FrameQuality, SessionList,
+                 ModeChange, LookChange, SceneText, ParameterList, CameraChange, StateTimes, StreamList>;
+// clang-format on
+// schema end
 
 /// Serialises a message: an opcode byte (Control), then protobuf. Messages within their limits take at most
 /// kMaxControlBytes. Names, reasons and notices are shortened to their limits; unprintable characters become

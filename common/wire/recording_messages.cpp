@@ -97,6 +97,15 @@ void add_types(const pb::Descriptor& type, std::set<const pb::Descriptor*>& type
   }
 }
 
+/// Options are for this source alone: a recording has none of them.
+void clear_options(pb::DescriptorProto& type) {
+  type.clear_options();
+  for (auto& field : *type.mutable_field()) field.clear_options();
+  for (auto& inner : *type.mutable_nested_type())
+    if (!inner.options().map_entry()) clear_options(inner);
+  for (auto& choice : *type.mutable_enum_type()) choice.clear_options();
+}
+
 /// A file with these types alone, behind those that it needs.
 void add_file(const pb::FileDescriptor& file, const std::set<const pb::Descriptor*>& types,
               const std::set<const pb::EnumDescriptor*>& enums, pb::FileDescriptorSet& set) {
@@ -111,9 +120,15 @@ void add_file(const pb::FileDescriptor& file, const std::set<const pb::Descripto
   part.set_package(file.package());
   part.set_syntax("proto3");
   for (int i = 0; i < file.message_type_count(); ++i)
-    if (types.count(file.message_type(i)) > 0) file.message_type(i)->CopyTo(part.add_message_type());
+    if (types.count(file.message_type(i)) > 0) {
+      file.message_type(i)->CopyTo(part.add_message_type());
+      clear_options(*part.mutable_message_type()->rbegin());
+    }
   for (int i = 0; i < file.enum_type_count(); ++i)
-    if (enums.count(file.enum_type(i)) > 0) file.enum_type(i)->CopyTo(part.add_enum_type());
+    if (enums.count(file.enum_type(i)) > 0) {
+      file.enum_type(i)->CopyTo(part.add_enum_type());
+      part.mutable_enum_type()->rbegin()->clear_options();
+    }
   if (part.message_type_size() + part.enum_type_size() == 0) return;
   for (int i = 0; i < file.dependency_count(); ++i)
     if (is_known(*file.dependency(i))) part.add_dependency(file.dependency(i)->name());

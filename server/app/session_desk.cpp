@@ -147,24 +147,46 @@ Welcome SessionDesk::make_welcome(const Viewers::Place& place, const ViewerCodec
   return welcome;
 }
 
-void SessionDesk::on_motion(SessionId session, const MotionSamples& samples, int64_t arrival_ns) {
-  parts_.inputs.push(session, samples, arrival_ns);
-  parts_.hub.tell_motion(session, samples, arrival_ns);
+void SessionDesk::on_message(SessionId session, const ClientMessage& message, int64_t arrival_ns) {
+  std::visit(Overloaded{[&](const MotionSamples& samples) {
+                          parts_.inputs.push(session, samples, arrival_ns);
+                          parts_.hub.tell_motion(session, samples, arrival_ns);
+                        },
+                        [&](const WindSamples& samples) {
+                          parts_.inputs.push(session, samples, arrival_ns);
+                          parts_.hub.tell_wind(session, samples, arrival_ns);
+                        },
+                        [&](const ControlCommand& command) { obey(session, command); },
+                        [&](const SetParameter& parameter) { obey(session, parameter); },
+                        [&](const LiveCommand& command) { obey(session, command); },
+                        [&](const CameraCommand& command) { obey(session, command); },
+                        [&](const RecordCommand& command) { obey(session, command); },
+                        [&](const SceneRequest& request) { answer(session, request); },
+                        [&](const ParameterRequest& request) { answer(session, request); },
+                        [&](const StateTimesRequest& request) { answer(session, request); },
+                        [&](const CameraChange& camera) { move_camera(session, camera); },
+                        [&](const ViewerReport& report) { viewers_.set_report(session, report); },
+                        [&](const ModeRequest& request) { viewers_.request_mode(session, request.mode); },
+                        [&](const AdminCommand&) { is_shut_down_wanted_ = true; },  // all that comes here
+                        [](const auto&) {}},
+             message);
 }
 
-void SessionDesk::on_wind(SessionId session, const WindSamples& samples, int64_t arrival_ns) {
-  parts_.inputs.push(session, samples, arrival_ns);
-  parts_.hub.tell_wind(session, samples, arrival_ns);
+void SessionDesk::on_need(SessionId, const StreamNeed& need) {
+  if (need.kind == StreamNeed::Kind::Picture)
+    parts_.hub.request_whole(need.picture_class);
+  else
+    parts_.hub.request_keyframe(need.stream_id);
 }
 
-void SessionDesk::on_command(SessionId session, const ControlCommand& command) {
+void SessionDesk::obey(SessionId session, const ControlCommand& command) {
   // Each of these waits for the one before, and a test makes many.
   const bool is_counted = command.command == Command::StepOnce && command.step_count > 0;
   if (is_counted || may_control(session, name_of(command.command)))
     parts_.source.post(command, reply_to(session, name_of(command.command)), viewers_.describe(session));
 }
 
-void SessionDesk::on_parameter(SessionId session, const SetParameter& parameter) {
+void SessionDesk::obey(SessionId session, const SetParameter& parameter) {
   if (!may_control(session, parameter.assignment)) return;
   if (const Status status = may_change(parameter.assignment); !status)
     net_->send(session, Notice{true, status.error().message});
@@ -187,7 +209,7 @@ Status SessionDesk::may_change(const std::string& assignment) const {
   return {};
 }
 
-void SessionDesk::on_parameter_request(SessionId session, const ParameterRequest& request) {
+void SessionDesk::answer(SessionId session, const ParameterRequest& request) {
   if (!parameter_budget_.take(session, now_ns()))
     return net_->send(session, Notice{true, "Too many requests for parameters: this one was left out."});
   const std::optional<SceneDesc> scene = parts_.source.scene();
@@ -205,7 +227,7 @@ void SessionDesk::tell_parameters() {
     net_->send(session, std::move(list));
 }
 
-void SessionDesk::on_scene_request(SessionId session) {
+void SessionDesk::answer(SessionId session, const SceneRequest&) {
   if (!may_control(session, "save the scene")) return;
   const std::optional<SceneDesc> scene = parts_.whole_scene();
   SceneText answer{scene ? to_line(*scene) : std::string()};
@@ -220,7 +242,7 @@ void SessionDesk::on_scene_request(SessionId session) {
     net_->send(session, std::move(answer));
 }
 
-void SessionDesk::on_live_command(SessionId session, const LiveCommand& command) {
+void SessionDesk::obey(SessionId session, const LiveCommand& command) {
   if (!may_control(session,
                    fmt::format("live motion capture: {} {}", name_of(command.action), command.subject)))
     return;
@@ -229,7 +251,7 @@ void SessionDesk::on_live_command(SessionId session, const LiveCommand& command)
                           : Notice{true, "This server has no live inputs: start it with --mocap PROTOCOL."});
 }
 
-void SessionDesk::on_camera_command(SessionId session, const CameraCommand& command) {
+void SessionDesk::obey(SessionId session, const CameraCommand& command) {
   const std::string whose =
       command.session == 0 ? std::string("all") : fmt::format("session {}", command.session);
   if (!may_control(session, "camera of " + whose)) return;
@@ -248,7 +270,7 @@ void SessionDesk::on_camera_command(SessionId session, const CameraCommand& comm
   net_->send(session, Notice{aimed->movable.empty(), std::move(said)});
 }
 
-void SessionDesk::on_record_command(SessionId session, const RecordCommand& command) {
+void SessionDesk::obey(SessionId session, const RecordCommand& command) {
   const std::string what = command.is_wanted ? "record start " + command.name : "record stop";
   if (!may_control(session, what)) return;
   if (whole_viewers_.contains(session)) return parts_.all_records->obey(command, reply_to(session, what));
@@ -256,7 +278,7 @@ void SessionDesk::on_record_command(SessionId session, const RecordCommand& comm
   net_->send(session, Notice{true, std::string(kNoRecordings)});
 }
 
-void SessionDesk::on_state_times_request(SessionId session, const StateTimesRequest& request) {
+void SessionDesk::answer(SessionId session, const StateTimesRequest& request) {
   const std::lock_guard lock(times_mutex_);
   if (request.is_wanted)
     times_readers_.insert(session);
@@ -341,7 +363,7 @@ bool SessionDesk::on_picture_step(SessionId session, size_t step, const std::str
   return true;
 }
 
-void SessionDesk::on_camera(SessionId session, const CameraChange& camera) {
+void SessionDesk::move_camera(SessionId session, const CameraChange& camera) {
   if (const Status status = viewers_.set_camera(session, camera.camera); !status)
     net_->send(session, Notice{true, status.error().to_string()});
   else
@@ -374,7 +396,8 @@ LinkAnswer SessionDesk::on_link(SessionId session, const LinkState& link, int64_
   return answer;
 }
 
-void SessionDesk::on_mode(SessionId session) {
+void SessionDesk::on_change(SessionId session, SubscriptionChange change) {
+  if (change == SubscriptionChange::Strands) return viewers_.note_strand_class(session);
   viewers_.note_mode(session, now_ns());
   if (const auto pictures = viewers_.pictures(session)) tell_quality(session, *pictures, "to begin with");
 }
@@ -402,7 +425,7 @@ void SessionDesk::on_left(SessionId session) {
   whole_viewers_.erase(session);
   control_budget_.remove(session);
   parameter_budget_.remove(session);
-  on_state_times_request(session, {false});
+  answer(session, StateTimesRequest{false});
   parameter_watch_.remove(session);
   codecs_.remove(session);
   teller_.remove(session);

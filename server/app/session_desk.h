@@ -76,37 +76,25 @@ class SessionDesk : public NetHandler {
   void tell_parameters();
 
   Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) override;
-  void on_motion(SessionId session, const MotionSamples& samples, int64_t arrival_ns) override;
-  void on_wind(SessionId session, const WindSamples& samples, int64_t arrival_ns) override;
-  void on_command(SessionId session, const ControlCommand& command) override;
-  void on_parameter(SessionId session, const SetParameter& parameter) override;
-  void on_scene_request(SessionId session) override;
-  void on_live_command(SessionId session, const LiveCommand& command) override;
-  void on_parameter_request(SessionId session, const ParameterRequest& request) override;
-  void on_camera_command(SessionId session, const CameraCommand& command) override;
-  void on_state_times_request(SessionId session, const StateTimesRequest& request) override;
-  void on_record_command(SessionId session, const RecordCommand& command) override;
-  void on_camera(SessionId session, const CameraChange& camera) override;
-  void on_shut_down(SessionId) override { is_shut_down_wanted_ = true; }
-  void on_keyframe_request(SessionId, uint16_t stream_id) override { parts_.hub.request_keyframe(stream_id); }
-  void on_picture_request(SessionId, PictureClass picture_class) override {
-    parts_.hub.request_whole(picture_class);
-  }
+  void on_message(SessionId session, const ClientMessage& message, int64_t arrival_ns) override;
+  void on_need(SessionId session, const StreamNeed& need) override;
+  void on_change(SessionId session, SubscriptionChange change) override;
   bool on_picture_step(SessionId session, size_t step, const std::string& reason) override;
-  void on_strand_class(SessionId session) override { viewers_.note_strand_class(session); }
-  void on_report(SessionId session, const ViewerReport& report) override {
-    viewers_.set_report(session, report);
-  }
-  void on_mode_request(SessionId session, const ModeRequest& request) override {
-    viewers_.request_mode(session, request.mode);
-  }
   LinkAnswer on_link(SessionId session, const LinkState& link, int64_t time_ns) override;
-  void on_mode(SessionId session) override;
   void on_left(SessionId session) override;
   Status readiness() override;
   std::string metrics() override { return metrics_ ? metrics_() : std::string(); }
 
  private:
+  void obey(SessionId session, const ControlCommand& command);
+  void obey(SessionId session, const SetParameter& parameter);
+  void obey(SessionId session, const LiveCommand& command);
+  void obey(SessionId session, const CameraCommand& command);
+  void obey(SessionId session, const RecordCommand& command);
+  void answer(SessionId session, const SceneRequest& request);
+  void answer(SessionId session, const ParameterRequest& request);
+  void answer(SessionId session, const StateTimesRequest& request);
+  void move_camera(SessionId session, const CameraChange& camera);
   Welcome make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const;
   bool may_control(SessionId session, std::string_view what);
   Status may_change(const std::string& assignment) const;

@@ -62,6 +62,32 @@ struct LinkAnswer {
   bool is_request_waiting = false;  // a ModeRequest has not had its turn: look again soon
 };
 
+/// What a session waits for; asked again until it comes.
+struct StreamNeed {
+  enum class Kind {
+    Keyframe,  // of this strand stream, to be given to publish_strands()
+    Anchor,    // the same for a relay's joiners: the relay itself follows the chain
+    Picture,   // a whole one, changed or not: publish_picture() with the newest
+  };
+  Kind kind = Kind::Keyframe;
+  uint16_t stream_id = 0;          // of strands
+  PictureClass picture_class = 0;  // of a Picture
+};
+
+/// What has become of a session's subscription.
+enum class SubscriptionChange {
+  Strands,  // it has another class or codec of strands
+  Mode,     // a change of mode is complete: the first frame of the new mode is next
+};
+
+/// One visitor of a variant, made of a lambda per alternative.
+template <class... Ts>
+struct Overloaded : Ts... {
+  using Ts::operator()...;
+};
+template <class... Ts>
+Overloaded(Ts...) -> Overloaded<Ts...>;  // Clang 14 needs it said
+
 /// The application's reactions to sessions. Called on the network thread, so functions must return quickly
 /// without waiting.
 class NetHandler {
@@ -70,43 +96,18 @@ class NetHandler {
   /// Decides on a Hello. An error closes the session with its sentence: LimitExceeded as Full, Unavailable as
   /// TryLater, Unauthorized as Unauthorized, else Policy.
   virtual Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) = 0;
-  virtual void on_motion(SessionId session, const MotionSamples& samples, int64_t arrival_ns) = 0;
-  virtual void on_wind(SessionId session, const WindSamples& samples, int64_t arrival_ns) = 0;
-  virtual void on_command(SessionId session, const ControlCommand& command) = 0;
-  virtual void on_parameter(SessionId session, const SetParameter& parameter) = 0;
-  virtual void on_scene_request(SessionId) {}
-  virtual void on_live_command(SessionId, const LiveCommand&) {}
-  virtual void on_parameter_request(SessionId, const ParameterRequest&) {}
-  /// Handles a command about others' cameras; a CameraChange sent to a session also moves its pictures.
-  virtual void on_camera_command(SessionId, const CameraCommand&) {}
-  virtual void on_state_times_request(SessionId, const StateTimesRequest&) {}
-  virtual void on_record_command(SessionId, const RecordCommand&) {}
-  /// Handles a viewer's camera; it may change the class of the subscription's pictures.
-  virtual void on_camera(SessionId session, const CameraChange& camera) = 0;
-  /// Handles an admin's request to shut down the server.
-  virtual void on_shut_down(SessionId) {}
-  /// Reports that the session waits for a keyframe of this strand stream, to be given to publish_strands().
-  /// Repeated until one comes.
-  virtual void on_keyframe_request(SessionId session, uint16_t stream_id) = 0;
-  /// Reports that a relay, which follows the chain, needs a keyframe for its joiners.
-  virtual void on_anchor_request(SessionId session, uint16_t stream_id) {
-    on_keyframe_request(session, stream_id);
-  }
-  /// Reports that the session waits for a whole picture: publish_picture() with the newest one, changed or
-  /// not. Repeated until one comes.
-  virtual void on_picture_request(SessionId, PictureClass /*picture_class*/) {}
+  /// Handles what a session says after its Hello, when its role may say it. The network answers Ping,
+  /// FrameAck and KeyframeRequest itself, and AdminCommand except ShutDown. A CameraChange may change the
+  /// class of the subscription's pictures; after a ModeRequest on_link() follows immediately.
+  virtual void on_message(SessionId session, const ClientMessage& message, int64_t arrival_ns) = 0;
+  virtual void on_need(SessionId session, const StreamNeed& need) = 0;
+  virtual void on_change(SessionId, SubscriptionChange) {}
   /// Asks for another step of a viewer's quality ladder, because of its link. Puts the step and its class
   /// into the subscription; returns false if it is unavailable.
   virtual bool on_picture_step(SessionId, size_t /*step*/, const std::string& /*reason*/) { return false; }
-  /// Reports that the session has put another strand class into its subscription.
-  virtual void on_strand_class(SessionId) {}
-  virtual void on_report(SessionId, const ViewerReport&) {}
-  virtual void on_mode_request(SessionId, const ModeRequest&) {}
-  /// Checks a viewer's link, every limits.link_interval_ms and immediately after on_mode_request(). A change
+  /// Checks a viewer's link, every limits.link_interval_ms and immediately after a ModeRequest. A change
   /// of mode that it begins is stored in the subscription.
   virtual LinkAnswer on_link(SessionId, const LinkState&, int64_t /*time_ns*/) { return {}; }
-  /// Reports that a change of mode is complete: the first frame of the new mode is next.
-  virtual void on_mode(SessionId) {}
   /// Reports once that a session has left whose on_hello() succeeded.
   virtual void on_left(SessionId session) = 0;
   /// Returns the answer of /readyz: success if the simulation is stepping, otherwise the reason in one

@@ -1,8 +1,8 @@
 #include "server/net/roles.h"
 
 #include <chrono>
-
-#include "server/net/overloaded_private.h"
+#include <iterator>
+#include <variant>
 
 namespace strandcast {
 
@@ -22,23 +22,62 @@ bool may_be(Grant grant, Role role) {
   return false;
 }
 
+namespace {
+
+enum class Sender { First, Anyone, Watches, Steers, Feeds, Admin };
+struct Kind {
+  const char* name;
+  Sender sender;
+};
+// In the order of ClientMessage.
+// schema begin: senders
+// clang-format off
+constexpr Kind kKinds[] = {
+    {"Hello", Sender::First},
+    {"MotionSamples", Sender::Feeds},
+    {"WindSamples", Sender::Feeds},
+    {"CameraChange", Sender::Watches},
+    {"KeyframeRequest", Sender::Watches},
+    {"FrameAck", Sender::Watches},
+    {"Ping", Sender::Anyone},
+    {"ControlCommand", Sender::Steers},
+    {"SetParameter", Sender::Steers},
+    {"AdminCommand", Sender::Admin},
+    {"ViewerReport", Sender::Watches},
+    {"ModeRequest", Sender::Watches},
+    {"SceneRequest", Sender::Steers},
+    {"LiveCommand", Sender::Steers},
+    {"ParameterRequest", Sender::Watches},
+    {"CameraCommand", Sender::Steers},
+    {"StateTimesRequest", Sender::Watches},
+    {"RecordCommand", Sender::Steers},
+};
+// clang-format on
+// schema end
+static_assert(std::size(kKinds) == std::variant_size_v<ClientMessage>);
+
+}  // namespace
+
+const char* message_name(const ClientMessage& message) {
+  return kKinds[message.index()].name;
+}
+
 bool may_send(Role role, const ClientMessage& message) {
-  const bool watches = role != Role::Source;
-  const bool steers = role == Role::Controller || role == Role::Admin;
-  const bool feeds = role == Role::Source || role == Role::Admin;
-  return std::visit(
-      Overloaded{
-          [](const Hello&) { return false; }, [&](const MotionSamples&) { return feeds; },
-          [&](const WindSamples&) { return feeds; }, [&](const CameraChange&) { return watches; },
-          [&](const KeyframeRequest&) { return watches; }, [&](const FrameAck&) { return watches; },
-          [](const Ping&) { return true; }, [&](const ControlCommand&) { return steers; },
-          [&](const SetParameter&) { return steers; }, [&](const ParameterRequest&) { return watches; },
-          [&](const SceneRequest&) { return steers; }, [&](const LiveCommand&) { return steers; },
-          [&](const CameraCommand&) { return steers; }, [&](const StateTimesRequest&) { return watches; },
-          [&](const RecordCommand&) { return steers; }, [&](const ViewerReport&) { return watches; },
-          [&](const ModeRequest&) { return watches; },
-          [&](const AdminCommand&) { return role == Role::Admin; }},
-      message);
+  switch (kKinds[message.index()].sender) {
+    case Sender::First:
+      return false;
+    case Sender::Anyone:
+      return true;
+    case Sender::Watches:
+      return role != Role::Source;
+    case Sender::Steers:
+      return role == Role::Controller || role == Role::Admin;
+    case Sender::Feeds:
+      return role == Role::Source || role == Role::Admin;
+    case Sender::Admin:
+      return role == Role::Admin;
+  }
+  return false;
 }
 
 bool is_token_equal(std::string_view expected, std::string_view given) {

@@ -29,6 +29,9 @@ int64_t unix_time_s();
 /// Returns whether a token permits a role. A controller's token also permits a viewer, an admin's every role.
 bool may_be(Grant grant, Role role);
 
+/// Returns the type of a message by name, as WIRE.md has it.
+const char* message_name(const ClientMessage& message);
+
 /// Returns whether a role may send a message; Hello is sent before there is a role.
 bool may_send(Role role, const ClientMessage& message);
 

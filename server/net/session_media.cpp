@@ -59,7 +59,7 @@ void Session::ask_for_anchor(int64_t time_ns) {
     return;
   anchor_asked_ns_ = time_ns;
   context_.count(&NetCounters::keyframe_requests);
-  head().handler.on_anchor_request(id_, stream_id_of(subscription_.strands));
+  head().handler.on_need(id_, {StreamNeed::Kind::Anchor, stream_id_of(subscription_.strands)});
 }
 
 void Session::deliver_chain(const std::vector<EncodedFramePtr>& chain) {
@@ -126,9 +126,9 @@ void Session::ask_for_keyframe(int64_t time_ns) {
   keyframe_asked_ns_ = time_ns;
   context_.count(&NetCounters::keyframe_requests);
   if (needs_picture)
-    head().handler.on_picture_request(id_, subscription_.pictures.picture_class);
+    head().handler.on_need(id_, {StreamNeed::Kind::Picture, 0, subscription_.pictures.picture_class});
   else
-    head().handler.on_keyframe_request(id_, stream_id_of(subscription_.strands));
+    head().handler.on_need(id_, {StreamNeed::Kind::Keyframe, stream_id_of(subscription_.strands)});
 }
 
 void Session::on_ack(const FrameAck& ack, int64_t time_ns) {
@@ -189,7 +189,7 @@ void Session::change_strand_class(size_t chosen) {
   subscription_.strands.strand_class = chosen;
   context_.count(&NetCounters::class_changes);
   queue_.restart_strands();
-  head().handler.on_strand_class(id_);
+  head().handler.on_change(id_, SubscriptionChange::Strands);
 }
 
 /// Strands go on by another codec, beginning with a keyframe.
@@ -200,7 +200,7 @@ void Session::change_codec(const CodecAnswer& answer) {
   context_.count(&NetCounters::codec_changes);
   const bool has_strands = subscription_.gets(StreamMode::Strands);
   if (has_strands) queue_.restart_strands();
-  head().handler.on_strand_class(id_);
+  head().handler.on_change(id_, SubscriptionChange::Strands);
   announce_quality(answer.reason);
   if (has_strands) ask_for_keyframe(now_ns());
 }

@@ -6,7 +6,7 @@
 #include "common/base/profile.h"
 #include "common/base/units.h"
 #include "common/log/log.h"
-#include "server/net/overloaded_private.h"
+#include "server/net/roles.h"
 #include "server/net/session_private.h"
 
 namespace strandcast::net {
@@ -27,17 +27,6 @@ CloseCode close_code_for(const Error& error) {
     default:
       return CloseCode::Policy;
   }
-}
-
-const char* message_name(const ClientMessage& message) {
-  constexpr const char* kNames[] = {"Hello",         "MotionSamples",     "WindSamples",
-                                    "CameraChange",  "KeyframeRequest",   "FrameAck",
-                                    "Ping",          "ControlCommand",    "SetParameter",
-                                    "ViewerReport",  "ModeRequest",       "AdminCommand",
-                                    "SceneRequest",  "LiveCommand",       "ParameterRequest",
-                                    "CameraCommand", "StateTimesRequest", "RecordCommand"};
-  static_assert(std::size(kNames) == std::variant_size_v<ClientMessage>);
-  return kNames[message.index()];
 }
 
 }  // namespace
@@ -132,44 +121,31 @@ void Session::join(const Hello& hello) {
 }
 
 void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
-  NetHandler& handler = head().handler;
-  std::visit(
-      Overloaded{[](const Hello&) {},
-                 [&](const MotionSamples& samples) { handler.on_motion(id_, samples, arrival_ns); },
-                 [&](const WindSamples& samples) { handler.on_wind(id_, samples, arrival_ns); },
-                 [&](const CameraChange& camera) { move_camera(camera); },
-                 [&](const KeyframeRequest&) {
-                   if (is_relay())
-                     ask_for_anchor(arrival_ns);
-                   else
-                     start_again(arrival_ns);
-                 },
-                 [&](const FrameAck& ack) { on_ack(ack, arrival_ns); },
-                 [&](const Ping& ping) {
-                   queue_control(Pong{ping.client_time_ns, arrival_ns + context_.clock_offset_ns, 0});
-                 },
-                 [&](const ControlCommand& command) { handler.on_command(id_, command); },
-                 [&](const SetParameter& parameter) { handler.on_parameter(id_, parameter); },
-                 [&](const ViewerReport& report) { handler.on_report(id_, report); },
-                 [&](const ModeRequest& request) {
-                   handler.on_mode_request(id_, request);
-                   is_mode_request_waiting_ = true;
-                   report_link(arrival_ns);
-                 },
-                 [&](const AdminCommand& command) { obey(command, arrival_ns); },
-                 [&](const SceneRequest&) { handler.on_scene_request(id_); },
-                 [&](const LiveCommand& command) { handler.on_live_command(id_, command); },
-                 [&](const ParameterRequest& request) { handler.on_parameter_request(id_, request); },
-                 [&](const CameraCommand& command) { handler.on_camera_command(id_, command); },
-                 [&](const StateTimesRequest& request) { handler.on_state_times_request(id_, request); },
-                 [&](const RecordCommand& command) { handler.on_record_command(id_, command); }},
-      message);
+  std::visit(Overloaded{[&](const CameraChange& camera) { move_camera(camera); },
+                        [&](const KeyframeRequest&) {
+                          if (is_relay())
+                            ask_for_anchor(arrival_ns);
+                          else
+                            start_again(arrival_ns);
+                        },
+                        [&](const FrameAck& ack) { on_ack(ack, arrival_ns); },
+                        [&](const Ping& ping) {
+                          queue_control(Pong{ping.client_time_ns, arrival_ns + context_.clock_offset_ns, 0});
+                        },
+                        [&](const ModeRequest&) {
+                          head().handler.on_message(id_, message, arrival_ns);
+                          is_mode_request_waiting_ = true;
+                          report_link(arrival_ns);
+                        },
+                        [&](const AdminCommand& command) { obey(command, arrival_ns); },
+                        [&](const auto&) { head().handler.on_message(id_, message, arrival_ns); }},
+             message);
 }
 
 /// By its own word, or by that of somebody who controls.
 void Session::move_camera(const CameraChange& camera) {
   const PictureClass before = subscription_.pictures.picture_class;
-  head().handler.on_camera(id_, camera);
+  head().handler.on_message(id_, camera, now_ns());
   follow_picture_class(before);
 }
 
@@ -182,7 +158,7 @@ void Session::obey(const AdminCommand& command, int64_t time_ns) {
                : "ends the server");
   if (command.action == AdminAction::ShutDown) {
     queue_control(Notice{false, "The server is stopping."});
-    return head().handler.on_shut_down(id_);
+    return head().handler.on_message(id_, command, time_ns);
   }
   const std::optional<std::string> key = context_.key_of(command.session);
   const bool is_own = key == peer_.key;

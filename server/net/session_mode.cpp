@@ -56,7 +56,7 @@ void Session::finish_mode_switch() {
     has_asset_ = false;
   context_.count(&NetCounters::mode_changes);
   context_.note(fmt::format("session {} gets {}: {}", id_, to_string(subscription_.mode()), change.reason));
-  head().handler.on_mode(id_);
+  head().handler.on_change(id_, SubscriptionChange::Mode);
   queue_control(change);
   if (subscription_.mode() == StreamMode::Frames || state_ != State::Joined) return;
   announce_quality(to_string(head().strands.classes()[subscription_.strands.strand_class]));

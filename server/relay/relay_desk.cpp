@@ -122,18 +122,29 @@ void RelayDesk::say(SessionId session, const ClientMessage& message) {
     parts_.voices.say({session, found->second.hello, found->second.address}, message);
 }
 
-/// Of viewers of pictures; the others draw by themselves.
-void RelayDesk::on_camera(SessionId session, const CameraChange& camera) {
+void RelayDesk::on_message(SessionId session, const ClientMessage& message, int64_t) {
   const auto found = leaves_.find(session);
-  if (found != leaves_.end() && found->second.subscription->gets(StreamMode::Frames)) say(session, camera);
+  if (found == leaves_.end()) return;
+  Leaf& leaf = found->second;
+  std::visit(Overloaded{[&](const CameraChange&) {  // other viewers draw by themselves
+                          if (leaf.subscription->gets(StreamMode::Frames)) say(session, message);
+                        },
+                        [&](const ViewerReport& report) { leaf.report = report; },
+                        [&](const ModeRequest&) { leaf.is_answer_due = true; },
+                        [&](const AdminCommand&) { is_shut_down_wanted_ = true; },  // all that comes here
+                        [&](const auto&) { say(session, message); }},
+             message);
 }
 
-void RelayDesk::on_report(SessionId session, const ViewerReport& report) {
-  if (const auto found = leaves_.find(session); found != leaves_.end()) found->second.report = report;
-}
-
-void RelayDesk::on_mode_request(SessionId session, const ModeRequest&) {
-  if (const auto found = leaves_.find(session); found != leaves_.end()) found->second.is_answer_due = true;
+void RelayDesk::on_need(SessionId session, const StreamNeed& need) {
+  switch (need.kind) {
+    case StreamNeed::Kind::Keyframe:
+      return upstream_.join(session, need.stream_id);
+    case StreamNeed::Kind::Anchor:
+      return upstream_.request_keyframe(need.stream_id);
+    case StreamNeed::Kind::Picture:
+      return parts_.voices.request_picture(session);
+  }
 }
 
 LinkAnswer RelayDesk::on_link(SessionId session, const LinkState& link, int64_t time_ns) {

@@ -42,32 +42,11 @@ class RelayDesk : public NetHandler {
   bool is_shut_down_wanted() const { return is_shut_down_wanted_; }
 
   Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) override;
-  void on_motion(SessionId session, const MotionSamples& samples, int64_t) override { say(session, samples); }
-  void on_wind(SessionId session, const WindSamples& samples, int64_t) override { say(session, samples); }
-  void on_command(SessionId session, const ControlCommand& command) override { say(session, command); }
-  void on_parameter(SessionId session, const SetParameter& parameter) override { say(session, parameter); }
-  void on_scene_request(SessionId session) override { say(session, SceneRequest{}); }
-  void on_live_command(SessionId session, const LiveCommand& command) override { say(session, command); }
-  void on_parameter_request(SessionId session, const ParameterRequest& request) override {
-    say(session, request);
+  void on_message(SessionId session, const ClientMessage& message, int64_t arrival_ns) override;
+  void on_need(SessionId session, const StreamNeed& need) override;
+  void on_change(SessionId, SubscriptionChange change) override {
+    if (change == SubscriptionChange::Strands) follow_demand();
   }
-  void on_camera_command(SessionId session, const CameraCommand& command) override { say(session, command); }
-  void on_state_times_request(SessionId session, const StateTimesRequest& request) override {
-    say(session, request);
-  }
-  void on_record_command(SessionId session, const RecordCommand& command) override { say(session, command); }
-  void on_camera(SessionId session, const CameraChange& camera) override;
-  void on_shut_down(SessionId) override { is_shut_down_wanted_ = true; }
-  void on_keyframe_request(SessionId session, uint16_t stream_id) override {
-    upstream_.join(session, stream_id);
-  }
-  void on_anchor_request(SessionId, uint16_t stream_id) override { upstream_.request_keyframe(stream_id); }
-  void on_picture_request(SessionId session, PictureClass) override {
-    parts_.voices.request_picture(session);
-  }
-  void on_strand_class(SessionId) override { follow_demand(); }
-  void on_report(SessionId session, const ViewerReport& report) override;
-  void on_mode_request(SessionId session, const ModeRequest&) override;
   LinkAnswer on_link(SessionId session, const LinkState& link, int64_t time_ns) override;
   void on_left(SessionId session) override;
   Status readiness() override { return upstream_.readiness(); }

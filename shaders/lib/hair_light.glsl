@@ -7,23 +7,25 @@
 #include "lib/select.glsl"
 
 // Of the scene: weights of the terms, and how strands differ.
+// schema begin: shader look
 struct HairLook {
   vec3 root_color;
   vec3 tip_color;
   float diffuse;
-  float scatter;
-  float highlight;          // R
-  float transmission;       // TT
-  float second_highlight;   // TRT
-  float width;              // of R, longitudinal, rad
-  float tilt;               // of the scales, rad
-  float tilt_spread;        // from strand to strand, rad
-  float root_darkening;
-  float strand_variation;
-  float lock_variation;
-  float warmth_variation;
-  float wetness;
+  float scatter;  // light that comes through other strands
+  float highlight;  // R: the light's colour, from the surface
+  float transmission;  // TT, seen against the light
+  float second_highlight;  // TRT: coloured, nearer to the root
+  float width;  // rad
+  float tilt;  // tilt of the scales: moves the highlights apart, rad
+  float tilt_spread;  // from strand to strand, rad
+  float root_darkening;  // 0..1, over the first quarter of a strand
+  float strand_variation;  // 0..1, of brightness from strand to strand
+  float lock_variation;  // from lock to lock
+  float warmth_variation;  // 0..1, of red against blue
+  float wetness;  // 0 dry .. 1 dripping: darker, clumped, sharp highlights
 };
+// schema end
 
 // What one strand is like, all along.
 struct HairStrand {

@@ -11,11 +11,11 @@ layout(std140, binding = kBindingTileFrame) uniform TileFrameBlock {
   vec4 eye;             // m; w = near, m
   vec4 target;          // size, px; pixels per metre at 1 m; far, m
   vec4 strand;          // width at the root, m; share of it at the tip; where tips begin to fade; unused
-  vec4 root_color;      // w = diffuse
-  vec4 tip_color;       // w = scatter
-  vec4 lobes;           // highlight, transmission, second highlight, width of R in rad
-  vec4 scales;          // tilt and its spread, rad; root darkening; variation by strand
-  vec4 variation;       // by lock, of warmth; wetness; ambient
+  vec4 root_color;      // w = ambient
+  vec4 tip_color;       // w = unused
+  // schema begin: shader block
+  vec4 shading[4];     // numbers of HairLook in their order, from diffuse on
+  // schema end
   vec4 to_key;          // unit; w = 1: there is a rim light
   vec4 key_color;
   vec4 to_rim;          // unit
@@ -33,15 +33,18 @@ layout(std140, binding = kBindingTileFrame) uniform TileFrameBlock {
   uvec4 grid;           // tiles across and down, strands that are drawn of those expanded, unused
 } u_frame;
 
+// schema begin: shader block reader
 HairLook frame_look() {
-  return HairLook(u_frame.root_color.rgb, u_frame.tip_color.rgb, u_frame.root_color.w, u_frame.tip_color.w,
-                  u_frame.lobes.x, u_frame.lobes.y, u_frame.lobes.z, u_frame.lobes.w, u_frame.scales.x, u_frame.scales.y,
-                  u_frame.scales.z, u_frame.scales.w, u_frame.variation.x, u_frame.variation.y, u_frame.variation.z);
+  return HairLook(u_frame.root_color.rgb, u_frame.tip_color.rgb, u_frame.shading[0].x, u_frame.shading[0].y,
+                  u_frame.shading[0].z, u_frame.shading[0].w, u_frame.shading[1].x, u_frame.shading[1].y,
+                  u_frame.shading[1].z, u_frame.shading[1].w, u_frame.shading[2].x, u_frame.shading[2].y,
+                  u_frame.shading[2].z, u_frame.shading[2].w, u_frame.shading[3].x);
 }
+// schema end
 
 HairLights frame_lights() {
   return HairLights(u_frame.to_key.xyz, u_frame.key_color.rgb, u_frame.to_rim.xyz, u_frame.rim_color.rgb,
-                    u_frame.to_key.w > 0.0, u_frame.up.xyz, u_frame.variation.w);
+                    u_frame.to_key.w > 0.0, u_frame.up.xyz, u_frame.root_color.w);
 }
 
 // Of the lattice, along its axes.

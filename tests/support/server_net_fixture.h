@@ -62,22 +62,24 @@ class FakeApp : public NetHandler {
     admission.asset = media(Opcode::Asset, 1, 0, asset_bytes);
     return admission;
   }
-  void on_motion(SessionId, const MotionSamples& samples, int64_t) override {
-    motion += samples.samples.size();
+  void on_message(SessionId session, const ClientMessage& message, int64_t) override {
+    std::visit(Overloaded{[&](const MotionSamples& samples) { motion += samples.samples.size(); },
+                          [&](const WindSamples& samples) { wind += samples.samples.size(); },
+                          [&](const ControlCommand&) {
+                            ++commands;
+                            server->send(session, Notice{false, "done"});
+                          },
+                          [&](const SetParameter&) { ++parameters; }, [&](const CameraChange&) { ++cameras; },
+                          [&](const AdminCommand&) { ++shut_downs; }, [](const auto&) {}},
+               message);
   }
-  void on_wind(SessionId, const WindSamples& samples, int64_t) override { wind += samples.samples.size(); }
-  void on_command(SessionId session, const ControlCommand&) override {
-    ++commands;
-    server->send(session, Notice{false, "done"});
-  }
-  void on_parameter(SessionId, const SetParameter&) override { ++parameters; }
-  void on_camera(SessionId, const CameraChange&) override { ++cameras; }
-  void on_shut_down(SessionId) override { ++shut_downs; }
   Status readiness() override {
     if (is_stepping) return {};
     return make_error(ErrorCode::Unavailable, "Stuck on purpose.");
   }
-  void on_keyframe_request(SessionId, uint16_t stream_id) override {
+  void on_need(SessionId, const StreamNeed& need) override {
+    if (need.kind == StreamNeed::Kind::Picture) return;
+    const uint16_t stream_id = need.stream_id;
     const std::lock_guard lock(mutex_);
     ++keyframe_requests;
     if (sequence_ > 0)

@@ -30,8 +30,8 @@ TEST(Roles, EveryMessageAndRole) {
   // One row per kind of message, in the order of ClientMessage.
   const std::vector<std::string> expected = {
       "no no no no",    "no no yes yes",   "no no yes yes", "yes yes no yes", "yes yes no yes",
-      "yes yes no yes", "yes yes yes yes", "no yes no yes", "no yes no yes",  "yes yes no yes",
-      "yes yes no yes", "no no no yes",    "no yes no yes", "no yes no yes",  "yes yes no yes",
+      "yes yes no yes", "yes yes yes yes", "no yes no yes", "no yes no yes",  "no no no yes",
+      "yes yes no yes", "yes yes no yes",  "no yes no yes", "no yes no yes",  "yes yes no yes",
       "no yes no yes",  "yes yes no yes",  "no yes no yes"};
   const auto messages = sample_client_messages();
   ASSERT_EQ(messages.size(), expected.size());

@@ -25,7 +25,8 @@ const check = (what, test) => {
 const messages = new Map(); // name -> Map of field -> [number, type, repeated]
 const enumerators = new Map(); // name -> number
 for (const name of ['scene', 'session', 'input']) {
-  const text = read(`proto/strandcast/v1/${name}.proto`).replace(/\/\/.*$/gm, '');
+  const text = read(`proto/strandcast/v1/${name}.proto`).replace(/\/\/.*$/gm, '').replace(/"(\\.|[^"\\])*"/g, '')
+    .replace(/\[[^\]]*\]/g, '').replace(/\boption \([^;]*;/g, '');
   const stack = [];
   for (const [statement] of text.matchAll(/(message|enum|oneof)\s+\w+\s*\{|\}|[^;{}]+;/g)) {
     const words = statement.trim().replace(/[;{]/g, '').split(/\s*=\s*|\s+/);
@@ -148,7 +149,7 @@ const ranges = new Map();
 for (const [, name, low, high, unit] of read('common/scene/scene_fields.h').matchAll(/Range (k\w+)\{([^,]+), ([^,]+), "([^"]*)"\}/g))
   ranges.set(name, [Number(low), Number(high), unit]);
 const fields = [...page.lookSections, ...page.simulationSections].flatMap((section) => section.fields);
-for (const field of fields)
+for (const field of fields.filter(({ range }) => range))
   check(field.path, () => {
     assert.deepEqual([field.minimum, field.maximum, field.unit], ranges.get(field.range));
     const name = field.path.split('.').pop();
@@ -157,6 +158,17 @@ for (const field of fields)
     const own = calls.filter(([, called]) => called === name || field.path.split('.').includes(called));
     assert.ok(own.some(([, , range]) => range === field.range), `no field has ${field.range}`);
   });
+
+// Made of scene.proto: as the slider of a viewer's field list has it.
+check('ranges of the look', () => {
+  const visited = read('common/scene/scene_fields.h');
+  const own = fields.filter(({ range }) => !range);
+  assert.ok(own.length >= 30 && own.every(({ path }) => path.startsWith('look.')), `${own.length} fields`);
+  for (const { path, minimum, maximum, unit } of own) {
+    const [, low, high, said] = new RegExp(`v\\.number\\("${path.split('.').pop()}", [\\w.]+, Range\\{([^,]+), ([^,]+), "([^"]*)"\\}\\)`).exec(visited) ?? [];
+    assert.deepEqual([minimum, maximum, unit], [Number(low), Number(high), said], path);
+  }
+});
 
 check('hair colours', () => {
   const srgb = (linear) => Math.round(255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055));
@@ -177,6 +189,7 @@ check('numbers of a look', () => {
       const inner = fill(kind);
       const parts = kind.x || kind.r ? Object.values(inner) : undefined;
       if (parts) values.set(name, parts);
+      else for (const [part, value] of Object.entries(inner)) values.set(`${name}_${part}`, [value]);
       return [name, inner];
     }
     if (!/^[xyzrgb]$/.test(name)) values.set(name, [next + 1]);

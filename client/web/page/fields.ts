@@ -1,9 +1,9 @@
-// Fields of a scene that the page's panel shows, with their ranges (common/scene/scene_fields.h; a test compares) and
-// the part of a range that is handy.
+// Fields of a scene that the page's panel shows, with their ranges and the part of a range that is handy: of the look from
+// scene.proto (proto/schema.py), others as common/scene/scene_fields.h has them (a test compares).
 export interface Field {
   path: string;
   title: string;
-  range: string; // its name there
+  range?: string; // its name there; none: of the look
   minimum: number;
   maximum: number;
   unit: string;
@@ -18,42 +18,67 @@ export interface Section {
 const f = (path: string, title: string, range: [string, number, number, string], handy?: number, isWhole?: boolean): Field => ({
   path, title, range: range[0], minimum: range[1], maximum: range[2], unit: range[3], handy, isWhole,
 });
-const FRACTION: [string, number, number, string] = ['kFraction', 0, 1, ''];
-const WEIGHT: [string, number, number, string] = ['kShadingWeight', 0, 10, ''];
-const AMPLITUDE: [string, number, number, string] = ['kStyleAmplitude', 0, 0.1, 'm'];
-const COUNT: [string, number, number, string] = ['kStyleCount', 0, 64, 'waves'];
-const MELANIN: [string, number, number, string] = ['kMelanin', 0, 10, ''];
 const WIND: [string, number, number, string] = ['kWindSpeed', -100, 100, 'm/s'];
+
+// schema begin: page ranges
+const lookNumbers: { readonly [path: string]: readonly [number, number, string, number, string, boolean] } = {
+  'look.eumelanin': [0, 10, '', 8, 'brown melanin', false],
+  'look.pheomelanin': [0, 10, '', 4, 'red melanin', false],
+  'look.strand_radius_m': [1e-6, 0.01, 'm', 0.0005, 'radius', false],
+  'look.tip_scale': [0, 1, '', 1, 'radius at the tip', false],
+  'look.followers': [0, 64, '', 64, 'followers', true],
+  'look.segments': [1, 8, '', 8, 'segments', true],
+  'look.ambient': [0, 1, '', 1, 'ambient', false],
+  'look.exposure': [0, 100, '', 4, 'exposure', false],
+  'look.style.clump': [0, 1, '', 1, 'clump', false],
+  'look.style.locks': [1, 16, '', 16, 'locks', true],
+  'look.style.spread': [0, 1, '', 0.1, 'spread', false],
+  'look.style.wave_m': [0, 0.1, 'm', 0.02, 'waves', false],
+  'look.style.wave_count': [0, 64, 'waves', 16, 'waves along it', false],
+  'look.style.frizz_m': [0, 0.1, 'm', 0.005, 'frizz', false],
+  'look.style.frizz_count': [0, 64, 'waves', 32, 'frizz along it', false],
+  'look.style.stray_share': [0, 1, '', 0.3, 'strays', false],
+  'look.style.stray_spread': [0, 20, '', 10, 'strays go further', false],
+  'look.style.length_spread': [0, 1, '', 1, 'uneven lengths', false],
+  'look.style.short_share': [0, 1, '', 0.5, 'short ones', false],
+  'look.style.tip_fade': [0, 1, '', 1, 'tips fade over', false],
+  'look.shading.diffuse': [0, 10, '', 2, 'diffuse', false],
+  'look.shading.scatter': [0, 10, '', 2, 'scatter', false],
+  'look.shading.highlight': [0, 10, '', 4, 'highlight', false],
+  'look.shading.transmission': [0, 10, '', 4, 'transmission', false],
+  'look.shading.second_highlight': [0, 10, '', 4, 'second highlight', false],
+  'look.shading.highlight_width_deg': [1, 45, 'degrees', 45, 'highlight width', false],
+  'look.shading.cuticle_deg': [-15, 15, 'degrees', 15, 'cuticle', false],
+  'look.shading.cuticle_spread_deg': [0, 30, 'degrees', 30, 'cuticle spread', false],
+  'look.shading.root_darkening': [0, 1, '', 1, 'root darkening', false],
+  'look.shading.strand_variation': [0, 1, '', 1, 'strand variation', false],
+  'look.shading.lock_variation': [0, 1, '', 1, 'lock variation', false],
+  'look.shading.warmth_variation': [0, 1, '', 1, 'warmth variation', false],
+  'look.shading.wetness': [0, 1, '', 1, 'wetness', false],
+};
+// schema end
+/** Of the look: as scene.proto has it, but for what is said here. */
+function look(name: string, title?: string, handy?: number): Field {
+  const [minimum, maximum, unit, usual, label, isWhole] = lookNumbers[`look.${name}`]!;
+  return { path: `look.${name}`, title: title ?? label, minimum, maximum, unit, handy: handy ?? usual, isWhole };
+}
 
 export const lookSections: readonly Section[] = [
   { title: 'Colour', fields: [
-    f('look.eumelanin', 'brown melanin', MELANIN, 8), f('look.pheomelanin', 'red melanin', MELANIN, 4),
-    f('look.shading.wetness', 'wetness', FRACTION), f('look.exposure', 'exposure', ['kExposure', 0, 100, ''], 4),
-    f('look.ambient', 'light from around', FRACTION),
+    look('eumelanin'), look('pheomelanin'), look('shading.wetness'), look('exposure'), look('ambient', 'light from around'),
   ] },
   { title: 'Style', fields: [
-    f('look.style.clump', 'clump', FRACTION), f('look.style.locks', 'locks', ['kLocks', 1, 16, ''], 16, true),
-    f('look.style.spread', 'spread', FRACTION, 0.1), f('look.style.wave_m', 'waves', AMPLITUDE, 0.02),
-    f('look.style.wave_count', 'waves along it', COUNT, 16), f('look.style.frizz_m', 'frizz', AMPLITUDE, 0.005),
-    f('look.style.frizz_count', 'frizz along it', COUNT, 32), f('look.style.stray_share', 'strays', FRACTION, 0.3),
-    f('look.style.stray_spread', 'strays go further', ['kStraySpread', 0, 20, ''], 10),
-    f('look.style.length_spread', 'uneven lengths', FRACTION), f('look.style.short_share', 'short ones', FRACTION, 0.5),
-    f('look.style.tip_fade', 'tips fade over', FRACTION),
+    look('style.clump'), look('style.locks'), look('style.spread'), look('style.wave_m'), look('style.wave_count'),
+    look('style.frizz_m'), look('style.frizz_count'), look('style.stray_share'), look('style.stray_spread'),
+    look('style.length_spread'), look('style.short_share'), look('style.tip_fade'),
   ] },
   { title: 'Shading', fields: [
-    f('look.shading.diffuse', 'diffuse', WEIGHT, 2), f('look.shading.scatter', 'scatter', WEIGHT, 2),
-    f('look.shading.highlight', 'highlight', WEIGHT, 4), f('look.shading.transmission', 'transmission', WEIGHT, 4),
-    f('look.shading.second_highlight', 'second highlight', WEIGHT, 4),
-    f('look.shading.highlight_width_deg', 'highlight width', ['kHighlightWidth', 1, 45, 'degrees']),
-    f('look.shading.cuticle_deg', 'cuticle', ['kCuticle', -15, 15, 'degrees']),
-    f('look.shading.root_darkening', 'root darkening', FRACTION),
-    f('look.shading.strand_variation', 'strand variation', FRACTION),
+    look('shading.diffuse'), look('shading.scatter'), look('shading.highlight'), look('shading.transmission'),
+    look('shading.second_highlight'), look('shading.highlight_width_deg'), look('shading.cuticle_deg'),
+    look('shading.root_darkening'), look('shading.strand_variation'),
   ] },
   { title: 'Detail', fields: [
-    f('look.followers', 'drawn strands between', ['kFollowers', 0, 64, ''], 16, true),
-    f('look.segments', 'segments', ['kSegments', 1, 8, ''], 8, true),
-    f('look.strand_radius_m', 'radius', ['kDrawnRadius', 1e-6, 0.01, 'm'], 0.0005),
-    f('look.tip_scale', 'radius at the tip', FRACTION),
+    look('followers', 'drawn strands between', 16), look('segments'), look('strand_radius_m'), look('tip_scale'),
   ] },
 ];
 

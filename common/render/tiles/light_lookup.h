@@ -10,9 +10,27 @@
 namespace strandcast {
 
 STRANDCAST_LANES law::HairLook hair_look(const ShadingNumbers& n) {
-  return {n.root_color,     n.tip_color,        n.diffuse,        n.scatter,          n.highlight,
-          n.transmission,   n.second_highlight, n.width_rad,      n.tilt_rad,         n.tilt_spread_rad,
-          n.root_darkening, n.strand_variation, n.lock_variation, n.warmth_variation, n.wetness};
+  law::HairLook look;
+  look.root_color = n.root_color;
+  look.tip_color = n.tip_color;
+  // schema begin: hair look
+  // clang-format off
+  look.diffuse = n.diffuse;
+  look.scatter = n.scatter;
+  look.highlight = n.highlight;
+  look.transmission = n.transmission;
+  look.second_highlight = n.second_highlight;
+  look.width = n.width_rad;
+  look.tilt = n.tilt_rad;
+  look.tilt_spread = n.tilt_spread_rad;
+  look.root_darkening = n.root_darkening;
+  look.strand_variation = n.strand_variation;
+  look.lock_variation = n.lock_variation;
+  look.warmth_variation = n.warmth_variation;
+  look.wetness = n.wetness;
+  // clang-format on
+  // schema end
+  return look;
 }
 STRANDCAST_LANES law::HairLights hair_lights(const ShadingNumbers& n, const LightDirections& lights) {
   return {lights.to_key, n.key_color, lights.to_rim, n.rim_color, lights.has_rim, lights.up, n.ambient};
