@@ -19,11 +19,11 @@ HeadMovement FeltMotion::feel(const HeadMovement& moved, bool is_cut, double ste
     if (--unknown_steps_ > 0) return felt_;
     constexpr double kShare = 1.0 / kStepsAfterCut;
     beyond_ = {kShare * seen_.shift_m - felt_.shift_m, kShare * seen_.turn_rad - felt_.turn_rad};
-    passed_s_ = beyond_ == HeadMovement{} ? kSettleS : 0.0;
+    passed_s_ = beyond_ == HeadMovement{} ? kFeltChangeS : 0.0;
     return felt_;
   }
-  passed_s_ = std::min(passed_s_ + step_s, kSettleS);
-  share_ = ease(passed_s_ / kSettleS);
+  passed_s_ = std::min(passed_s_ + step_s, kFeltChangeS);
+  share_ = ease(passed_s_ / kFeltChangeS);
   felt_ = moved;
   if (share_ < 1.0) {
     felt_.shift_m -= (1.0 - share_) * beyond_.shift_m;

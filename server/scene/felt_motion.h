@@ -19,7 +19,7 @@ struct HeadMovement {
 /// Steps after a cut from whose mean the head's new speed is taken: samples fall unevenly into single steps.
 inline constexpr uint32_t kStepsAfterCut = 4;
 /// Time in which strands come to feel the change of speed across a cut, s.
-inline constexpr double kSettleS = 1.0;
+inline constexpr double kFeltChangeS = 1.0;
 
 class FeltMotion {
  public:
@@ -27,7 +27,7 @@ class FeltMotion {
   /// `is_cut`: the head's way of this step is a jump, and strands go on as in the step before.
   HeadMovement feel(const HeadMovement& moved, bool is_cut, double step_s);
 
-  /// Returns the share of the change of speed that strands feel by now: 0 at a cut, 1 from kSettleS on.
+  /// Returns the share of the change of speed that strands feel by now: 0 at a cut, 1 from kFeltChangeS on.
   double share() const { return share_; }
 
  private:
@@ -35,7 +35,7 @@ class FeltMotion {
   HeadMovement seen_;    // since the cut
   HeadMovement beyond_;  // a step's movement after the cut, less that before it
   uint32_t unknown_steps_ = 0;
-  double passed_s_ = kSettleS;  // since the new speed is known
+  double passed_s_ = kFeltChangeS;  // since the new speed is known
   double share_ = 1.0;
 };
 

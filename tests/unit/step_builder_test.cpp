@@ -108,7 +108,7 @@ double most_felt_mps2(double before_mps, double after_mps, bool is_cut) {
 // A source that joins, comes back or leaves changes the head's speed at once. Strands feel the change over a
 // second: 1.875 is a quintic's steepest slope. The same change of one source is felt as it is.
 TEST(StepBuilder, ACutChangesTheFeltSpeedGently) {
-  const double gently_mps2 = 1.01 * 1.875 * 2.3 / kSettleS;
+  const double gently_mps2 = 1.01 * 1.875 * 2.3 / kFeltChangeS;
   EXPECT_LT(most_felt_mps2(0.0, 2.3, true), gently_mps2) << "a head at rest";
   EXPECT_LT(most_felt_mps2(2.3, 0.0, true), gently_mps2) << "a head that stops";
   EXPECT_LT(most_felt_mps2(2.3, 2.3, true), 1e-6) << "a cut within a flight";
