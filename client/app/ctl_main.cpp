@@ -61,7 +61,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", fmt::format("strandcast-ctl {}", version()));
   CtlCommandLine line;
   std::string log_level = "warn";
-  app.failure_message(command_line_failure);
+  app.failure_message(command_line_failure<CLI::App, CLI::Error>);
   app.require_subcommand(1);
   app.fallthrough();  // --connect may stand behind the sub-command too
   declare_target(app, line.target);

@@ -225,7 +225,7 @@ ViewCommandLine read_view_command_line(int argc, const char* const* argv) {
   CLI::App app("Strandcast viewer: shows the hair of a running strandcast-server, or of a recording.",
                "strandcast-view");
   app.set_version_flag("--version", fmt::format("strandcast-view {}", version()));
-  app.failure_message(command_line_failure);
+  app.failure_message(command_line_failure<CLI::App, CLI::Error>);
   RawOptions raw;
   ViewOptions options;
   declare(app, raw, options);

@@ -4,23 +4,22 @@
 #include <string>
 #include <string_view>
 
-#include <CLI/CLI.hpp>
-
 namespace strandcast {
 
-/// Returns the sentence of an error. For a value of the wrong kind it names the option and the value.
-inline std::string command_line_error(const CLI::Error& error) {
+/// Returns the sentence for `said`, the text of a CLI::ParseError. For a value of the wrong kind it names the
+/// option and the value.
+inline std::string command_line_error(std::string_view said) {
   constexpr std::string_view kNotRead = "Could not convert: ", kIs = " = ";
-  const std::string text = error.what();
-  const size_t is = text.find(kIs);
-  if (!text.starts_with(kNotRead) || is == std::string::npos) return text;
-  return text.substr(kNotRead.size(), is - kNotRead.size()) + " cannot be '" + text.substr(is + kIs.size()) +
-         "'";
+  const size_t is = said.find(kIs);
+  if (!said.starts_with(kNotRead) || is == std::string_view::npos) return std::string(said);
+  const std::string_view option = said.substr(kNotRead.size(), is - kNotRead.size());
+  return std::string(option) + " cannot be '" + std::string(said.substr(is + kIs.size())) + "'";
 }
 
-/// Says such a sentence and where help is, for CLI::App::failure_message().
-inline std::string command_line_failure(const CLI::App* app, const CLI::Error& error) {
-  return app->get_name() + ": " + command_line_error(error) + " (--help lists the options)\n";
+/// Returns such a sentence of a program, and where help is: for CLI::App::failure_message().
+template <class App, class Failure>
+std::string command_line_failure(const App* app, const Failure& failure) {
+  return app->get_name() + ": " + command_line_error(failure.what()) + " (--help lists the options)\n";
 }
 
 }  // namespace strandcast

@@ -332,7 +332,7 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
   } catch (const CLI::CallForVersion&) {
     options.help = version_text() + "\n";
   } catch (const CLI::ParseError& error) {
-    return make_error(ErrorCode::BadInput, "{} (--help lists the options)", command_line_error(error));
+    return make_error(ErrorCode::BadInput, "{} (--help lists the options)", command_line_error(error.what()));
   }
   constexpr double kBytesPerMbit = 125e3;
   options.config.net.limits.viewer_bytes_per_s = raw.viewer_mbit * kBytesPerMbit;

@@ -33,7 +33,7 @@ int run(int argc, const char* const* argv) {
     return 0;
   } catch (const CLI::ParseError& error) {
     fmt::print(stderr, "strandcast-report: {} (--help lists the commands and options)\n",
-               command_line_error(error));
+               command_line_error(error.what()));
     return kExitBadInput;
   }
   init_log("warn");
