@@ -200,8 +200,9 @@ TEST_F(ProcessFaults, ASignalEndsAViewerThatDrawsItsClip) {
        "--clip", clip.string(), "--clip-seconds", "30", "--clip-fps", "60", "--clip-size", "1920x1080"},
       folder_.path() / "viewer.txt");
   const auto said = [&] { return text_of("viewer.txt"); };
-  ASSERT_TRUE(eventually(
-      [&] { return viewer.has_ended() || said().find("drawing the clip: picture 1 of ") != std::string::npos; }));
+  ASSERT_TRUE(eventually([&] {
+    return viewer.has_ended() || said().find("drawing the clip: picture 1 of ") != std::string::npos;
+  }));
   viewer.send_signal(SIGINT);
   EXPECT_TRUE(eventually([&] { return viewer.has_ended(); })) << said();
   EXPECT_FALSE(std::filesystem::exists(clip)) << "a clip is whole or not there";
