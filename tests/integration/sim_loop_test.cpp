@@ -1,0 +1,380 @@
+// The simulation's loop in this process, without a network: commands and changes that come in floods, steps
+// that a session asks for, and quality by how long a step takes.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <future>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "common/scene/scene_file.h"
+#include "common/strands/scene_asset.h"
+#include "server/source/sim_loop.h"
+#include "tests/support/server_fixture.h"
+
+namespace strandcast::sim_loop_test {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr uint32_t kStrands = 150;
+constexpr uint32_t kVertices = 8;
+
+/// Takes what a loop makes, and keeps how stream and look were changed.
+class LoopSink : public StateSink {
+ public:
+  void put(std::shared_ptr<const Snapshot>) override {}
+  void change_stream(const StreamDesc& stream) override {
+    const std::lock_guard lock(mutex_);
+    streams_.push_back(stream);
+  }
+  void change_look(const LookChange& look) override {
+    const std::lock_guard lock(mutex_);
+    looks_.push_back(look);
+  }
+  void change_shape(std::shared_ptr<const SceneAsset>) override {}
+  std::vector<StreamDesc> streams() const {
+    const std::lock_guard lock(mutex_);
+    return streams_;
+  }
+  std::vector<LookChange> looks() const {
+    const std::lock_guard lock(mutex_);
+    return looks_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<StreamDesc> streams_;
+  std::vector<LookChange> looks_;
+};
+
+TEST(SimLoopJobs, CommandsBeyondTheLimitAreRefusedAtOnce) {
+  // The first state published after the start holds the simulation thread until the test lets it go.
+  std::promise<void> held, go;
+  auto let_go = go.get_future().share();
+  std::atomic<int> published = 0;
+  SimLoopConfig config;
+  config.scene = test::small_scene(kStrands, kVertices);
+  auto content = load_scene_content(config.scene);
+  ASSERT_TRUE(content.ok());
+  config.content = std::make_shared<const SceneContent>(std::move(*content));
+  config.on_publish = [&](const std::shared_ptr<const Snapshot>&) {
+    if (++published != 2) return;
+    held.set_value();
+    let_go.wait();
+  };
+  InputHub hub;
+  LoopSink sink;
+  auto loop = SimLoop::start(std::move(config), hub, sink);
+  if (!loop.ok() && test::lacks_gl(loop.error().message))
+    GTEST_SKIP() << "needs OpenGL 4.5: " << loop.error().to_string();
+  ASSERT_TRUE(loop.ok()) << loop.error().to_string();
+  held.get_future().wait();
+  std::atomic<size_t> refused = 0, answered = 0;
+  for (size_t i = 0; i < kMaxPendingJobs + 3; ++i)
+    (*loop)->post(ControlCommand{Command::Pause},
+                  [&](const Notice& notice) { notice.is_error ? ++refused : ++answered; });
+  EXPECT_EQ(refused, 3u);
+  go.set_value();
+  for (int i = 0; i < 1000 && answered < kMaxPendingJobs; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  EXPECT_EQ(answered, kMaxPendingJobs) << "what was accepted is carried out";
+  (*loop)->stop();
+}
+
+/// A loop over a small scene without a network; null after a skip or a failure.
+class Loop {
+ public:
+  explicit Loop(SimLoopConfig config) {
+    auto content = load_scene_content(config.scene);
+    if (!content.ok()) return;
+    config.content = std::make_shared<const SceneContent>(std::move(*content));
+    auto started = SimLoop::start(std::move(config), hub_, sink_);
+    if (started.ok())
+      loop_ = std::move(*started);
+    else
+      error_ = started.error();
+  }
+  explicit operator bool() const { return loop_ != nullptr; }
+  SimLoop* operator->() const { return loop_.get(); }
+  std::string trouble() const { return error_.to_string(); }
+  std::vector<StreamDesc> streams() const { return sink_.streams(); }
+  std::vector<LookChange> looks() const { return sink_.looks(); }
+  /// Posts the change and waits for its answer.
+  Notice ask(const std::string& assignment) const {
+    auto answer = std::make_shared<std::promise<Notice>>();
+    loop_->post(SetParameter{assignment}, [answer](Notice notice) { answer->set_value(std::move(notice)); });
+    return answer->get_future().get();
+  }
+
+ private:
+  InputHub hub_;
+  LoopSink sink_;
+  Error error_;
+  std::unique_ptr<SimLoop> loop_;
+};
+
+// What a step takes is a hundredth of the time there is in the one scene, and many times as much in the
+// other.
+TEST(SimLoopQuality, AutoIsFullWhereStepsAreQuickAndElseFast) {
+  const auto running = [](const std::vector<std::string>& overrides, bool is_lockstep) {
+    SimLoopConfig config;
+    config.scene = with_overrides(test::small_scene(400, 16), overrides).value();
+    config.is_lockstep = is_lockstep;
+    const Loop loop(std::move(config));
+    EXPECT_TRUE(loop) << loop.trouble();
+    return loop ? loop->scene() : SceneDesc();
+  };
+  const SceneDesc quick = running({"quality=auto", "step_rate_hz=10"}, false);
+  EXPECT_EQ(quick.solver.name, "direct_rod");
+  EXPECT_TRUE(quick.volume.air.acts);
+  const std::vector<std::string> slow = {"quality=auto", "step_rate_hz=1000", "substeps=64"};
+  const SceneDesc lowered = running(slow, false);
+  EXPECT_EQ(lowered.solver.name, "dftl");
+  EXPECT_FALSE(lowered.volume.acts());
+  EXPECT_EQ(lowered.quality, kAutoQuality);
+  EXPECT_EQ(running(slow, true).solver.name, "direct_rod") << "simulated time waits: nothing is measured";
+}
+
+TEST(SimLoopJobs, AFloodOfChangesOfTheStreamIsPublishedTwiceASecondAndTheLastOneCounts) {
+  SimLoopConfig config;
+  config.scene = test::small_scene(kStrands, kVertices);
+  const Loop loop(std::move(config));
+  if (!loop && test::lacks_gl(loop.trouble())) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+  ASSERT_TRUE(loop) << loop.trouble();
+  const int64_t begin_ns = now_ns();
+  constexpr int kChanges = 300;
+  for (int i = 0; i < kChanges; ++i) {
+    const Notice notice = loop.ask(fmt::format("stream.bound_m={}", i % 2 == 0 ? "0.0002" : "0.0003"));
+    ASSERT_FALSE(notice.is_error) << notice.text;
+  }
+  const Notice last = loop.ask("stream.bound_m=0.0004");
+  EXPECT_FALSE(last.is_error);
+  ASSERT_TRUE(eventually([&] {
+    const auto streams = loop.streams();
+    return !streams.empty() && streams.back().bound_m == 0.0004f;
+  }));
+  EXPECT_LE(loop.streams().size(), static_cast<size_t>((now_ns() - begin_ns) / kStreamChangeNs) + 1);
+}
+
+TEST(SimLoopJobs, AFloodOfLooksIsToldTenTimesASecondAndTheLastOneCounts) {
+  SimLoopConfig config;
+  config.scene = test::small_scene(kStrands, kVertices);
+  const LookDesc first = config.scene.look;
+  const Loop loop(std::move(config));
+  if (!loop && test::lacks_gl(loop.trouble())) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+  ASSERT_TRUE(loop) << loop.trouble();
+  EXPECT_TRUE(loop.looks().empty()) << "nothing has changed";
+  const int64_t begin_ns = now_ns();
+  constexpr int kChanges = 300;
+  for (int i = 1; i <= kChanges; ++i)
+    ASSERT_FALSE(loop.ask(fmt::format("look.ambient={}", 1e-3 * i)).is_error);
+  const auto is_told = [&](auto&& is_it) {
+    return eventually([&] {
+      const auto looks = loop.looks();
+      return !looks.empty() && is_it(looks.back());
+    });
+  };
+  ASSERT_TRUE(is_told([](const LookChange& look) { return look.look.ambient == 0.3f; }));
+  EXPECT_LE(loop.looks().size(), static_cast<size_t>((now_ns() - begin_ns) / kLookChangeNs) + 1);
+  LookDesc expected = first;
+  expected.ambient = 0.3f;
+  EXPECT_EQ(loop.looks().back().look, expected) << "all else stays";
+  EXPECT_EQ(loop->scene().look, expected);
+  // While nothing is simulated, too, with what came too soon after the one before.
+  loop->post(ControlCommand{Command::Pause}, {});
+  for (const char* color : {"red", "black", "grey"})
+    ASSERT_FALSE(loop.ask(fmt::format("look.hair_color={}", color)).is_error);
+  ASSERT_TRUE(is_told([](const LookChange& look) { return look.look.hair_color == "grey"; }));
+  EXPECT_TRUE(loop.streams().empty()) << "the stream does not change with it";
+}
+
+TEST(SimLoopJobs, NewSolversLeaveTimeForStepsBetweenThem) {
+  std::promise<void> held, go;
+  auto let_go = go.get_future().share();
+  std::atomic<int> published = 0;
+  SimLoopConfig config;
+  config.scene = test::small_scene(kStrands, kVertices);
+  config.on_publish = [&](const std::shared_ptr<const Snapshot>&) {
+    if (++published != 2) return;
+    held.set_value();
+    let_go.wait();
+  };
+  const Loop loop(std::move(config));
+  if (!loop && test::lacks_gl(loop.trouble())) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+  ASSERT_TRUE(loop) << loop.trouble();
+  held.get_future().wait();
+  std::mutex mutex;
+  std::vector<std::string> answers;
+  constexpr size_t kJobs = 30;
+  static_assert(kJobs <= kMaxPendingJobs);
+  for (size_t i = 0; i < kJobs; ++i)
+    loop->post(SetParameter{i % 2 == 0 ? "solver.name=pbd" : "solver.name=dftl"}, [&](const Notice& notice) {
+      const std::lock_guard lock(mutex);
+      answers.push_back(notice.text);
+    });
+  go.set_value();
+  ASSERT_TRUE(eventually([&] {
+    const std::lock_guard lock(mutex);
+    return answers.size() == kJobs;
+  }));
+  const auto step_of = [](const std::string& text) {
+    return std::stoul(text.substr(text.find("step ") + 5));
+  };
+  EXPECT_GT(step_of(answers.back()), step_of(answers.front())) << answers.front() << " " << answers.back();
+}
+
+/// Answers, as they come, behind a word of whose they are.
+class Answers {
+ public:
+  SimLoop::Reply of(const std::string& who) {
+    return [this, who](const Notice& notice) {
+      const std::lock_guard lock(mutex_);
+      all_.emplace_back(who, notice);
+    };
+  }
+  std::vector<std::pair<std::string, Notice>> all() const {
+    const std::lock_guard lock(mutex_);
+    return all_;
+  }
+  /// The first of these; waits for it.
+  Notice first_of(const std::string& who) const {
+    std::optional<Notice> found;
+    EXPECT_TRUE(eventually([&] {
+      for (const auto& [whose, notice] : all())
+        if (whose == who && !found) found = notice;
+      return found.has_value();
+    })) << who;
+    return found.value_or(Notice{});
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<std::pair<std::string, Notice>> all_;
+};
+
+constexpr uint32_t kManySteps = kMaxStepCount;
+const ControlCommand kStepMany{Command::StepOnce, kManySteps};
+
+SimLoopConfig stepped_config() {
+  SimLoopConfig config;
+  config.scene = test::small_scene(kStrands, kVertices);
+  config.is_lockstep = true;
+  return config;
+}
+
+// A controller asks for hours of steps, and goes.
+TEST(SimLoopJobs, StepsEndWithTheSessionThatAskedForThem) {
+  Answers answers;
+  const Loop loop(stepped_config());
+  if (!loop && test::lacks_gl(loop.trouble())) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+  ASSERT_TRUE(loop) << loop.trouble();
+  loop->post(kStepMany, answers.of("steps"), "gone");
+  loop->post(kStepMany, answers.of("more"), "gone");
+  ASSERT_TRUE(eventually([&] { return loop->stats().tick > 0; }));
+  loop->leave("somebody else");
+  give_time_to_misbehave();
+  EXPECT_TRUE(answers.all().empty());
+  loop->leave("gone");
+  const Notice end = answers.first_of("steps");
+  EXPECT_TRUE(end.is_error);
+  EXPECT_THAT(end.text, HasSubstr("has ended"));
+  loop->post(ControlCommand{Command::Pause}, answers.of("pause"), "other");
+  answers.first_of("pause");
+  const uint64_t tick = loop->stats().tick;
+  EXPECT_LT(tick, kManySteps);
+  give_time_to_misbehave();
+  EXPECT_EQ(loop->stats().tick, tick) << "those that waited are left out, too";
+  EXPECT_EQ(answers.all().size(), 2u);
+}
+
+TEST(SimLoopJobs, StepsYieldToOthersAndKeepTheOrderOfTheirOwn) {
+  for (const Command command : {Command::Pause, Command::Reset}) {
+    Answers answers;
+    const Loop loop(stepped_config());
+    if (!loop && test::lacks_gl(loop.trouble())) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+    ASSERT_TRUE(loop) << loop.trouble();
+    loop->post(kStepMany, answers.of("steps"), "one");
+    loop->post(SetParameter{"gravity_mps2={ x: 1 y: 0 }"}, answers.of("own"), "one");
+    ASSERT_TRUE(eventually([&] { return loop->stats().tick > 0; }));
+    loop->post(SetParameter{"gravity_mps2={ x: 2 y: 0 }"}, answers.of("set"), "other");
+    EXPECT_FALSE(answers.first_of("set").is_error) << "between two steps";
+    EXPECT_EQ(answers.all().size(), 1u) << "the steps go on, and what follows them waits";
+    loop->post(ControlCommand{command}, answers.of("command"), "other");
+    EXPECT_FALSE(answers.first_of("command").is_error);
+    EXPECT_THAT(answers.first_of("steps").text, HasSubstr("somebody else"));
+    EXPECT_FALSE(answers.first_of("own").is_error);
+    EXPECT_LT(loop->stats().tick, kManySteps);
+  }
+}
+
+TEST(SimLoopJobs, StepsOfOneCommandHaveABoundInTime) {
+  Answers answers;
+  SimLoopConfig config = stepped_config();
+  config.longest_steps_ns = 1;
+  const Loop loop(std::move(config));
+  if (!loop && test::lacks_gl(loop.trouble())) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+  ASSERT_TRUE(loop) << loop.trouble();
+  loop->post(kStepMany, answers.of("steps"), "one");
+  const Notice end = answers.first_of("steps");
+  EXPECT_TRUE(end.is_error);
+  EXPECT_THAT(end.text, HasSubstr(fmt::format("of {} steps done", kManySteps)));
+  EXPECT_LT(loop->stats().tick, 10u);
+}
+
+// Three controllers at their allowed rate, and an honest one.
+TEST(SimLoopJobs, SessionsHaveTheirTurnsOneAfterTheOther) {
+  std::promise<void> go, held;
+  const std::shared_future<void> let_go = go.get_future().share();
+  std::atomic<int> published = 0;
+  SimLoopConfig config;
+  config.scene = test::small_scene(kStrands, kVertices);
+  config.on_publish = [&](const std::shared_ptr<const Snapshot>&) {
+    if (++published != 2) return;
+    held.set_value();
+    let_go.wait();
+  };
+  const Loop loop(std::move(config));
+  if (!loop && test::lacks_gl(loop.trouble())) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+  ASSERT_TRUE(loop) << loop.trouble();
+  held.get_future().wait();
+  Answers answers;
+  const std::vector<std::string> greedy = {"a", "b", "c"};
+  for (size_t i = 0; i < 4 * kMaxPendingJobs; ++i)
+    loop->post(SetParameter{"solver.name=pbd"}, answers.of(greedy[i % 3]), greedy[i % 3]);
+  loop->post(ControlCommand{Command::Pause}, answers.of("honest"), "honest");
+  size_t refused = 0;
+  for (const auto& [who, notice] : answers.all()) {
+    EXPECT_NE(who, "honest");
+    refused += notice.is_error ? 1 : 0;
+  }
+  EXPECT_EQ(refused, 3 * kMaxPendingJobs + 1) << "one gave its place";
+  go.set_value();
+  EXPECT_FALSE(answers.first_of("honest").is_error);
+  size_t before = 0;
+  for (const auto& [who, notice] : answers.all()) {
+    if (who == "honest") break;
+    before += notice.is_error ? 0 : 1;
+  }
+  EXPECT_LE(before, 4u) << "one of each before it, and the one under way";
+}
+
+// One step of it takes seconds, and whoever ends the server waits for none of them.
+TEST(SimLoopJobs, StopDoesNotWaitForTheRestOfTheSubsteps) {
+  SimLoopConfig config;
+  config.scene = test::small_scene(3'000, 16);
+  config.scene.solver.name = "super_helix";
+  config.scene.solver.parameters.clear();
+  config.scene.substeps = 64;
+  const Loop loop(std::move(config));
+  if (!loop && test::lacks_gl(loop.trouble())) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+  ASSERT_TRUE(loop) << loop.trouble();
+  give_time_to_misbehave();
+  loop->stop();
+  EXPECT_EQ(loop->stats().last_step_ns, 0) << "the first step was finished";
+}
+
+}  // namespace
+}  // namespace strandcast::sim_loop_test
