@@ -122,6 +122,9 @@ void declare_cameras(CLI::App& app, CtlCommandLine& line) {
   declare_camera(app, line.camera);
 }
 
+void declare_bundled(CLI::App& app, CtlCommandLine& line) {
+  declare_bundle(app, line.bundle);
+}
 void declare_exported(CLI::App& app, CtlCommandLine& line) {
   declare_export(app, line.exported);
 }
@@ -242,6 +245,8 @@ constexpr CtlCommand kCommands[] = {
      [](const Line& line, const Stop&) { return run_save(line.target, line.scene_path); }},
     {"export", "Write the strands as curves for other programs", declare_exported,
      [](const Line& line, const Stop& stop) { return run_export(line.target, line.exported, stop); }},
+    {"bundle", "Make one HTML file of a recording, which browsers play without a server", declare_bundled,
+     [](const Line& line, const Stop&) { return run_bundle(line.bundle); }},
     {"check", "Decode frames with two viewers and compare their states; or look whether a recording is sound",
      declare_check, start_check},
     {"sessions", "List who is connected (needs an admin's token)", nullptr, admin<AdminAction::ListSessions>},
