@@ -313,7 +313,7 @@ TEST(LivePolicy, ABodyThatStaysElsewhereHasJumped) {
 
 TEST(LivePolicy, AStepIsTakenAtTheSpeedOfAHead) {
   Stage stage;
-  const Pose turned{{0.7, 0.0, 0.0}, glm::angleAxis(2.5, glm::dvec3(0, 1, 0))};
+  const Pose turned{{0.7, 0.0, 0.0}, glm::angleAxis(0.55, glm::dvec3(0, 1, 0))};
   for (int i = 0; i < 10; ++i) stage.send(live_pose({}), kStart + i * 10 * kMsInNs);
   for (int i = 10; i < 40; ++i) stage.send(live_pose(turned), kStart + i * 10 * kMsInNs);
   stage.expect_no_faster_than_a_head();
