@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "client/app/frame_rate.h"
 #include "client/export/export_strands.h"
 #include "client/export/frame_sampler.h"
 #include "client/export/number_text.h"
@@ -271,6 +272,60 @@ TEST(Export, UsdaSaysWhatProgramsGuessWrongOtherwise) {
                                  "\n            26: [("})
     EXPECT_THAT(text, HasSubstr(said));
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "hair.usda.part"));
+}
+
+// Rates of film and television: frames lie where the exact quotient says, over a minute and at its end.
+TEST(Export, FramesOfRationalRatesAreAtTheirTimes) {
+  for (const std::string asked : {"23.976", "24000/1001", "29.97", "59.94", "0.5", "240"}) {
+    const TemporaryFolder folder;
+    MadeStates states(61);
+    ExportOptions options;
+    options.path = folder.path() / "hair.csv";
+    options.fps = *parse_frame_rate(asked, kLeastFrameRate, kMostFrameRate);
+    const ExportReport report = exported(states, options);
+    EXPECT_EQ(report.frame_count, static_cast<uint64_t>(options.fps + 1e-9) + 1) << asked;
+    const auto rows = rows_of(options.path);
+    for (size_t i = kStrands * kVertices; i < rows.size(); i += kStrands * kVertices)
+      EXPECT_NEAR(rows[i][1], (rows[i][0] - 1.0) / options.fps, 1e-6) << asked;
+    options.path = folder.path() / "hair.usda";
+    MadeStates same(61);
+    exported(same, options);
+    const std::string text = *load_text(options.path, 1 << 26);
+    EXPECT_THAT(text, HasSubstr(fmt::format("timeCodesPerSecond = {}\n", options.fps))) << asked;
+  }
+}
+
+TEST(FrameRate, IsReadAsPeopleWriteIt) {
+  const auto rate = [](std::string_view text) {
+    return parse_frame_rate(text, kLeastFrameRate, kMostFrameRate);
+  };
+  for (const auto& [text, exact] :
+       std::vector<std::pair<const char*, double>>{{"24", 24.0},
+                                                   {"23.976", 24000.0 / 1001.0},
+                                                   {"23.98", 24000.0 / 1001.0},
+                                                   {"24000/1001", 24000.0 / 1001.0},
+                                                   {"29.97", 30000.0 / 1001.0},
+                                                   {"59.94", 60000.0 / 1001.0},
+                                                   {"119.88", 120000.0 / 1001.0},
+                                                   {"50", 50.0},
+                                                   {"12.5", 12.5},
+                                                   {"25/2", 12.5},
+                                                   {"240", 240.0},
+                                                   {"0.001", 0.001}}) {
+    ASSERT_TRUE(rate(text)) << text;
+    EXPECT_DOUBLE_EQ(*rate(text), exact) << text;
+  }
+  for (const char* text : {"", "fast", "24fps", "24/", "/1001", "24/0", "nan", "inf", "24 ", "1/2/3"}) {
+    ASSERT_FALSE(rate(text)) << text;
+    EXPECT_THAT(rate(text).error().message, HasSubstr("24000/1001")) << text;
+  }
+  for (const char* text : {"0", "-24", "240.5", "1e9", "1e-9", "24/-1"}) {
+    ASSERT_FALSE(rate(text)) << text;
+    EXPECT_THAT(rate(text).error().message, HasSubstr("0.001 to 240 are possible")) << text;
+  }
+  EXPECT_EQ(frame_rate_text(24000.0 / 1001.0), "23.976");
+  EXPECT_EQ(frame_rate_text(119.88011988), "119.88");
+  EXPECT_EQ(frame_rate_text(30.0), "30");
 }
 
 TEST(Export, UsdaFramesAreTheStatesAtTheirTimes) {
