@@ -13,7 +13,6 @@ namespace {
 
 constexpr int64_t kBetweenJumpsNs = 1'000'000;  // the hub sees a jump where two samples are this near
 constexpr int64_t kShortestStepNs = 1'000;      // between two poses
-constexpr double kVelocityMemoryS = 0.03;       // a velocity is that of about so long
 constexpr uint32_t kSteadyCount = 8;            // equal steps in a row that make a habit
 constexpr double kSteadyShare = 0.2;            // how much periods of a steady source differ
 constexpr double kLeastTurn = 1e-9;             // of a quaternion's vector part
@@ -30,27 +29,6 @@ glm::dquat heading_of(const glm::dquat& rotation) {
   const double norm = std::hypot(rotation.w, rotation.y);
   if (norm < kLeastTurn) return {1.0, 0.0, 0.0, 0.0};
   return {rotation.w / norm, 0.0, rotation.y / norm, 0.0};
-}
-
-/// A rotation as an axis times its angle, the short way.
-glm::dvec3 turn_of(glm::dquat rotation) {
-  if (rotation.w < 0.0) rotation = -rotation;
-  const glm::dvec3 part(rotation.x, rotation.y, rotation.z);
-  const double sine = glm::length(part);
-  if (sine < kLeastTurn) return 2.0 * part;
-  return part * (2.0 * std::atan2(sine, rotation.w) / sine);
-}
-
-glm::dquat rotation_by(const glm::dvec3& turn_rad) {
-  const double angle_rad = glm::length(turn_rad);
-  if (angle_rad < kLeastTurn) return {1.0, 0.0, 0.0, 0.0};
-  return glm::angleAxis(angle_rad, turn_rad / angle_rad);
-}
-
-/// From 0 to 1, at rest at both ends.
-double eased(double share) {
-  const double t = std::clamp(share, 0.0, 1.0);
-  return t * t * (3.0 - 2.0 * t);
 }
 
 }  // namespace
@@ -74,7 +52,6 @@ void LivePolicy::take(const LivePose& pose, int64_t arrival_ns) {
 
 std::vector<LiveHead> LivePolicy::advance(int64_t now_ns) {
   while (!waiting_.empty() && now_ns - waiting_.front().arrival_ns >= kResequenceNs) release_first();
-  rest(now_ns);
   return std::exchange(due_, {});
 }
 
@@ -85,7 +62,6 @@ bool LivePolicy::is_stale(int64_t now_ns) const {
 void LivePolicy::begin_another() {
   forget_order();
   seen_.reset();
-  held_.reset();
   doubted_m_.reset();
   jumps_ = true;
 }
@@ -246,13 +222,11 @@ void LivePolicy::release(const LivePose& pose, int64_t arrival_ns) {
     before.time_ns = std::max(time_ns - kBetweenJumpsNs, last_->time_ns + kShortestStepNs);
     head.time_ns = std::max(time_ns, before.time_ns + kShortestStepNs);
     due_.push_back(before);
-    velocity_mps_ = turn_rad_per_s_ = glm::dvec3(0.0);
     last_.reset();
   }
   if (last_) head.world_from_head = clamped(head.world_from_head, head.time_ns);
   jumps_ = false;
   put(std::move(head));
-  held_ = last_->world_from_head;
 }
 
 /// False while a body that is elsewhere at once has not stayed there.
@@ -326,11 +300,11 @@ void LivePolicy::add_joints(const LivePose& pose, LiveHead& head) const {
 
 // ---- what the head does
 
-/// As far towards the target as a head gets by then.
+/// As far towards the target as a head gets by then: after a gap the whole time counts.
 Pose LivePolicy::clamped(const Pose& target, int64_t time_ns) {
   const Pose& from = last_->world_from_head;
-  const double window_s = static_cast<double>(kClampWindowNs) * kSPerNs;
   const double passed_s = static_cast<double>(time_ns - last_->time_ns) * kSPerNs;
+  const double window_s = std::max(static_cast<double>(kClampWindowNs) * kSPerNs, passed_s);
   move_allowance_m_ = std::min(move_allowance_m_ + kMaxLiveSpeedMps * passed_s, kMaxLiveSpeedMps * window_s);
   turn_allowance_rad_ =
       std::min(turn_allowance_rad_ + kMaxLiveTurnRadPerS * passed_s, kMaxLiveTurnRadPerS * window_s);
@@ -349,44 +323,10 @@ Pose LivePolicy::clamped(const Pose& target, int64_t time_ns) {
 }
 
 void LivePolicy::put(LiveHead head) {
-  if (last_) {
-    const double passed_s = static_cast<double>(head.time_ns - last_->time_ns) * kSPerNs;
-    if (glm::dot(head.world_from_head.rotation, last_->world_from_head.rotation) < 0.0)
-      head.world_from_head.rotation = -head.world_from_head.rotation;
-    const Pose& before = last_->world_from_head;
-    const double share = std::min(passed_s / kVelocityMemoryS, 1.0);
-    // Over the memory, not over a step that may be short by jitter.
-    const double over_s = std::max(passed_s, kVelocityMemoryS);
-    const glm::dvec3 moved_m = head.world_from_head.position_m - before.position_m;
-    const glm::dvec3 turned_rad = turn_of(head.world_from_head.rotation * glm::conjugate(before.rotation));
-    velocity_mps_ = velocity_mps_ * (1.0 - share) + moved_m / over_s;
-    turn_rad_per_s_ = turn_rad_per_s_ * (1.0 - share) + turned_rad / over_s;
-  }
+  if (last_ && glm::dot(head.world_from_head.rotation, last_->world_from_head.rotation) < 0.0)
+    head.world_from_head.rotation = -head.world_from_head.rotation;
   last_ = head;
   due_.push_back(std::move(head));
-}
-
-/// Says where the head is while nothing comes.
-void LivePolicy::rest(int64_t now_ns) {
-  if (!held_ || !last_ || is_stale(now_ns)) return;
-  const int64_t age_ns = now_ns - seen_ns_;
-  if (age_ns < kHoldNs || now_ns - last_->time_ns < kRestingPoseNs) return;
-  last_->time_ns = now_ns;
-  last_->world_from_head = resting_pose(age_ns);
-  const double passed_s = static_cast<double>(kRestingPoseNs) * kSPerNs;
-  move_allowance_m_ = kMaxLiveSpeedMps * passed_s;
-  turn_allowance_rad_ = kMaxLiveTurnRadPerS * passed_s;
-  due_.push_back(*last_);
-}
-
-/// Where a head is that was seen last `age_ns` ago.
-Pose LivePolicy::resting_pose(int64_t age_ns) const {
-  const double share = static_cast<double>(age_ns - kHoldNs) / static_cast<double>(kEaseNs);
-  const double on_s = static_cast<double>(kExtrapolateNs) * kSPerNs * eased(share);
-  Pose pose = *held_;
-  pose.position_m += velocity_mps_ * on_s;
-  pose.rotation = glm::normalize(rotation_by(turn_rad_per_s_ * on_s) * pose.rotation);
-  return pose;
 }
 
 }  // namespace strandcast
