@@ -21,7 +21,16 @@ using AbcKey = std::array<uint64_t, 2>;
 AbcKey murmur_key(std::span<const std::byte> bytes);
 
 /// Element types of Alembic that strands need, by their numbers.
-enum class AbcType : uint8_t { U8 = 1, I16 = 4, I32 = 6, U32 = 5, Float = 10, Double = 11, String = 12 };
+enum class AbcType : uint8_t {
+  Bool = 0,
+  U8 = 1,
+  I16 = 4,
+  I32 = 6,
+  U32 = 5,
+  Float = 10,
+  Double = 11,
+  String = 12
+};
 enum class AbcForm : uint8_t { Compound, Scalar, Array };
 
 /// Samples of a property that are in the file already.

@@ -79,6 +79,8 @@ class AbcWriter : public StrandWriter {
 
   Status add_transform(AbcItem& hair) {
     AbcEntry xform{".xform", AbcForm::Compound, AbcType::U8, 1, 0, "schema=AbcGeom_Xform_v3", {}, {}};
+    RETURN_IF_ERROR(
+        add(xform.entries, ".inherits", AbcForm::Scalar, AbcType::Bool, 1, "", std::array{uint8_t{1}}));
     AbcEntry user{".userProperties", AbcForm::Compound, AbcType::U8, 1, 0, "", {}, {}};
     RETURN_IF_ERROR(add(user.entries, "groom_version_major", AbcForm::Scalar, AbcType::I16, 1, "",
                         std::array{kAbcGroomMajor}));

@@ -58,7 +58,7 @@ class MadeAbc {
   AbcItem xform(const std::vector<uint8_t>& ops, const std::vector<double>& channels, bool is_inheriting,
                 std::vector<AbcItem> items) {
     std::vector<AbcEntry> own = {
-        entry(".inherits", AbcForm::Scalar, AbcType::U8, 1, std::array{uint8_t{is_inheriting}})};
+        entry(".inherits", AbcForm::Scalar, AbcType::Bool, 1, std::array{uint8_t{is_inheriting}})};
     if (!ops.empty()) {
       const auto op_count = static_cast<uint32_t>(ops.size()), count = static_cast<uint32_t>(channels.size());
       own.push_back(entry(".ops", AbcForm::Scalar, AbcType::U8, op_count, ops));
