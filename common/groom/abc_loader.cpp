@@ -180,7 +180,8 @@ class AbcLoading {
       };
       is_guide_.push_back(guide && value_of(guide, 0) > 0.0 ? 1 : 0);
       constexpr size_t kMostGroups = 1'000;  // that are told apart
-      if (group && tally_.groups.size() < kMostGroups) tally_.groups.insert(value_of(group, 0));
+      const double group_id = group ? value_of(group, 0) : NAN;
+      if (std::isfinite(group_id) && tally_.groups.size() < kMostGroups) tally_.groups.insert(group_id);
       if (uv && has_all_uv_) groom_.root_uv.emplace_back(value_of(uv, 0), value_of(uv, 1));
     }
     return {};

@@ -98,14 +98,19 @@ Result<bool> read_visible(const AbcArchive& archive, const std::vector<AbcProper
   return said < 0.0 ? is_parent_visible : said > 0.0;
 }
 
-/// The object that an instance stands for; empty if it is not there.
-Result<std::optional<AbcObject>> instance_source(const AbcArchive& archive, const AbcObject& instance) {
+/// The path of the object that an instance stands for; empty if it names none.
+Result<std::string> source_path(const AbcArchive& archive, const AbcObject& instance) {
   ASSIGN_OR_RETURN(const auto properties, archive.properties(instance));
   const AbcProperty* const source = find_abc_property(properties, ".instanceSource");
-  if (source == nullptr || source->pod != AbcPod::String) return std::optional<AbcObject>();
+  if (source == nullptr || source->pod != AbcPod::String) return std::string();
   ASSIGN_OR_RETURN(const AbcSample sample, archive.sample(*source, 0, kMaxAbcNameBytes * kMaxAbcDepth));
-  const std::vector<std::string> texts = sample.texts();
-  std::string_view path = texts.empty() ? std::string_view() : texts.front();
+  std::vector<std::string> texts = sample.texts();
+  return texts.empty() ? std::string() : std::move(texts.front());
+}
+
+/// The object at a path; empty if it is not there.
+Result<std::optional<AbcObject>> find_object(const AbcArchive& archive, std::string_view path) {
+  if (path.empty()) return std::optional<AbcObject>();
   AbcObject object = archive.top();
   while (!path.empty()) {
     path.remove_prefix(path.front() == '/' ? 1 : 0);
@@ -117,8 +122,6 @@ Result<std::optional<AbcObject>> instance_source(const AbcArchive& archive, cons
     if (found == objects.end()) return std::optional<AbcObject>();
     object = std::move(*found);
   }
-  if (texts.empty()) return std::optional<AbcObject>();
-  object.name = instance.name;
   return std::optional(std::move(object));
 }
 
@@ -189,12 +192,18 @@ Result<AbcTree> AbcTree::read(const AbcArchive& archive) {
 
 Status AbcTree::add(const AbcArchive& archive, AbcNode node) {
   for (int step = 0; abc_metadata_value(node.object.metadata, "isInstance") == "1"; ++step) {
-    ASSIGN_OR_RETURN(auto source, instance_source(archive, node.object));
-    if (!source || step == kMostInstanceSteps) {
+    ASSIGN_OR_RETURN(const std::string path, source_path(archive, node.object));
+    const auto [source, is_new] = sources_.try_emplace(path);
+    if (is_new) {
+      ASSIGN_OR_RETURN(source->second, find_object(archive, path));
+    }
+    if (!source->second || step == kMostInstanceSteps) {
       ++lost_instance_count_;
       return {};
     }
-    node.object = std::move(*source);
+    std::string name = std::move(node.object.name);
+    node.object = *source->second;
+    node.object.name = std::move(name);
     node.is_instance = true;
   }
   node.kind = kind_of_object(node.object);

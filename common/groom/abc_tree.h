@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -54,6 +55,7 @@ class AbcTree {
   Status add(const AbcArchive& archive, AbcNode node);
 
   std::vector<AbcNode> nodes_;
+  std::map<std::string, std::optional<AbcObject>> sources_;  // of instances, by their paths
   size_t lost_instance_count_ = 0;
 };
 

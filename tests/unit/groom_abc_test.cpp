@@ -134,6 +134,16 @@ TEST_F(AbcTest, InstancesStandWhereTheyAre) {
   EXPECT_THAT(refusal(read_abc(endless.finish({std::move(outer)}))), HasSubstr("objects in each other"));
 }
 
+TEST_F(AbcTest, AnObjectIsLookedUpOnceForAllItsInstances) {
+  // To look among 10,000 names for each of them would read a gigabyte.
+  constexpr size_t kInstances = 10'000;
+  std::vector<AbcItem> items = {file_.curves({})};
+  for (size_t i = 0; i < kInstances; ++i) items.push_back(file_.instance(fmt::format("{}", i), "/hair"));
+  const auto groom = read_abc(file_.finish(std::move(items)));
+  ASSERT_TRUE(groom) << groom.error().to_string();
+  EXPECT_EQ(groom->groom.strand_count(), 2 * (kInstances + 1));
+}
+
 TEST_F(AbcTest, HiddenObjectsAreLeftOutUnlessTheyAreShownAgain) {
   const auto visible = [](MadeAbc& file, int8_t value) {
     return file.entry("visible", AbcForm::Scalar, static_cast<AbcType>(2), 1, std::array{value});
