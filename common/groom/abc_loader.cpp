@@ -151,6 +151,9 @@ class AbcLoading {
     ASSIGN_OR_RETURN(const auto id, strand_param(reader, curves, "groom_id"));
     ASSIGN_OR_RETURN(const auto uv, root_uv(reader, curves));
     ASSIGN_OR_RETURN(Splines splines, read_splines(reader, curves));
+    // One large object is not grown step by step; many small ones are.
+    const size_t known = groom_.rest_position_m.size();
+    if (curves.points.size() > known) groom_.rest_position_m.reserve(known + curves.points.size());
     if (id) tally_.has_ids = true;
     if (!uv) has_all_uv_ = false;
     size_t first = 0;
@@ -298,8 +301,8 @@ class AbcLoading {
 
   std::vector<std::string> notes() const {
     std::vector<std::string> notes;
-    const auto note = [&](size_t count, std::string sentence) {
-      if (count > 0) notes.push_back(std::move(sentence));
+    const auto note = [&](size_t count, const std::string& sentence) {
+      if (count > 0) notes.push_back(sentence);
     };
     const AbcTally& t = tally_;
     note(t.objects > 1, fmt::format("strands of {} curves objects", t.objects));
