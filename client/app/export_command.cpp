@@ -51,9 +51,8 @@ Result<std::unique_ptr<ExportSource>> open_source(const CtlTarget& target, const
 
 void declare_export(CLI::App& app, ExportCommand& command) {
   app.add_option("paths", command.paths,
-                 "[RECORDING.mcap] OUT.usda, OUT.ply or OUT.csv: what was recorded, or what the server sends "
-                 "from now "
-                 "on; a file of the second name is replaced")
+                 "[RECORDING.mcap] OUT.usda, OUT.abc, OUT.ply or OUT.csv: what was recorded, or what the "
+                 "server sends from now on; a file of the second name is replaced")
       ->required()
       ->expected(1, 2);
   app.add_option("--fps", command.fps, "Frames per second, such as 24, 23.976 or 24000/1001 (default: 30)")

@@ -292,11 +292,11 @@ TEST(LiveSenders, ZerosOfATrackerThatHasLostTheHeadDoNotThrowIt) {
       nearest_rad = std::min(nearest_rad, angle_between_rad(step.world_from_head.rotation, {1, 0, 0, 0}));
     EXPECT_LT(nearest_rad, 1e-6) << "it was believed in the end";
     EXPECT_NEAR(angle_between_rad(longer.head().rotation, {1, 0, 0, 0}), kAwayRad, 1e-6);
-    // The steepest of an ease is 1.5 of its mean.
+    // The steepest of an ease is 1.5 of its mean. What comes more rarely than steps is held between them.
     const double ease_s = static_cast<double>(kEaseNs) * kSPerNs;
-    EXPECT_LE(longer.fastest_turn_rad_per_s(), 1.001 * 1.5 * kAwayRad / ease_s) << rate_hz;
-    EXPECT_LE(longer.fastest_mps(), 1.001 * 1.5 * glm::length(glm::dvec3(0.05, 0.02, 0.30)) / ease_s)
-        << rate_hz;
+    const double steepest = 1.001 * 1.5 * (rate_hz < 60.0 ? 2.0 : 1.0) / ease_s;
+    EXPECT_LE(longer.fastest_turn_rad_per_s(), steepest * kAwayRad) << rate_hz;
+    EXPECT_LE(longer.fastest_mps(), steepest * glm::length(glm::dvec3(0.05, 0.02, 0.30))) << rate_hz;
     EXPECT_EQ(longer.count("carried"), 0u);
   }
 }
@@ -355,7 +355,7 @@ TEST(LiveSenders, HairIsCarriedAlongWithAPerformerWhoComesBackElsewhere) {
       const Stage near = back_elsewhere(protocol, lost_s, 0.3f);
       EXPECT_EQ(near.count("carried"), 0u);
       EXPECT_LE(near.fastest_mps(), kMostStepMps);
-      EXPECT_NEAR(near.head().position_m.x, 0.3, 1e-6);
+      EXPECT_NEAR(near.head().position_m.x, 0.3, 0.01) << "eased gently, and nearly there after 1.5 s";
     }
 }
 

@@ -15,7 +15,6 @@ namespace {
 
 constexpr int64_t kBetweenJumpsNs = 1'000'000;  // the hub sees a jump where two samples are this near
 constexpr int64_t kShortestStepNs = 1'000;      // between two poses
-constexpr double kVelocityMemoryS = 0.03;       // a velocity is that of about so long
 constexpr uint32_t kSteadyCount = 8;            // equal steps in a row that make a habit
 constexpr double kSteadyShare = 0.2;            // how much periods of a steady source differ
 constexpr double kLeastTurn = 1e-9;             // of a quaternion's vector part
@@ -92,7 +91,6 @@ void LivePolicy::leave_out_stalled_time(LivePose& pose) {
 
 std::vector<LiveHead> LivePolicy::advance(int64_t now_ns) {
   while (!waiting_.empty() && now_ns - waiting_.front().arrival_ns >= kResequenceNs) release_first();
-  rest(now_ns);
   return std::exchange(due_, {});
 }
 
@@ -106,7 +104,6 @@ void LivePolicy::begin_another() {
   told_poses_ = stalled_poses_ = 0;
   has_no_times_ = false;
   seen_.reset();
-  held_.reset();
   doubted_.reset();
   jumps_ = true;
 }
@@ -250,7 +247,6 @@ void LivePolicy::note_order(const LivePose& pose) {
 void LivePolicy::release(const LivePose& pose, int64_t arrival_ns) {
   note_order(pose);
   const int64_t time_ns = time_of(pose, arrival_ns);
-  const bool is_back = seen_ && arrival_ns - seen_ns_ > kHoldNs;  // after a loss, or doubts
   const bool is_taken = is_believed(pose, arrival_ns);
   came_ns_ = arrival_ns;
   if (!is_taken) {
@@ -271,15 +267,15 @@ void LivePolicy::release(const LivePose& pose, int64_t arrival_ns) {
     before.time_ns = std::max(time_ns - kBetweenJumpsNs, last_->time_ns + kShortestStepNs);
     head.time_ns = std::max(time_ns, before.time_ns + kShortestStepNs);
     due_.push_back(before);
-    velocity_mps_ = turn_rad_per_s_ = glm::dvec3(0.0);
     last_.reset();
     ease_.reset();
+    has_doubted_ = false;
   }
-  if (last_ && is_back) begin_ease(head.world_from_head, head.time_ns);
+  // A loss is eased by the hub.
+  if (last_ && std::exchange(has_doubted_, false)) begin_ease(head.world_from_head, head.time_ns);
   if (last_) head.world_from_head = clamped(eased(head.world_from_head, head.time_ns), head.time_ns);
   jumps_ = false;
   put(std::move(head));
-  held_ = last_->world_from_head;
 }
 
 bool LivePolicy::is_near(const LivePose& pose, const Pose& other, double most_turn_rad) const {
@@ -307,6 +303,7 @@ bool LivePolicy::is_believed(const LivePose& pose, int64_t arrival_ns) {
     doubted_ = pose.world_from_subject;
     if (++doubted_poses_ < kGatePoses || arrival_ns - doubted_since_ns_ < kGateNs) return false;
     doubted_.reset();
+    has_doubted_ = true;
   }
   if (!is_elsewhere) return true;
   jumps_ = true;
@@ -385,11 +382,11 @@ void LivePolicy::add_joints(const LivePose& pose, LiveHead& head) const {
 
 // ---- what the head does
 
-/// As far towards the target as a head gets by then.
+/// As far towards the target as a head gets by then: after a gap the whole time counts.
 Pose LivePolicy::clamped(const Pose& target, int64_t time_ns) {
   const Pose& from = last_->world_from_head;
-  const double window_s = static_cast<double>(kClampWindowNs) * kSPerNs;
   const double passed_s = static_cast<double>(time_ns - last_->time_ns) * kSPerNs;
+  const double window_s = std::max(static_cast<double>(kClampWindowNs) * kSPerNs, passed_s);
   move_allowance_m_ = std::min(move_allowance_m_ + kMaxLiveSpeedMps * passed_s, kMaxLiveSpeedMps * window_s);
   turn_allowance_rad_ =
       std::min(turn_allowance_rad_ + kMaxLiveTurnRadPerS * passed_s, kMaxLiveTurnRadPerS * window_s);
@@ -408,44 +405,10 @@ Pose LivePolicy::clamped(const Pose& target, int64_t time_ns) {
 }
 
 void LivePolicy::put(LiveHead head) {
-  if (last_) {
-    const double passed_s = static_cast<double>(head.time_ns - last_->time_ns) * kSPerNs;
-    if (glm::dot(head.world_from_head.rotation, last_->world_from_head.rotation) < 0.0)
-      head.world_from_head.rotation = -head.world_from_head.rotation;
-    const Pose& before = last_->world_from_head;
-    const double share = std::min(passed_s / kVelocityMemoryS, 1.0);
-    // Over the memory, not over a step that may be short by jitter.
-    const double over_s = std::max(passed_s, kVelocityMemoryS);
-    const glm::dvec3 moved_m = head.world_from_head.position_m - before.position_m;
-    const glm::dvec3 turned_rad = turn_of(head.world_from_head.rotation * glm::conjugate(before.rotation));
-    velocity_mps_ = velocity_mps_ * (1.0 - share) + moved_m / over_s;
-    turn_rad_per_s_ = turn_rad_per_s_ * (1.0 - share) + turned_rad / over_s;
-  }
+  if (last_ && glm::dot(head.world_from_head.rotation, last_->world_from_head.rotation) < 0.0)
+    head.world_from_head.rotation = -head.world_from_head.rotation;
   last_ = head;
   due_.push_back(std::move(head));
-}
-
-/// Says where the head is while nothing comes.
-void LivePolicy::rest(int64_t now_ns) {
-  if (!held_ || !last_ || is_stale(now_ns)) return;
-  const int64_t age_ns = now_ns - seen_ns_;
-  if (age_ns < kHoldNs || now_ns - last_->time_ns < kRestingPoseNs) return;
-  last_->time_ns = now_ns;
-  last_->world_from_head = resting_pose(age_ns);
-  const double passed_s = static_cast<double>(kRestingPoseNs) * kSPerNs;
-  move_allowance_m_ = kMaxLiveSpeedMps * passed_s;
-  turn_allowance_rad_ = kMaxLiveTurnRadPerS * passed_s;
-  due_.push_back(*last_);
-}
-
-/// Where a head is that was seen last `age_ns` ago.
-Pose LivePolicy::resting_pose(int64_t age_ns) const {
-  const double share = static_cast<double>(age_ns - kHoldNs) / static_cast<double>(kEaseNs);
-  const double on_s = static_cast<double>(kExtrapolateNs) * kSPerNs * eased_share(share);
-  Pose pose = *held_;
-  pose.position_m += velocity_mps_ * on_s;
-  pose.rotation = glm::normalize(rotation_by(turn_rad_per_s_ * on_s) * pose.rotation);
-  return pose;
 }
 
 }  // namespace strandcast

@@ -13,9 +13,9 @@
 //   head is eased there over kEaseNs.
 // * Speed is limited to kMaxLiveSpeedMps and kMaxLiveTurnRadPerS, except for bursts of kClampWindowNs; the
 //   head then follows later.
-// * Loss: the newest pose is held for kHoldNs. Then the head continues by its motion of kExtrapolateNs, eased
-//   in and out over kEaseNs, and rests there. The next pose is eased to. After kMotionStaleNs (input_hub.h)
-//   the head is stale, and the next pose is accepted wherever it is: what is far away is a jump.
+// * Loss: nothing is given out, and the hub eases the head to rest (head_easing.h). After kMotionStaleNs
+//   (input_hub.h) the subject is stale, and the next pose is accepted wherever it is: what is far away is a
+//   jump.
 // * Both signs of a quaternion are the same rotation; the nearer one is used.
 // * Calibration makes the present pose the rest pose at the origin. It removes the tracker's tilt on the head
 //   and the direction that the performer faced.
@@ -44,14 +44,9 @@ inline constexpr double kGateTurnRad = 0.6;
 inline constexpr double kGateTurnRadPerS = 18.0;
 inline constexpr uint32_t kGatePoses = 5;
 inline constexpr int64_t kGateNs = 100'000'000;
+inline constexpr int64_t kEaseNs = 250'000'000;
 inline constexpr size_t kResequenceFrames = 3;
 inline constexpr int64_t kResequenceNs = 20'000'000;
-inline constexpr int64_t kHoldNs = 100'000'000;
-inline constexpr int64_t kExtrapolateNs = 50'000'000;
-inline constexpr int64_t kEaseNs = 250'000'000;
-/// Interval at which the head's resting pose is repeated after kHoldNs, so that a late pose does not move it
-/// by the whole gap at once.
-inline constexpr int64_t kRestingPoseNs = 10'000'000;
 /// Frame numbers that differ by more than this belong to a new count.
 inline constexpr int64_t kRestartFrames = 1000;
 inline constexpr uint32_t kRestartPoses = 5;  // or as many in a row that are late
@@ -138,8 +133,6 @@ class LivePolicy {
   void add_joints(const LivePose& pose, LiveHead& head) const;
   Pose clamped(const Pose& target, int64_t time_ns);
   void put(LiveHead head);
-  void rest(int64_t now_ns);
-  Pose resting_pose(int64_t age_ns) const;
 
   const bool turns_only_;
   LivePolicyCounters counters_;
@@ -174,12 +167,10 @@ class LivePolicy {
 
   // What the head does.
   std::optional<LiveHead> last_;  // given out
-  std::optional<Pose> held_;      // the newest of a pose that came
-  glm::dvec3 velocity_mps_{0.0};
-  glm::dvec3 turn_rad_per_s_{0.0};  // about axes of the world
   double move_allowance_m_ = 0.0;
   double turn_allowance_rad_ = 0.0;
   std::optional<Ease> ease_;
+  bool has_doubted_ = false;  // the next pose is far from the last one, and is eased to
   std::vector<LiveHead> due_;
   std::vector<std::string> notes_;
 };
