@@ -287,6 +287,21 @@ TEST_F(AbcTest, GuidesAreHairOnlyWhereTheyAreAlone) {
   EXPECT_THAT(none->notes, Not(Contains(HasSubstr("guides"))));
 }
 
+TEST_F(AbcTest, GuidesOfAnObjectOfTheirOwnNeedNoRootCoordinates) {
+  for (const int16_t is_guide : {int16_t{1}, int16_t{0}}) {
+    MadeAbc file(path());
+    const std::vector<glm::vec2> uv = {{0.25f, 0.5f}, {0.75f, 1.0f}};
+    const std::vector<int16_t> flag = {is_guide};
+    auto other = file.curves({}, {}, {file.param("groom_guide", AbcType::I16, 1, flag)});
+    other.name = "other";
+    auto hair = file.curves({}, {}, {file.param("groom_root_uv", AbcType::Float, 2, uv, "uni")});
+    const auto groom = read_abc(file.finish({std::move(hair), std::move(other)}));
+    ASSERT_TRUE(groom) << groom.error().to_string();
+    EXPECT_EQ(groom->groom.strand_count(), is_guide == 1 ? 2u : 4u);
+    EXPECT_EQ(groom->groom.root_uv, is_guide == 1 ? uv : std::vector<glm::vec2>());
+  }
+}
+
 TEST_F(AbcTest, OfSamplesTheFirstIsTheGroom) {
   MadeCurves moving;
   moving.sample_count = 3;
