@@ -94,6 +94,9 @@ class AbcLoading {
       if (const Status added = add_object(tree, node); !added) return at(tree.path(node), added.error());
     }
     leave_out_guides();
+    // Strand coordinates stay when all strands have them.
+    const auto lacks_uv = [](const glm::vec2& uv) { return std::isnan(uv.x); };
+    if (std::any_of(groom_.root_uv.begin(), groom_.root_uv.end(), lacks_uv)) groom_.root_uv.clear();
     if (groom_.strand_count() > 0) return {};
     return make_error(ErrorCode::BadInput, "there are no curves with strands to read{}",
                       tally_.hidden_objects + tally_.closed_objects + tally_.unknown_objects > 0
@@ -155,7 +158,6 @@ class AbcLoading {
     const size_t known = groom_.rest_position_m.size();
     if (curves.points.size() > known) groom_.rest_position_m.reserve(known + curves.points.size());
     if (id) tally_.has_ids = true;
-    if (!uv) has_all_uv_ = false;
     size_t first = 0;
     for (size_t strand = 0; strand < curves.vertex_counts.size(); ++strand) {
       const size_t count = curves.vertex_counts[strand];
@@ -185,7 +187,7 @@ class AbcLoading {
       constexpr size_t kMostGroups = 1'000;  // that are told apart
       const double group_id = group ? value_of(group, 0) : NAN;
       if (std::isfinite(group_id) && tally_.groups.size() < kMostGroups) tally_.groups.insert(group_id);
-      if (uv && has_all_uv_) groom_.root_uv.emplace_back(value_of(uv, 0), value_of(uv, 1));
+      groom_.root_uv.emplace_back(uv ? glm::vec2(value_of(uv, 0), value_of(uv, 1)) : glm::vec2(NAN));
     }
     return {};
   }
@@ -214,8 +216,10 @@ class AbcLoading {
           found && (found->scope != AbcScope::Constant || curves.vertex_counts.size() == 1);
       if (!is_for_each) continue;
       bool is_finite = true;
-      for (size_t i = 0; i < found->param.count(); ++i)
-        if (!std::isfinite(found->param.number(i, 0) + found->param.number(i, 1))) is_finite = false;
+      for (size_t i = 0; i < found->param.count(); ++i) {
+        const glm::vec2 uv(found->param.number(i, 0), found->param.number(i, 1));
+        is_finite = is_finite && std::isfinite(uv.x + uv.y);
+      }
       if (is_finite) return found;
       ++tally_.unfit_roots;
     }
@@ -282,7 +286,6 @@ class AbcLoading {
 
   /// Guides that drive other strands are no hair; alone they are.
   void leave_out_guides() {
-    if (!has_all_uv_) groom_.root_uv.clear();
     tally_.guides = static_cast<size_t>(std::count(is_guide_.begin(), is_guide_.end(), uint8_t{1}));
     are_all_guides_ = tally_.guides == is_guide_.size();
     if (tally_.guides == 0 || are_all_guides_) return;
@@ -294,7 +297,7 @@ class AbcLoading {
       hair.rest_position_m.insert(hair.rest_position_m.end(), points + groom_.offset[strand],
                                   points + groom_.offset[strand + 1]);
       hair.offset.push_back(static_cast<uint32_t>(hair.rest_position_m.size()));
-      if (!groom_.root_uv.empty()) hair.root_uv.push_back(groom_.root_uv[strand]);
+      hair.root_uv.push_back(groom_.root_uv[strand]);
     }
     groom_ = std::move(hair);
   }
@@ -345,7 +348,6 @@ class AbcLoading {
   const AbcArchive& archive_;
   Groom groom_;
   std::vector<uint8_t> is_guide_;  // of each strand
-  bool has_all_uv_ = true;
   bool are_all_guides_ = false;
   size_t lost_instances_ = 0;
   AbcTally tally_;

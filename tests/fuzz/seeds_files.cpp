@@ -120,7 +120,7 @@ void add_alembic(const SeedFolder& seeds) {
   {
     test::MadeAbc file(path);
     test::MadeCurves moving;
-    moving.sample_count = 3;
+    moving.shift = {0, 1, 2};
     auto source = file.xform({0x10, 0x40, 0x20, 0x00}, {1, 0, 0, 90, 0, 1, 0, 45, 1, 2, 1}, true,
                              {file.curves(moving, {file.param("width", AbcType::Float, 1, widths, "uni")},
                                           {file.param("groom_guide", AbcType::I16, 1, guides, "uni"),

@@ -18,7 +18,7 @@ struct MadeCurves {
   std::array<uint8_t, 4> kinds = {1, 0, 0, 0};  // type, wrap, basis, basis
   std::vector<int32_t> counts = {3, 2};
   std::vector<glm::vec3> points = {{0, 0, 0}, {0, 0, 1}, {0, 1, 2.5f}, {1, 0, 0}, {1, 0, -1}};
-  size_t sample_count = 1;  // each a unit further along x
+  std::vector<float> shift = {0};  // of each sample, along x
 };
 
 class MadeAbc {
@@ -44,10 +44,11 @@ class MadeAbc {
   }
 
   AbcItem curves(MadeCurves made, std::vector<AbcEntry> own = {}, std::vector<AbcEntry> free = {}) {
-    AbcEntry points{"P", AbcForm::Array, AbcType::Float, 3, made.sample_count > 1 ? 1u : 0u, "", {}, {}};
-    for (size_t i = 0; i < made.sample_count; ++i) {
-      CHECK(file_.append(points.series, abc_bytes(made.points)).ok());
-      for (glm::vec3& point : made.points) point.x += 1.0f;
+    AbcEntry points{"P", AbcForm::Array, AbcType::Float, 3, made.shift.size() > 1 ? 1u : 0u, "", {}, {}};
+    for (const float shift : made.shift) {
+      std::vector<glm::vec3> moved = made.points;
+      for (glm::vec3& point : moved) point.x += shift;
+      CHECK(file_.append(points.series, abc_bytes(moved)).ok());
     }
     own.insert(own.begin(), points);
     own.push_back(entry("nVertices", AbcForm::Array, AbcType::I32, 1, made.counts));
@@ -65,6 +66,15 @@ class MadeAbc {
       own.push_back(entry(".vals", AbcForm::Scalar, AbcType::Double, count, channels));
     }
     return {"xform", "schema=AbcGeom_Xform_v3", {compound(".xform", std::move(own))}, std::move(items)};
+  }
+  /// A transform that moves along x, with a sample for each shift.
+  AbcItem moving_xform(const std::vector<double>& shift, std::vector<AbcItem> items) {
+    constexpr uint8_t kTranslate = 0x10;
+    AbcEntry channels{".vals", AbcForm::Scalar, AbcType::Double, 3, 1, "", {}, {}};
+    for (const double x : shift)
+      CHECK(file_.append(channels.series, abc_bytes(std::array{x, 0.0, 0.0})).ok());
+    AbcEntry ops = entry(".ops", AbcForm::Scalar, AbcType::U8, 1, std::array{kTranslate});
+    return {"xform", "schema=AbcGeom_Xform_v3", {compound(".xform", {ops, channels})}, std::move(items)};
   }
   AbcItem instance(const std::string& name, const std::string& source) {
     return {name,

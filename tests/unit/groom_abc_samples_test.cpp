@@ -202,7 +202,7 @@ void expect_xform(const AbcArchive& archive, const AbcTree& tree, size_t node, c
 }
 
 TEST(AbcSamples, AllContentIsThatOfTheirJson) {
-  REQUIRE_SHARED_DATA();
+  REQUIRE_SHARED(samples());
   size_t curves_count = 0, xform_count = 0;
   const auto files = files_in(samples());
   EXPECT_EQ(files.size(), 44u);
@@ -250,7 +250,7 @@ TEST(AbcSamples, AllContentIsThatOfTheirJson) {
 }
 
 TEST(AbcSamples, KeysAreThoseThatWeWrite) {
-  REQUIRE_SHARED_DATA();
+  REQUIRE_SHARED(samples());
   size_t key_count = 0;
   for (const std::filesystem::path& path : files_in(samples())) {
     const auto container = AbcContainer::open(path);
@@ -282,7 +282,7 @@ TEST(AbcSamples, KeysAreThoseThatWeWrite) {
 }
 
 TEST(AbcSamples, GroomsHaveTheRootsUnrealNames) {
-  REQUIRE_SHARED_DATA();
+  REQUIRE_SHARED(samples());
   for (const char* const name : {"ue_groom.abc", "double_attrs.abc"}) {
     const auto groom = load_abc(samples() / name);
     ASSERT_TRUE(groom) << groom.error().to_string();
@@ -303,7 +303,7 @@ TEST(AbcSamples, GroomsHaveTheRootsUnrealNames) {
 }
 
 TEST(AbcSamples, DamagedOnesEndInASentenceOrASoundGroom) {
-  REQUIRE_SHARED_DATA();
+  REQUIRE_SHARED(samples());
   constexpr size_t kMostBytes = 64u << 20;  // of one allocation, for the list of 100,000 objects
   const auto files = files_in(samples() / "malformed");
   EXPECT_EQ(files.size(), 83u);
