@@ -41,7 +41,9 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
   app.add_option("--speed", feed.speed, "Playing speed")
       ->check(CLI::Range(1e-3, kMaxSpeed))
       ->capture_default_str();
-  app.add_option("--seconds", feed.seconds, "Stop after this long (default: the length of the motion file)")
+  app.add_option(
+         "--seconds", feed.seconds,
+         "Stop after this long (default: at the end of the motion file; without one, or with --loop, never)")
       ->check(CLI::Range(0.0, 1e6));
   app.add_option("--rate", feed.rate_hz, "Samples per second")
       ->check(CLI::Range(kMinFeedRateHz, kMaxDatagramRateHz))

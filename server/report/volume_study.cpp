@@ -19,7 +19,7 @@
 namespace strandcast {
 namespace {
 
-/// Velocities of a shaken tuft's volume, as docs/internals/measuring.md has them.
+/// Rates of the volume, and the tuft that is shaken.
 constexpr double kFrictionPerS = 20.0;
 constexpr double kRepulsionPerS2 = 18'000.0;
 constexpr float kTuftLengthM = 0.2f;

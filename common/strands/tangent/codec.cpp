@@ -106,6 +106,10 @@ class Encoder final : public StrandEncoder {
     return frames;
   }
 
+  std::shared_ptr<SharedUpdate> take_shared() override {
+    return steps_ && has_chain_ ? steps_->take_shared(layout_, chain_.history) : nullptr;
+  }
+
  private:
   /// Whether anybody has the frame before an anchor.
   enum class Followers { None, Some };

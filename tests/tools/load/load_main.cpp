@@ -14,7 +14,7 @@
 #include "common/base/quantile.h"
 #include "common/base/text.h"
 #include "common/client/client_token.h"
-#include "tests/tools/load_viewers.h"
+#include "tests/tools/load/load_viewers.h"
 
 namespace {
 
