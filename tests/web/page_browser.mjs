@@ -223,7 +223,8 @@ const all = {
     const made = spawnSync(path.join(path.dirname(program), 'strandcast-ctl'), ['bundle', run, page], { encoding: 'utf8' });
     assert.equal(made.status, 0, made.stderr);
     console.log(`  ${made.stdout.trim()}`);
-    const frames = Number(/: (\d+) frames/.exec(made.stdout)[1]);
+    const [frames, all, recording] = made.stdout.match(/: (\d+) frames.*; (\d+) kB, (\d+) kB/).slice(1).map(Number);
+    assert.ok(all - recording <= 600, `page and modules: ${all - recording} kB`);
     const tab = await browser.open(`file://${page}`);
     const state = await tab.until((now) => now.mode === 'strands' && now.states > frames + 20, 'strands of the second round');
     assert.deepEqual([state.codec, state.hash_ok, state.error, state.rejected], ['step', true, '', '']);
