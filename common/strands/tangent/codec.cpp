@@ -24,7 +24,7 @@ namespace strandcast::tangent {
 namespace {
 
 constexpr uint8_t kTangentNumber = 5;
-constexpr uint8_t kStepNumber = 9;
+constexpr uint8_t kStepNumber = 10;
 constexpr int kTableLevel = 3;
 constexpr uint8_t kAnchorFlag = 1;
 
