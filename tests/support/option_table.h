@@ -111,7 +111,7 @@ inline std::set<std::string> options_in_help(const std::string& help) {
   for (std::string line; std::getline(lines, line);) {
     if (!line.empty() && line[0] != ' ') is_of_options = line != "Subcommands:";
     if (!is_of_options || line.size() < 3 || !line.starts_with("  ") || line[2] == ' ') continue;
-    std::istringstream all(line.substr(2, line.find(' ', 2) - 2));
+    std::istringstream all(line.substr(2, line.find_first_of(" {", 2) - 2));  // "--no-pictures{false}"
     for (std::string name; std::getline(all, name, ',');)
       if (name != "-h" && name != "--help" && name != "--version") names.insert(name);
   }
