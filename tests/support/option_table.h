@@ -158,6 +158,30 @@ void expect_changes(std::span<const OptionRow> rows, const FieldsOf& fields_of) 
   }
 }
 
+/// How far a number may go, and what is next to that.
+struct OptionRange {
+  std::string option;
+  std::string below, low, high, above;  // below: empty where nothing is
+  std::vector<std::string> beside = {};
+};
+
+/// `is_taken`: whether a command line is accepted.
+template <class IsTaken>
+void expect_ranges(std::span<const OptionRange> ranges, const IsTaken& is_taken) {
+  for (const OptionRange& range : ranges) {
+    const auto with = [&](const std::string& value) {
+      Arguments arguments = range.beside;
+      arguments.push_back(range.option + "=" + value);  // a number below 0 is no option
+      return is_taken(arguments);
+    };
+    EXPECT_TRUE(with(range.low)) << range.option << " " << range.low;
+    EXPECT_TRUE(with(range.high)) << range.option << " " << range.high;
+    EXPECT_FALSE(!range.below.empty() && with(range.below)) << range.option << " " << range.below;
+    EXPECT_FALSE(with(range.above)) << range.option << " " << range.above;
+    EXPECT_FALSE(with("nan")) << range.option;
+  }
+}
+
 /// Every option of the help page has a row, and every row's is there.
 inline void expect_all_options(std::span<const OptionRow> rows, const std::string& help,
                                const std::string& command = {}) {

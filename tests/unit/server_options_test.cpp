@@ -186,6 +186,24 @@ TEST(ServerOptionTable, EveryOptionChangesItsFieldAndNoOther) {
   test::expect_all_options(rows, parse({"--help"})->help);
 }
 
+TEST(ServerOptionTable, NumbersEndWhereTheyAreSaidTo) {
+  const test::OptionRange kRanges[] = {{"--max-sessions", "0", "1", "256", "257"},
+                                       {"--max-sessions-per-address", "0", "1", "256", "257"},
+                                       {"--connections-per-s", "0.99", "1", "10000", "10001"},
+                                       {"--messages-per-s", "9.9", "10", "10000", "10001"},
+                                       {"--wrong-tokens", "-1", "0", "1000", "1001"},
+                                       {"--wrong-token-window-ms", "999", "1000", "86400000", "86400001"},
+                                       {"--wrong-token-block-ms", "999", "1000", "86400000", "86400001"},
+                                       {"--handshake-ms", "99", "100", "60000", "60001"},
+                                       {"--idle-ms", "999", "1000", "600000", "600001"},
+                                       {"--stalled-ms", "499", "500", "60000", "60001"},
+                                       {"--frame-viewers", "-1", "0", "10000", "10001"},
+                                       {"--viewer-mbit", "-1", "0", "1000000", "1000001"},
+                                       {"--seconds", "-1", "0", "1000000000", "1000000001"},
+                                       {"--port", "-1", "0", "65535", "65536"}};
+  test::expect_ranges(kRanges, [](const test::Arguments& arguments) { return parse(arguments).ok(); });
+}
+
 // A word of a fixed list that says what goes without it changes nothing: the other words do, as above.
 TEST(ServerOptionTable, WhatIsSaidAnywayChangesNothing) {
   for (const auto& said : {test::Arguments{"--log-format", "text"},
