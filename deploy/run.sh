@@ -115,6 +115,7 @@ sed -n 's/^[^ ]* info \[scene\] //p' "$out/server.log"  # how files were read: t
 sed -n 's/^[^ ]* info \[mocap\] /Waiting for head motion: /p' "$out/server.log"
 grep -i ' warning ' "$out/server.log" >&2 || true
 
+: >"$out/feed.log"  # that of a run before says "feeding" too
 "$bin/strandcast-ctl" feed --connect "127.0.0.1:$port" --motion "$motion" --wind "$wind" --loop "${motion_options[@]}" \
   >"$out/feed.log" 2>&1 &
 feed=$!

@@ -48,7 +48,11 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
   app.add_option("--rate", feed.rate_hz, "Samples per second")
       ->check(CLI::Range(kMinFeedRateHz, kMaxDatagramRateHz))
       ->capture_default_str();
-  app.add_option("--wind-mean", line.wind_mps, "Mean of the gusts, x y z in m/s")->expected(3);
+  app.add_option_function<std::vector<float>>(
+         "--wind-mean",
+         [&feed](const std::vector<float>& mps) { feed.wind_mps = glm::vec3(mps[0], mps[1], mps[2]); },
+         "Mean of the gusts, x y z in m/s")
+      ->expected(3);
   app.add_option("--gust-intensity", feed.gust_intensity,
                  "Standard deviation of the gusts over their mean speed")
       ->check(CLI::Range(0.0f, 2.0f))
@@ -175,27 +179,9 @@ void declare_script(CLI::App& app, CtlCommandLine& line) {
 
 // ---- functions ----
 
-int start_feed(const Line& line, const Stop& stop) {
-  FeedOptions options = line.feed;
-  if (line.wind_mps.size() == 3)
-    options.wind_mps = glm::vec3(line.wind_mps[0], line.wind_mps[1], line.wind_mps[2]);
-  return run_feed(line.target, options, stop);
-}
-
 int start_check(const Line& line, const Stop&) {
   return line.recording.empty() ? run_check(line.target, line.check_frames, line.check_timeout_s)
                                 : run_recording_check(line.recording);
-}
-
-int start_test(const Line& line, const Stop& stop) {
-  TestOptions options = line.test;
-  options.uses_running = line.names_server;
-  return run_test(line.target, options, stop);
-}
-
-template <Command kCommand>
-int control(const Line& line, const Stop&) {
-  return run_command(line.target, ControlCommand{kCommand});
 }
 
 int start_step(const Line& line, const Stop& stop) {
@@ -203,44 +189,53 @@ int start_step(const Line& line, const Stop& stop) {
   return run_step(line.target, line.step_count, stop);
 }
 
+template <Command kCommand>
+ClientMessage control(const Line&) {
+  return ControlCommand{kCommand};
+}
+
+ClientMessage assign(const Line& line) {
+  return SetParameter{line.assignment};
+}
+
 template <LiveAction kAction>
-int live(const Line& line, const Stop&) {
-  return run_command(line.target, LiveCommand{kAction, line.subject});
+ClientMessage live(const Line& line) {
+  return LiveCommand{kAction, line.subject};
 }
 
 template <bool kIsWanted>
-int record(const Line& line, const Stop&) {
-  return run_command(line.target, RecordCommand{kIsWanted, line.recording_name});
+ClientMessage record(const Line& line) {
+  return RecordCommand{kIsWanted, line.recording_name};
 }
 
 template <AdminAction kAction>
-int admin(const Line& line, const Stop&) {
-  return run_admin(line.target, {kAction, line.session, line.ban_s});
+ClientMessage admin(const Line& line) {
+  return AdminCommand{kAction, line.session, line.ban_s};
 }
 
 // clang-format off
 constexpr CtlCommand kCommands[] = {
-    {"feed", "Send head motion and wind in real time, to all heads of a server or to --head", declare_feed, start_feed},
+    {"feed", "Send head motion and wind in real time, to all heads of a server or to --head", declare_feed,
+     [](const Line& line, const Stop& stop) { return run_feed(line.target, line.feed, stop); }},
     {"monitor", "Print the server's status twice a second", declare_monitor,
      [](const Line& line, const Stop& stop) { return run_monitor(line.target, line.monitor_s, stop); }},
-    {"pause", "Halt the simulation", nullptr, control<Command::Pause>},
-    {"resume", "Let the simulation run", nullptr, control<Command::Resume>},
+    {"pause", "Halt the simulation", nullptr, nullptr, control<Command::Pause>},
+    {"resume", "Let the simulation run", nullptr, nullptr, control<Command::Resume>},
     {"step", "Simulation steps while paused, or in lockstep", declare_step, start_step},
-    {"reset", "Set every strand to rest", nullptr, control<Command::Reset>},
-    {"set", "Change a scene parameter", declare_set,
-     [](const Line& line, const Stop&) { return run_command(line.target, SetParameter{line.assignment}); }},
+    {"reset", "Set every strand to rest", nullptr, nullptr, control<Command::Reset>},
+    {"set", "Change a scene parameter", declare_set, nullptr, assign},
     {"camera", "Where viewers look from: all of them, or one; each can move on from there", declare_cameras,
      [](const Line& line, const Stop&) { return run_camera(line.target, line.camera); }},
     {"mocap", "Live motion capture: who drives the head, and what is rest", nullptr, nullptr},
-    {"mocap subject", "Choose who drives the head", declare_subject, live<LiveAction::ChooseSubject>},
-    {"mocap calibrate", "What is seen now is the head at rest: look straight ahead", nullptr,
+    {"mocap subject", "Choose who drives the head", declare_subject, nullptr, live<LiveAction::ChooseSubject>},
+    {"mocap calibrate", "What is seen now is the head at rest: look straight ahead", nullptr, nullptr,
      live<LiveAction::Calibrate>},
-    {"mocap reset", "Undo calibrate", nullptr, live<LiveAction::Reset>},
+    {"mocap reset", "Undo calibrate", nullptr, nullptr, live<LiveAction::Reset>},
     {"record", "Recordings of a server that was started with --record-dir: of all its heads, or of --head", nullptr,
      nullptr},
-    {"record start", "Begin one: inputs, steps, states and strands from now on", declare_record_start,
+    {"record start", "Begin one: inputs, steps, states and strands from now on", declare_record_start, nullptr,
      record<true>},
-    {"record stop", "End it, and say what is in it", nullptr, record<false>},
+    {"record stop", "End it, and say what is in it", nullptr, nullptr, record<false>},
     {"params", "List the scene's parameters: value, unit, range, default, and what can be set", declare_params,
      [](const Line& line, const Stop& stop) { return run_params(line.target, line.params, stop); }},
     {"save", "Keep the scene as it runs, look and all, as a scene file", declare_save,
@@ -251,9 +246,9 @@ constexpr CtlCommand kCommands[] = {
      [](const Line& line, const Stop&) { return run_bundle(line.bundle); }},
     {"check", "Decode frames with two viewers and compare their states; or look whether a recording is sound",
      declare_check, start_check},
-    {"sessions", "List who is connected (needs an admin's token)", nullptr, admin<AdminAction::ListSessions>},
-    {"kick", "End one session (needs an admin's token)", declare_kick, admin<AdminAction::Kick>},
-    {"shutdown", "End the server (needs an admin's token)", nullptr, admin<AdminAction::ShutDown>},
+    {"sessions", "List who is connected (needs an admin's token)", nullptr, nullptr, admin<AdminAction::ListSessions>},
+    {"kick", "End one session (needs an admin's token)", declare_kick, nullptr, admin<AdminAction::Kick>},
+    {"shutdown", "End the server (needs an admin's token)", nullptr, nullptr, admin<AdminAction::ShutDown>},
     {"info", "Say what a recording holds", declare_info,
      [](const Line& line, const Stop&) { return run_recording_info(line.recording); }},
     {"recover", "Make a whole recording of one that was cut off or damaged", declare_recover,
@@ -262,7 +257,8 @@ constexpr CtlCommand kCommands[] = {
      [](const Line& line, const Stop&) { return run_compare(line.recording, line.other_recording); }},
     {"latency", "Watch for a while, and say how long each part of the way takes", declare_latency,
      [](const Line& line, const Stop& stop) { return run_latency(line.target, line.latency, stop); }},
-    {"test", "Carry out scenarios and check what they expect of a server", declare_test, start_test},
+    {"test", "Carry out scenarios and check what they expect of a server", declare_test,
+     [](const Line& line, const Stop& stop) { return run_test(line.target, line.test, stop); }},
     {"fleet", "Sessions on a cluster: fleet start NAME, list, stop NAME, drain NAME, tend, proxy-config", declare_script,
      [](const Line& line, const Stop&) { return run_script("strandcast-fleet", line.script_words); }},
     {"grid", "A report as an array of a cluster's jobs: grid work-precision --out FOLDER, grid stability --out FOLDER",
@@ -277,6 +273,13 @@ constexpr CtlCommand kCommands[] = {
 
 std::span<const CtlCommand> ctl_commands() {
   return kCommands;
+}
+
+int carry_out(const CtlCommand& command, const CtlCommandLine& line, const std::atomic<bool>& stop) {
+  if (command.run != nullptr) return command.run(line, stop);
+  const ClientMessage message = command.message(line);
+  const auto* order = std::get_if<AdminCommand>(&message);
+  return order != nullptr ? run_admin(line.target, *order) : run_command(line.target, message);
 }
 
 }  // namespace strandcast

@@ -18,9 +18,8 @@ namespace strandcast {
 /// Parsed arguments of all commands.
 struct CtlCommandLine {
   CtlTarget target{"127.0.0.1:" + std::to_string(kDefaultPort), {}, {}, false, {}, nullptr, {}};
-  bool names_server = false;  // --connect was given
+  std::string log_level = "warn";
   FeedOptions feed;
-  std::vector<float> wind_mps;
   double monitor_s = 0.0;
   std::string assignment;
   std::string subject;
@@ -47,11 +46,17 @@ struct CtlCommand {
   const char* summary;
   /// Adds the command's arguments to `app`, which stores pointers into `line`; null: it has none.
   void (*declare)(CLI::App& app, CtlCommandLine& line);
-  /// Runs the command and returns the exit code; null: only its sub-commands can be called.
+  /// Runs the command and returns the exit code; null: it sends `message`, or only its sub-commands can be
+  /// called.
   int (*run)(const CtlCommandLine& line, const std::atomic<bool>& stop);
+  /// Returns the message of a command that only sends one; null: it does more.
+  ClientMessage (*message)(const CtlCommandLine& line) = nullptr;
 };
 
 /// Returns the commands in the order of --help; sub-commands follow their parent.
 std::span<const CtlCommand> ctl_commands();
+
+/// Runs a command that can be called, and returns the exit code.
+int carry_out(const CtlCommand& command, const CtlCommandLine& line, const std::atomic<bool>& stop);
 
 }  // namespace strandcast

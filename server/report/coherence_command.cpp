@@ -9,20 +9,12 @@
 #include "server/report/coherence_page.h"
 #include "server/report/report_commands.h"
 #include "server/report/report_folder.h"
+#include "server/report/report_options.h"
 
 namespace strandcast {
 namespace {
 
 constexpr uint32_t kQuickStrands = 1000;
-
-struct CoherenceOptions {
-  std::filesystem::path scene_path;
-  std::vector<std::string> overrides;
-  std::filesystem::path out;
-  ExecutorConfig device{"lanes", "auto", {}};
-  bool is_quick = false;
-  bool has_pictures = true;
-};
 
 Result<SceneDesc> scene_of(const CoherenceOptions& options) {
   if (!options.scene_path.empty()) return load_scene(options.scene_path, options.overrides);
@@ -59,19 +51,23 @@ Status run_command(const CoherenceOptions& options) {
 
 }  // namespace
 
+void declare_coherence(CLI::App& command, CoherenceOptions& options) {
+  command.add_option("--scene", options.scene_path, "scene file; default: the built-in scene");
+  command.add_option("--set", options.overrides, "path=value: override a field of the scene; repeatable")
+      ->expected(1)
+      ->take_all();
+  command.add_flag("!--no-pictures", options.has_pictures, "draw no moments");
+  command.add_flag("--quick", options.is_quick, "fewer strands, fewer rows and shorter runs");
+  command.add_option("--out", options.out, "folder for the page, the plot and the CSV file")->required();
+  add_sim_device_options(command, options.device);
+}
+
 void add_coherence_command(CLI::App& app, ReportAction& action) {
   const auto options = std::make_shared<CoherenceOptions>();
   CLI::App* command = app.add_subcommand(
       "coherence",
       "how a whole head of hair moves together in a shake, and hair in air beside what is known of it");
-  command->add_option("--scene", options->scene_path, "scene file; default: the built-in scene");
-  command->add_option("--set", options->overrides, "path=value: override a field of the scene; repeatable")
-      ->expected(1)
-      ->take_all();
-  command->add_flag("!--no-pictures", options->has_pictures, "draw no moments");
-  command->add_flag("--quick", options->is_quick, "fewer strands, fewer rows and shorter runs");
-  command->add_option("--out", options->out, "folder for the page, the plot and the CSV file")->required();
-  add_sim_device_options(*command, options->device);
+  declare_coherence(*command, *options);
   command->callback([options, &action] { action = [options] { return run_command(*options); }; });
 }
 

@@ -9,18 +9,10 @@
 #include "server/report/collision_page.h"
 #include "server/report/report_commands.h"
 #include "server/report/report_folder.h"
+#include "server/report/report_options.h"
 
 namespace strandcast {
 namespace {
-
-struct CollisionOptions {
-  std::filesystem::path scene_path;
-  std::vector<std::string> overrides;
-  std::filesystem::path out;
-  ExecutorConfig device;
-  CollisionStudyDesc desc;
-  bool is_quick = false;
-};
 
 Status run_command(const CollisionOptions& options) {
   CollisionStudyDesc desc = options.desc;
@@ -48,22 +40,26 @@ Status run_command(const CollisionOptions& options) {
 
 }  // namespace
 
+void declare_collisions(CLI::App& command, CollisionOptions& options) {
+  command.add_option("--scene", options.scene_path, "scene file; default: the built-in scene");
+  command.add_option("--set", options.overrides, "path=value: override a field of the scene; repeatable")
+      ->expected(1)
+      ->take_all();
+  command.add_option("--motion", options.desc.clip,
+                     "BVH file whose neck, chest, shoulders and arms are the body (default: built in)");
+  add_motion_file_options(command, options.desc.clip_options);
+  command.add_flag("!--no-pictures", options.desc.has_pictures, "draw no moments");
+  command.add_flag("--quick", options.is_quick, "fewer fields and shorter runs");
+  command.add_option("--out", options.out, "folder for the page, the plots and the CSV files")->required();
+  add_sim_device_options(command, options.device);
+}
+
 void add_collisions_command(CLI::App& app, ReportAction& action) {
   const auto options = std::make_shared<CollisionOptions>();
   CLI::App* command = app.add_subcommand(
       "collisions",
       "what keeps hair out of the head (spheres, fields) and how it answers to a body: depth against time");
-  command->add_option("--scene", options->scene_path, "scene file; default: the built-in scene");
-  command->add_option("--set", options->overrides, "path=value: override a field of the scene; repeatable")
-      ->expected(1)
-      ->take_all();
-  command->add_option("--motion", options->desc.clip,
-                      "BVH file whose neck, chest, shoulders and arms are the body (default: built in)");
-  add_motion_file_options(*command, options->desc.clip_options);
-  command->add_flag("!--no-pictures", options->desc.has_pictures, "draw no moments");
-  command->add_flag("--quick", options->is_quick, "fewer fields and shorter runs");
-  command->add_option("--out", options->out, "folder for the page, the plots and the CSV files")->required();
-  add_sim_device_options(*command, options->device);
+  declare_collisions(*command, *options);
   command->callback([options, &action] { action = [options] { return run_command(*options); }; });
 }
 

@@ -9,19 +9,10 @@
 #include "server/report/pruning.h"
 #include "server/report/report_commands.h"
 #include "server/report/report_folder.h"
+#include "server/report/report_options.h"
 
 namespace strandcast {
 namespace {
-
-struct PruningOptions {
-  std::filesystem::path scenes = "deploy/scenes";
-  std::vector<std::string> only;
-  std::vector<double> shares{0.5, 0.25, 0.125};
-  std::filesystem::path out;
-  ExecutorConfig device;
-  int steps = PruningDesc().steps;
-  bool has_pictures = true;
-};
 
 Result<std::vector<std::filesystem::path>> find_scenes(const PruningOptions& options) {
   std::error_code error;
@@ -90,24 +81,28 @@ Status run_command(const PruningOptions& options) {
 
 }  // namespace
 
+void declare_pruning(CLI::App& command, PruningOptions& options) {
+  command.add_option("--scenes", options.scenes, "folder of scene files")->capture_default_str();
+  command.add_option("--scene", options.only, "only the scene of this name; repeatable")
+      ->expected(1)
+      ->take_all();
+  command.add_option("--share", options.shares, "of strands that are simulated; repeatable")
+      ->expected(1)
+      ->take_all()
+      ->check(CLI::Range(0.001, 1.0));
+  command.add_option("--steps", options.steps, "of each run")
+      ->check(CLI::Range(10, 100'000))
+      ->capture_default_str();
+  command.add_flag("!--no-pictures", options.has_pictures, "compare no pictures");
+  command.add_option("--out", options.out, "folder for the page and the CSV files")->required();
+  add_sim_device_options(command, options.device);
+}
+
 void add_pruning_command(CLI::App& app, ReportAction& action) {
   const auto options = std::make_shared<PruningOptions>();
   CLI::App* command = app.add_subcommand(
       "pruning", "what is left out of each scene, and what that saves, by running it both ways");
-  command->add_option("--scenes", options->scenes, "folder of scene files")->capture_default_str();
-  command->add_option("--scene", options->only, "only the scene of this name; repeatable")
-      ->expected(1)
-      ->take_all();
-  command->add_option("--share", options->shares, "of strands that are simulated; repeatable")
-      ->expected(1)
-      ->take_all()
-      ->check(CLI::Range(0.001, 1.0));
-  command->add_option("--steps", options->steps, "of each run")
-      ->check(CLI::Range(10, 100'000))
-      ->capture_default_str();
-  command->add_flag("!--no-pictures", options->has_pictures, "compare no pictures");
-  command->add_option("--out", options->out, "folder for the page and the CSV files")->required();
-  add_sim_device_options(*command, options->device);
+  declare_pruning(*command, *options);
   command->callback([options, &action] { action = [options] { return run_command(*options); }; });
 }
 

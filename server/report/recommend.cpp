@@ -12,6 +12,7 @@
 #include "common/scene/scene_file.h"
 #include "server/report/report_commands.h"
 #include "server/report/report_executor.h"
+#include "server/report/report_options.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/step_builder.h"
 
@@ -292,19 +293,23 @@ std::string recommendation_text(const Recommendation& recommendation, const Scen
   return text;
 }
 
+void declare_recommend(CLI::App& command, RecommendOptions& options) {
+  command.add_option("--scene", options.scene_path, "scene file; default: the built-in scene");
+  command.add_option("--set", options.overrides, "path=value: override a field of the scene; repeatable")
+      ->expected(1)
+      ->take_all();
+  command.add_option("--budget-ms", options.budget_ms, "milliseconds of simulation per step")->required();
+  command.add_option("--solver", options.solvers, "choose from this one; repeatable")
+      ->expected(1)
+      ->take_all();
+  add_sim_device_options(command, options.device, {true});
+}
+
 void add_recommend_command(CLI::App& app, ReportAction& action) {
   const auto options = std::make_shared<RecommendOptions>();
   CLI::App* command =
       app.add_subcommand("recommend", "the most exact strand model for a scene within a time budget");
-  command->add_option("--scene", options->scene_path, "scene file; default: the built-in scene");
-  command->add_option("--set", options->overrides, "path=value: override a field of the scene; repeatable")
-      ->expected(1)
-      ->take_all();
-  command->add_option("--budget-ms", options->budget_ms, "milliseconds of simulation per step")->required();
-  command->add_option("--solver", options->solvers, "choose from this one; repeatable")
-      ->expected(1)
-      ->take_all();
-  add_sim_device_options(*command, options->device, {true});
+  declare_recommend(*command, *options);
   command->callback([options, &action] {
     action = [options]() -> Status {
       ASSIGN_OR_RETURN(const SceneDesc scene, options->scene_path.empty()

@@ -8,17 +8,10 @@
 #include "server/report/rendering.h"
 #include "server/report/report_commands.h"
 #include "server/report/report_folder.h"
+#include "server/report/report_options.h"
 
 namespace strandcast {
 namespace {
-
-struct RenderingOptions {
-  std::filesystem::path scene_path;
-  std::vector<std::string> overrides;
-  std::filesystem::path out;
-  std::string size = "1280x720";
-  RenderingReportDesc desc;
-};
 
 Status run_command(const RenderingOptions& options) {
   RenderingReportDesc desc = options.desc;
@@ -47,23 +40,26 @@ Status run_command(const RenderingOptions& options) {
 
 }  // namespace
 
+void declare_rendering(CLI::App& command, RenderingOptions& options) {
+  command.add_option("--scene", options.scene_path, "scene file; default: the built-in scene");
+  command.add_option("--set", options.overrides, "path=value: override a field of the scene; repeatable")
+      ->expected(1)
+      ->take_all();
+  command.add_option("--size", options.size, "of the pictures")->capture_default_str();
+  command.add_option("--rounds", options.desc.rounds, "turns of each way; the median counts")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command
+      .add_option("--gpu,--gl-device", options.desc.gl_device, "auto, software, hardware or a device number")
+      ->capture_default_str();
+  command.add_option("--out", options.out, "folder for the page, the CSV and the pictures")->required();
+}
+
 void add_rendering_command(CLI::App& app, ReportAction& action) {
   const auto options = std::make_shared<RenderingOptions>();
   CLI::App* command =
       app.add_subcommand("rendering", "error against time of every way to draw hair, with pictures");
-  command->add_option("--scene", options->scene_path, "scene file; default: the built-in scene");
-  command->add_option("--set", options->overrides, "path=value: override a field of the scene; repeatable")
-      ->expected(1)
-      ->take_all();
-  command->add_option("--size", options->size, "of the pictures")->capture_default_str();
-  command->add_option("--rounds", options->desc.rounds, "turns of each way; the median counts")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  command
-      ->add_option("--gpu,--gl-device", options->desc.gl_device,
-                   "auto, software, hardware or a device number")
-      ->capture_default_str();
-  command->add_option("--out", options->out, "folder for the page, the CSV and the pictures")->required();
+  declare_rendering(*command, *options);
   command->callback([options, &action] { action = [options] { return run_command(*options); }; });
 }
 

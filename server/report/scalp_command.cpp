@@ -9,21 +9,11 @@
 #include "server/report/csv_file.h"
 #include "server/report/report_commands.h"
 #include "server/report/report_folder.h"
+#include "server/report/report_options.h"
 #include "server/report/scalp.h"
 
 namespace strandcast {
 namespace {
-
-struct ScalpOptions {
-  std::filesystem::path scene_path;
-  std::vector<std::string> overrides;
-  std::filesystem::path motion_path;  // empty: the built-in walk
-  MotionFileOptions motion_file;
-  std::filesystem::path out;
-  ExecutorConfig device;
-  double seconds = ScalpRunDesc().seconds;
-  double every_s = ScalpRunDesc().every_s;
-};
 
 Result<StreamMotion> motion_of(const ScalpOptions& options) {
   if (!options.motion_path.empty()) return load_stream_motion(options.motion_path, options.motion_file);
@@ -57,24 +47,28 @@ Status run_command(const ScalpOptions& options) {
 
 }  // namespace
 
+void declare_scalp(CLI::App& command, ScalpOptions& options) {
+  command.add_option("--scene", options.scene_path, "scene file; default: the built-in scene");
+  command.add_option("--set", options.overrides, "path=value: override a field of the scene; repeatable")
+      ->expected(1)
+      ->take_all();
+  command.add_option("--motion", options.motion_path, ".bvh file; default: a built-in walk");
+  add_motion_file_options(command, options.motion_file);
+  command.add_option("--seconds", options.seconds, "of the motion")
+      ->check(CLI::Range(0.1, 600.0))
+      ->capture_default_str();
+  command.add_option("--every-s", options.every_s, "seconds between two measurements")
+      ->check(CLI::Range(0.01, 60.0))
+      ->capture_default_str();
+  command.add_option("--out", options.out, "folder for the CSV and the pictures")->required();
+  add_sim_device_options(command, options.device);
+}
+
 void add_scalp_command(CLI::App& app, ReportAction& action) {
   const auto options = std::make_shared<ScalpOptions>();
   CLI::App* command = app.add_subcommand(
       "scalp", "how much of the scalp shows between the hair in motion, and how far roots lean");
-  command->add_option("--scene", options->scene_path, "scene file; default: the built-in scene");
-  command->add_option("--set", options->overrides, "path=value: override a field of the scene; repeatable")
-      ->expected(1)
-      ->take_all();
-  command->add_option("--motion", options->motion_path, ".bvh file; default: a built-in walk");
-  add_motion_file_options(*command, options->motion_file);
-  command->add_option("--seconds", options->seconds, "of the motion")
-      ->check(CLI::Range(0.1, 600.0))
-      ->capture_default_str();
-  command->add_option("--every-s", options->every_s, "seconds between two measurements")
-      ->check(CLI::Range(0.01, 60.0))
-      ->capture_default_str();
-  command->add_option("--out", options->out, "folder for the CSV and the pictures")->required();
-  add_sim_device_options(*command, options->device);
+  declare_scalp(*command, *options);
   command->callback([options, &action] { action = [options] { return run_command(*options); }; });
 }
 

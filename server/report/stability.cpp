@@ -9,6 +9,7 @@
 #include "server/report/csv_file.h"
 #include "server/report/report_commands.h"
 #include "server/report/report_folder.h"
+#include "server/report/report_options.h"
 
 namespace strandcast {
 namespace {
@@ -58,14 +59,18 @@ Status run_stability(const StabilityOptions& options) {
   return {};
 }
 
+void declare_stability(CLI::App& command, StabilityOptions& options) {
+  command.add_option("--out", options.out, "folder for the CSV and the page")->required();
+  command.add_option("--solver", options.solvers, "only this one; repeatable")->expected(1)->take_all();
+  add_sim_device_options(command, options.device);
+  command.add_flag("--quick", options.is_quick, "fewer settings and shorter rests");
+}
+
 void add_stability_command(CLI::App& app, ReportAction& action) {
   const auto options = std::make_shared<StabilityOptions>();
   CLI::App* command =
       app.add_subcommand("stability", "every strand model against stiff and extreme cases, with limits");
-  command->add_option("--out", options->out, "folder for the CSV and the page")->required();
-  command->add_option("--solver", options->solvers, "only this one; repeatable")->expected(1)->take_all();
-  add_sim_device_options(*command, options->device);
-  command->add_flag("--quick", options->is_quick, "fewer settings and shorter rests");
+  declare_stability(*command, *options);
   command->callback([options, &action] { action = [options] { return run_stability(*options); }; });
 }
 

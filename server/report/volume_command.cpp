@@ -8,6 +8,7 @@
 #include "common/scene/scene_file.h"
 #include "server/report/report_commands.h"
 #include "server/report/report_folder.h"
+#include "server/report/report_options.h"
 #include "server/report/volume_page.h"
 
 namespace strandcast {
@@ -15,16 +16,6 @@ namespace {
 
 /// Hairs of the built-in scene where all are looked at.
 constexpr uint32_t kAllHairs = 12'000;
-constexpr uint32_t kGuides = 2'000;
-
-struct VolumeReportOptions {
-  std::filesystem::path scene_path;
-  std::vector<std::string> overrides;
-  std::filesystem::path out;
-  ExecutorConfig device;
-  uint32_t guides = kGuides;
-  bool is_quick = false;
-};
 
 Result<SceneDesc> scene_of(const VolumeReportOptions& options) {
   if (!options.scene_path.empty()) return load_scene(options.scene_path, options.overrides);
@@ -62,22 +53,26 @@ Status run_command(const VolumeReportOptions& options) {
 
 }  // namespace
 
+void declare_volume(CLI::App& command, VolumeReportOptions& options) {
+  command.add_option("--scene", options.scene_path,
+                     fmt::format("scene file; default: the built-in scene with {} hairs", kAllHairs));
+  command.add_option("--set", options.overrides, "path=value: override a field of the scene; repeatable")
+      ->expected(1)
+      ->take_all();
+  command.add_option("--guides", options.guides, "of its hairs that are simulated where only guides are")
+      ->check(CLI::Range(1u, 1'000'000u))
+      ->capture_default_str();
+  command.add_flag("--quick", options.is_quick, "fewer volumes and shorter runs");
+  command.add_option("--out", options.out, "folder for the page, the plot and the CSV files")->required();
+  add_sim_device_options(command, options.device);
+}
+
 void add_volume_command(CLI::App& app, ReportAction& action) {
   const auto options = std::make_shared<VolumeReportOptions>();
   CLI::App* command = app.add_subcommand(
       "volume",
       "hair that acts on hair: what a volume knows of it against what it takes, and how hair lies with it");
-  command->add_option("--scene", options->scene_path,
-                      fmt::format("scene file; default: the built-in scene with {} hairs", kAllHairs));
-  command->add_option("--set", options->overrides, "path=value: override a field of the scene; repeatable")
-      ->expected(1)
-      ->take_all();
-  command->add_option("--guides", options->guides, "of its hairs that are simulated where only guides are")
-      ->check(CLI::Range(1u, 1'000'000u))
-      ->capture_default_str();
-  command->add_flag("--quick", options->is_quick, "fewer volumes and shorter runs");
-  command->add_option("--out", options->out, "folder for the page, the plot and the CSV files")->required();
-  add_sim_device_options(*command, options->device);
+  declare_volume(*command, *options);
   command->callback([options, &action] { action = [options] { return run_command(*options); }; });
 }
 

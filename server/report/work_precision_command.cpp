@@ -5,6 +5,7 @@
 
 #include "server/report/report_commands.h"
 #include "server/report/report_folder.h"
+#include "server/report/report_options.h"
 #include "server/report/work_precision_page.h"
 
 namespace strandcast {
@@ -18,26 +19,30 @@ Status run_work_precision(const WorkPrecisionOptions& options) {
   return {};
 }
 
+void declare_work_precision(CLI::App& command, WorkPrecisionOptions& options) {
+  command.add_option("--out", options.out, "folder for the CSV, plots and page")->required();
+  command.add_option("--solver", options.solvers, "only this one; repeatable")->expected(1)->take_all();
+  command.add_option("--motion", options.motion, "head motion from this .bvh file; default: built in");
+  add_motion_file_options(command, options.motion_file);
+  command.add_option("--hair", options.hairs, "only this hair: straight, curled or styled; repeatable")
+      ->expected(1)
+      ->take_all();
+  command.add_option("--vertices", options.vertices, "only this many per strand; repeatable")
+      ->expected(1)
+      ->take_all();
+  command.add_option("--rate", options.rates_hz, "only this many steps per second; repeatable")
+      ->expected(1)
+      ->take_all();
+  command.add_option("--seconds", options.motion_s, "length of the measured motion")
+      ->check(CLI::PositiveNumber);
+  add_sim_device_options(command, options.device, {true, "double-precision references only"});
+  command.add_flag("--quick", options.is_quick, "fewer runs: some minutes on two cores");
+}
+
 void add_work_precision_command(CLI::App& app, ReportAction& action) {
   const auto options = std::make_shared<WorkPrecisionOptions>();
   CLI::App* command = app.add_subcommand("work-precision", "error against run time of every strand model");
-  command->add_option("--out", options->out, "folder for the CSV, plots and page")->required();
-  command->add_option("--solver", options->solvers, "only this one; repeatable")->expected(1)->take_all();
-  command->add_option("--motion", options->motion, "head motion from this .bvh file; default: built in");
-  add_motion_file_options(*command, options->motion_file);
-  command->add_option("--hair", options->hairs, "only this hair: straight, curled or styled; repeatable")
-      ->expected(1)
-      ->take_all();
-  command->add_option("--vertices", options->vertices, "only this many per strand; repeatable")
-      ->expected(1)
-      ->take_all();
-  command->add_option("--rate", options->rates_hz, "only this many steps per second; repeatable")
-      ->expected(1)
-      ->take_all();
-  command->add_option("--seconds", options->motion_s, "length of the measured motion")
-      ->check(CLI::PositiveNumber);
-  add_sim_device_options(*command, options->device, {true, "double-precision references only"});
-  command->add_flag("--quick", options->is_quick, "fewer runs: some minutes on two cores");
+  declare_work_precision(*command, *options);
   command->callback([options, &action] { action = [options] { return run_work_precision(*options); }; });
 }
 

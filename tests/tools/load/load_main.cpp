@@ -8,55 +8,18 @@
 
 #include "client/app/step_speed.h"
 #include "client/app/stop_signal.h"
-#include "client/app/view_options.h"
 #include "client/net/http_get.h"
 #include "common/base/profile.h"
 #include "common/base/quantile.h"
 #include "common/base/text.h"
 #include "common/client/client_token.h"
+#include "tests/tools/load/load_options.h"
 #include "tests/tools/load/load_viewers.h"
 
 namespace {
 
 using namespace strandcast;
 using namespace strandcast::load;
-
-struct CommandLine {
-  std::string connect = "127.0.0.1:" + std::to_string(kDefaultPort);
-  std::string token;
-  std::filesystem::path token_file;
-  bool is_tls = false;
-  std::filesystem::path tls_authorities;
-  uint32_t viewers = 16, frame_viewers = 0, silent_viewers = 0, stalled_viewers = 0;
-  double seconds = 10.0, warm_up_s = 2.0;
-  int64_t churn_ms = 0;
-  int server_pid = 0;
-};
-
-void declare(CLI::App& app, CommandLine& line) {
-  app.add_option("--connect", line.connect, "HOST:PORT of the server, numeric; wss://HOST:PORT for TLS")
-      ->capture_default_str();
-  app.add_option("--token", line.token, kTokenHelp)->envname(kTokenVariable);
-  app.add_option("--token-file", line.token_file, "File with the token");
-  app.add_flag("--tls", line.is_tls, "Encrypt the connections, as an address with wss:// does");
-  app.add_option("--tls-ca", line.tls_authorities, kTlsAuthoritiesHelp);
-  app.add_option("--viewers", line.viewers, "Viewers of strands that acknowledge")->capture_default_str();
-  app.add_option("--frame-viewers", line.frame_viewers, "Viewers of the server's pictures besides");
-  app.add_option("--silent-viewers", line.silent_viewers,
-                 "Viewers of strands that never acknowledge, besides");
-  app.add_option("--stalled-viewers", line.stalled_viewers,
-                 "Viewers that join and never read again, besides");
-  app.add_option("--seconds", line.seconds, "How long to measure")
-      ->check(CLI::Range(0.1, 1e6))
-      ->capture_default_str();
-  app.add_option("--warm-up", line.warm_up_s, "Seconds before that")
-      ->check(CLI::Range(0.0, 1e3))
-      ->capture_default_str();
-  app.add_option("--churn-ms", line.churn_ms,
-                 "The oldest viewer leaves and a new one joins this often, 0 = never")
-      ->check(CLI::Range(0, 100'000));
-  app.add_option("--server-pid", line.server_pid, "Watch memory and file descriptors of this process");
-}
 
 constexpr int64_t kWatchMs = 100;  // how often stops and the server's process are looked at
 
@@ -122,7 +85,7 @@ void print_measures(const LoadMeasures& measures, size_t viewers, double seconds
       std::cout << fmt::format("{}_ms_{}={:.3f}\n", name, label, quantile(*values, share));
 }
 
-Status join_all(LoadViewers& viewers, const CommandLine& line) {
+Status join_all(LoadViewers& viewers, const LoadOptions& options) {
   const auto join = [&](uint32_t count, ViewerPlan plan) -> Status {
     for (uint32_t i = 0; i < count; ++i) {
       ASSIGN_OR_RETURN([[maybe_unused]] const uint64_t number, viewers.join(plan));
@@ -130,27 +93,27 @@ Status join_all(LoadViewers& viewers, const CommandLine& line) {
     }
     return {};
   };
-  RETURN_IF_ERROR(join(line.stalled_viewers, {StreamMode::Strands, true, false}));
-  RETURN_IF_ERROR(join(line.silent_viewers, {StreamMode::Strands, false, true}));
-  RETURN_IF_ERROR(join(line.frame_viewers, {StreamMode::Frames, true, true}));
-  return join(line.viewers, {});
+  RETURN_IF_ERROR(join(options.stalled_viewers, {StreamMode::Strands, true, false}));
+  RETURN_IF_ERROR(join(options.silent_viewers, {StreamMode::Strands, false, true}));
+  RETURN_IF_ERROR(join(options.frame_viewers, {StreamMode::Frames, true, true}));
+  return join(options.viewers, {});
 }
 
-Status run(CommandLine line) {
-  ASSIGN_OR_RETURN(Address address, parse_address(line.connect));
-  address.is_tls = address.is_tls || line.is_tls || !line.tls_authorities.empty();
-  if (!line.token_file.empty()) {
-    ASSIGN_OR_RETURN(line.token, load_token(line.token_file, Role::Viewer));
+Status run(LoadOptions options) {
+  ASSIGN_OR_RETURN(Address address, parse_address(options.connect));
+  address.is_tls = address.is_tls || options.is_tls || !options.tls_authorities.empty();
+  if (!options.token_file.empty()) {
+    ASSIGN_OR_RETURN(options.token, load_token(options.token_file, Role::Viewer));
   }
   const std::atomic<bool>& stop = catch_stop_signals();
   std::optional<Encryption> encryption;
-  if (address.is_tls) encryption = Encryption{line.tls_authorities};
+  if (address.is_tls) encryption = Encryption{options.tls_authorities};
   LoadViewers viewers(
-      {address.host, address.port, line.token, encryption, measured_step_ns(), address.folder()});
-  RETURN_IF_ERROR(join_all(viewers, line));
+      {address.host, address.port, options.token, encryption, measured_step_ns(), address.folder()});
+  RETURN_IF_ERROR(join_all(viewers, options));
   for (const int64_t begin_ns = now_ns();
-       !stop && static_cast<double>(now_ns() - begin_ns) * 1e-9 < line.warm_up_s;)
-    viewers.run_for(std::min<int64_t>(kWatchMs, static_cast<int64_t>(line.warm_up_s * 1e3)));
+       !stop && static_cast<double>(now_ns() - begin_ns) * 1e-9 < options.warm_up_s;)
+    viewers.run_for(std::min<int64_t>(kWatchMs, static_cast<int64_t>(options.warm_up_s * 1e3)));
   if (viewers.measures().joined == 0)
     return make_error(
         ErrorCode::Unavailable, "nobody was let in by {}: {}", address.to_string(),
@@ -159,22 +122,22 @@ Status run(CommandLine line) {
 
   const int64_t begin_ns = now_ns();
   const auto elapsed_s = [&] { return static_cast<double>(now_ns() - begin_ns) * 1e-9; };
-  const ProcessState first = process_state(line.server_pid);
+  const ProcessState first = process_state(options.server_pid);
   ProcessState most = first;
   uint64_t turns = 0;
-  while (!stop && elapsed_s() < line.seconds && viewers.open_count() > 0) {
-    viewers.run_for(line.churn_ms > 0 ? line.churn_ms : kWatchMs);
-    const ProcessState now = process_state(line.server_pid);
+  while (!stop && elapsed_s() < options.seconds && viewers.open_count() > 0) {
+    viewers.run_for(options.churn_ms > 0 ? options.churn_ms : kWatchMs);
+    const ProcessState now = process_state(options.server_pid);
     most.rss_kib = std::max(most.rss_kib, now.rss_kib);
     most.descriptors = std::max(most.descriptors, now.descriptors);
-    if (line.churn_ms == 0) continue;
+    if (options.churn_ms == 0) continue;
     viewers.leave(viewers.oldest(), ++turns % 2 == 0);
     ASSIGN_OR_RETURN([[maybe_unused]] const uint64_t number, viewers.join({}));
   }
-  const ProcessState last = process_state(line.server_pid);
+  const ProcessState last = process_state(options.server_pid);
   std::cout << "viewers_open=" << viewers.open_count() << '\n';
   print_measures(viewers.measures(), viewers.open_count(), elapsed_s());
-  if (line.server_pid != 0) {
+  if (options.server_pid != 0) {
     print("server_rss_mib_first", first.rss_kib / 1024.0);
     print("server_rss_mib_most", most.rss_kib / 1024.0);
     print("server_rss_mib_last", last.rss_kib / 1024.0);
@@ -182,7 +145,7 @@ Status run(CommandLine line) {
     print("server_descriptors_most", static_cast<double>(most.descriptors));
     print("server_descriptors_last", static_cast<double>(last.descriptors));
   }
-  if (!stop) print_metrics(address, {line.tls_authorities, line.token});
+  if (!stop) print_metrics(address, {options.tls_authorities, options.token});
   return {};
 }
 
@@ -191,10 +154,10 @@ Status run(CommandLine line) {
 int main(int argc, char** argv) {
   CLI::App app("Strandcast load: many viewers against a running server, and what they saw.",
                "strandcast-load");
-  CommandLine line;
-  declare(app, line);
+  LoadOptions options;
+  declare_load(app, options);
   CLI11_PARSE(app, argc, argv);
-  if (const Status status = run(line); !status) {
+  if (const Status status = run(options); !status) {
     std::cerr << "strandcast-load: " << status.error().to_string() << '\n';
     return 2;
   }

@@ -1,0 +1,243 @@
+// Every option of every command of strandcast-ctl: the field that it sets, and that it sets no other; and the
+// messages of commands that only send one.
+#include "client/app/ctl_options.h"
+
+#include <fstream>
+
+#include "tests/support/option_table.h"
+#include "tests/support/temporary_folder.h"
+
+namespace strandcast::test {
+
+inline void tell(FieldTexts& told, const std::string& where, const CtlTarget& all) {
+  OPTION_FIELDS(all, connect, token, token_file, is_tls, tls_authorities, stop, head);
+}
+inline void tell(FieldTexts& told, const std::string& where, const MotionFileOptions& all) {
+  OPTION_FIELDS(all, unit_m, up, joint, has_body, body_joints, is_filtering_glitches,
+                is_keeping_first_frames);
+}
+inline void tell(FieldTexts& told, const std::string& where, const FeedOptions& all) {
+  OPTION_FIELDS(all, motion, wind, motion_file, is_looped, blend_s, is_live, speed, seconds, rate_hz,
+                wind_mps, gust_intensity, seed, as, to);
+}
+inline void tell(FieldTexts& told, const std::string& where, const ExportCommand& all) {
+  OPTION_FIELDS(all, paths, fps, unit, up, space, is_guides, from_s, to_s, seconds, at_s);
+}
+inline void tell(FieldTexts& told, const std::string& where, const BundleCommand& all) {
+  OPTION_FIELDS(all, recording, page, seconds, has_all_solvers);
+}
+inline void tell(FieldTexts& told, const std::string& where, const TestOptions& all) {
+  OPTION_FIELDS(all, scenarios, junit, out, server, uses_running, renews_goldens);
+}
+inline void tell(FieldTexts& told, const std::string& where, const ParameterOptions& all) {
+  OPTION_FIELDS(all, prefix, is_watching, is_live_only);
+}
+inline void tell(FieldTexts& told, const std::string& where, const LatencyOptions& all) {
+  OPTION_FIELDS(all, seconds, mode, out);
+}
+inline void tell(FieldTexts& told, const std::string& where, const CameraOptions& all) {
+  OPTION_FIELDS(all, view, session, yaw_deg, pitch_deg, distance_m, fov_deg, target_m);
+}
+inline void tell(FieldTexts& told, const std::string& where, const CtlCommandLine& all) {
+  OPTION_FIELDS(all, target, log_level, feed, monitor_s, assignment, subject, check_frames, check_timeout_s,
+                session, ban_s, scene_path, exported, bundle, recording, other_recording, recording_name,
+                step_count, test, params, latency, camera, script_words);
+}
+
+}  // namespace strandcast::test
+
+namespace strandcast::ctl_options_test {
+namespace {
+
+using test::Arguments;
+using test::OptionRow;
+
+CtlChoice parse(const Arguments& given) {
+  std::vector<const char*> arguments{"strandcast-ctl"};
+  for (const std::string& word : given) arguments.push_back(word.c_str());
+  return read_ctl_command_line(static_cast<int>(arguments.size()), arguments.data());
+}
+
+std::optional<test::FieldTexts> fields_of(const Arguments& given) {
+  const CtlChoice choice = parse(given);
+  if (choice.command == nullptr) return std::nullopt;
+  test::FieldTexts told;
+  tell(told, {}, choice.line);
+  return told;
+}
+
+const Arguments kScenario = {"--scenario", "s"};
+const Arguments kOut = {"o.usda"};
+const Arguments kBundle = {"a.mcap", "o.html"};
+
+// Options of all commands stand behind one here.
+const OptionRow kTargetRows[] = {
+    {"--connect", {"other:81"}, {{"target.connect", "other:81"}, {"test.uses_running", "true"}}, {"pause"}},
+    {"--token-file", {"t"}, {{"target.token_file", "t"}}, {"pause"}},
+    {"--token", {"secret"}, {{"target.token", "secret"}}, {"pause"}},
+    {"--tls", {}, {{"target.is_tls", "true"}}, {"pause"}},
+    {"--tls-ca", {"ca.pem"}, {{"target.tls_authorities", "ca.pem"}}, {"pause"}},
+    {"--head", {"anna"}, {{"target.head", "anna"}}, {"pause"}},
+    {"--log", {"debug"}, {{"log_level", "debug"}}, {"pause"}}};
+
+const OptionRow kCommandRows[] = {
+    {"--motion", {"a.bvh"}, {{"feed.motion", "a.bvh"}}, {}, "feed"},
+    {"--wind", {"a.csv"}, {{"feed.wind", "a.csv"}}, {}, "feed"},
+    {"--unit", {"0.5"}, {{"feed.motion_file.unit_m", "0.5"}}, {}, "feed"},
+    {"--up", {"z"}, {{"feed.motion_file.up", "z"}}, {}, "feed"},
+    {"--joint", {"Skull"}, {{"feed.motion_file.joint", "Skull"}}, {}, "feed"},
+    {"--body-joint", {"Hip", "Knee"}, {{"feed.motion_file.body_joints", "Hip Knee"}}, {}, "feed"},
+    {"--filter-glitches", {}, {{"feed.motion_file.is_filtering_glitches", "true"}}, {}, "feed"},
+    {"--keep-first-frames", {}, {{"feed.motion_file.is_keeping_first_frames", "true"}}, {}, "feed"},
+    {"--loop", {}, {{"feed.is_looped", "true"}}, {}, "feed"},
+    {"--live", {}, {{"feed.is_live", "true"}}, {}, "feed"},
+    {"--speed", {"2"}, {{"feed.speed", "2"}}, {}, "feed"},
+    {"--seconds", {"2.5"}, {{"feed.seconds", "2.5"}}, {}, "feed"},
+    {"--rate", {"25"}, {{"feed.rate_hz", "25"}}, {}, "feed"},
+    {"--wind-mean", {"3", "4", "5"}, {{"feed.wind_mps", "3 4 5"}}, {}, "feed"},
+    {"--gust-intensity", {"1.25"}, {{"feed.gust_intensity", "1.25"}}, {}, "feed"},
+    {"--seed", {"7"}, {{"feed.seed", "7"}}, {}, "feed"},
+    {"--as", {"vmc"}, {{"feed.as", "vmc"}}, {}, "feed"},
+    {"--to", {"other"}, {{"feed.to", "other"}}, {"--as", "vmc"}, "feed"},
+    {"--seconds", {"2.5"}, {{"monitor_s", "2.5"}}, {}, "monitor"},
+    {"count", {"7"}, {{"step_count", "7"}}, {}, "step"},
+    {"view", {"left"}, {{"camera.view", "left"}}, {}, "camera"},
+    {"--session", {"7"}, {{"camera.session", "7"}}, {}, "camera"},
+    {"--yaw-deg", {"7"}, {{"camera.yaw_deg", "7"}}, {}, "camera"},
+    {"--pitch-deg", {"7"}, {{"camera.pitch_deg", "7"}}, {}, "camera"},
+    {"--distance-m", {"7"}, {{"camera.distance_m", "7"}}, {}, "camera"},
+    {"--target-m", {"1", "2", "3"}, {{"camera.target_m", "1 2 3"}}, {}, "camera"},
+    {"--fov-deg", {"7"}, {{"camera.fov_deg", "7"}}, {}, "camera"},
+    {"name", {"Zoe"}, {{"subject", "Zoe"}}, {}, "mocap subject"},
+    {"name", {"take"}, {{"recording_name", "take"}}, {}, "record start"},
+    {"prefix", {"look"}, {{"params.prefix", "look"}}, {}, "params"},
+    {"--watch", {}, {{"params.is_watching", "true"}}, {}, "params"},
+    {"--live", {}, {{"params.is_live_only", "true"}}, {}, "params"},
+    {"--fps", {"24"}, {{"exported.fps", "24"}}, kOut, "export"},
+    {"--units", {"m"}, {{"exported.unit", "m"}}, kOut, "export"},
+    {"--up", {"z"}, {{"exported.up", "z"}}, kOut, "export"},
+    {"--space", {"world"}, {{"exported.space", "world"}}, kOut, "export"},
+    {"--guides", {}, {{"exported.is_guides", "true"}}, kOut, "export"},
+    {"--from", {"2"}, {{"exported.from_s", "2"}}, kOut, "export"},
+    {"--to", {"2"}, {{"exported.to_s", "2"}}, kOut, "export"},
+    {"--seconds", {"2"}, {{"exported.seconds", "2"}}, kOut, "export"},
+    {"--at", {"2"}, {{"exported.at_s", "2"}}, kOut, "export"},
+    {"recording", {"a.mcap"}, {{"recording", "a.mcap"}}, {}, "check"},
+    {"--seconds", {"2"}, {{"bundle.seconds", "2"}}, kBundle, "bundle"},
+    {"--all-solvers", {}, {{"bundle.has_all_solvers", "true"}}, kBundle, "bundle"},
+    {"--frames", {"7"}, {{"check_frames", "7"}}, {}, "check"},
+    {"--timeout", {"7"}, {{"check_timeout_s", "7"}}, {}, "check"},
+    {"--ban", {"60"}, {{"ban_s", "60"}}, {"7"}, "kick"},
+    {"out", {"b.mcap"}, {{"other_recording", "b.mcap"}}, {"a.mcap"}, "recover"},
+    {"--seconds", {"2"}, {{"latency.seconds", "2"}}, {}, "latency"},
+    {"--mode", {"frames"}, {{"latency.mode", "frames"}}, {}, "latency"},
+    {"--out", {"o"}, {{"latency.out", "o"}}, {}, "latency"},
+    {"--junit", {"j"}, {{"test.junit", "j"}}, kScenario, "test"},
+    {"--out", {"o"}, {{"test.out", "o"}}, kScenario, "test"},
+    {"--server", {"s"}, {{"test.server", "s"}}, kScenario, "test"},
+    {"--renew", {}, {{"test.renews_goldens", "true"}}, kScenario, "test"}};
+
+/// What a command cannot be without: its fields are those beside the first ones of any command.
+const OptionRow kRequiredRows[] = {
+    {"assignment", {"look.ambient=1"}, {{"assignment", "look.ambient=1"}}, {}, "set"},
+    {"file", {"s.textproto"}, {{"scene_path", "s.textproto"}}, {}, "save"},
+    {"paths", {"a.mcap", "o.usda"}, {{"exported.paths", "a.mcap o.usda"}}, {}, "export"},
+    {"recording", kBundle, {{"bundle.recording", "a.mcap"}, {"bundle.page", "o.html"}}, {}, "bundle"},
+    {"page", kBundle, {{"bundle.recording", "a.mcap"}, {"bundle.page", "o.html"}}, {}, "bundle"},
+    {"session", {"7"}, {{"session", "7"}}, {}, "kick"},
+    {"recording", {"a.mcap"}, {{"recording", "a.mcap"}}, {}, "info"},
+    {"recording", {"a.mcap"}, {{"recording", "a.mcap"}}, {}, "recover"},
+    {"recording",
+     {"a.mcap", "b.mcap"},
+     {{"recording", "a.mcap"}, {"other_recording", "b.mcap"}},
+     {},
+     "compare"},
+    {"other", {"a.mcap", "b.mcap"}, {{"recording", "a.mcap"}, {"other_recording", "b.mcap"}}, {}, "compare"},
+    {"--scenario", {"a", "--scenario", "b"}, {{"test.scenarios", "a b"}}, {}, "test"}};
+
+std::string help_of(const std::string& command) {
+  Arguments arguments = test::words_of(command);
+  arguments.push_back("--help");
+  testing::internal::CaptureStdout();
+  EXPECT_EQ(parse(arguments).exit_code, kDoneExit);
+  return testing::internal::GetCapturedStdout();
+}
+
+TEST(CtlOptionTable, EveryOptionOfEveryCommandChangesItsFieldAndNoOther) {
+  std::vector<OptionRow> rows(std::begin(kTargetRows), std::end(kTargetRows));
+  rows.insert(rows.end(), std::begin(kCommandRows), std::end(kCommandRows));
+  test::expect_changes(rows, fields_of);
+  const auto first = fields_of({"pause"});
+  ASSERT_TRUE(first);
+  for (const OptionRow& row : kRequiredRows) {
+    SCOPED_TRACE(row.command + " " + row.option);
+    Arguments arguments = test::words_of(row.command);
+    if (row.option.starts_with('-')) arguments.push_back(row.option);
+    arguments.insert(arguments.end(), row.values.begin(), row.values.end());
+    const auto fields = fields_of(arguments);
+    ASSERT_TRUE(fields);
+    EXPECT_EQ(test::difference_of(*first, *fields), row.changed);
+    rows.push_back(row);
+  }
+  test::expect_all_options(rows, help_of({}));
+  for (const CtlCommand& command : ctl_commands())
+    if (const std::string name = command.name; name != "fleet" && name != "grid")  // theirs are scripts'
+      test::expect_all_options(rows, help_of(name), name);
+}
+
+TEST(CtlOptionTable, WhatStandsBehindAScriptIsItsOwn) {
+  for (const char* script : {"fleet", "grid"})
+    EXPECT_EQ(parse({script, "start", "a", "--head", "b", "--", "--help"}).line.script_words,
+              (Arguments{"start", "a", "--head", "b", "--", "--help"}))
+        << script;
+}
+
+TEST(CtlOptionTable, ACommandThatOnlySendsAMessageSaysAllOfIt) {
+  const std::pair<Arguments, ClientMessage> kSent[] = {
+      {{"pause"}, ControlCommand{Command::Pause, 0}},
+      {{"resume"}, ControlCommand{Command::Resume, 0}},
+      {{"reset"}, ControlCommand{Command::Reset, 0}},
+      {{"set", "look.ambient=1"}, SetParameter{"look.ambient=1"}},
+      {{"mocap", "subject", "Zoe"}, LiveCommand{LiveAction::ChooseSubject, "Zoe"}},
+      {{"mocap", "calibrate"}, LiveCommand{LiveAction::Calibrate, ""}},
+      {{"mocap", "reset"}, LiveCommand{LiveAction::Reset, ""}},
+      {{"record", "start", "take"}, RecordCommand{true, "take"}},
+      {{"record", "stop"}, RecordCommand{false, ""}},
+      {{"sessions"}, AdminCommand{AdminAction::ListSessions, 0, 0.0}},
+      {{"kick", "7", "--ban", "60"}, AdminCommand{AdminAction::Kick, 7, 60.0}},
+      {{"shutdown"}, AdminCommand{AdminAction::ShutDown, 0, 0.0}}};
+  size_t sent_count = 0;
+  for (const CtlCommand& command : ctl_commands()) sent_count += command.message != nullptr ? 1 : 0;
+  EXPECT_EQ(std::size(kSent), sent_count) << "a command is missing here";
+  for (const auto& [arguments, message] : kSent) {
+    const CtlChoice choice = parse(arguments);
+    ASSERT_TRUE(choice.command != nullptr && choice.command->message != nullptr) << arguments[0];
+    EXPECT_EQ(choice.command->message(choice.line), message) << arguments[0];
+  }
+}
+
+/// Wind of 1 m/s, then of 3 m/s for the rest of a second.
+class FedWind : public testing::Test {
+ protected:
+  double x_mps_at(double time_s, bool is_looped) {
+    const TemporaryFolder folder;
+    FeedOptions options;
+    options.wind = (folder.path() / "wind.csv").string();
+    std::ofstream(options.wind) << kText;
+    options.motion = "none";
+    options.is_looped = is_looped;
+    const auto plan = make_feed_plan(options);
+    EXPECT_TRUE(plan) << plan.error().to_string();
+    return plan ? static_cast<double>(plan->wind(time_s).x) : 0.0;
+  }
+  static constexpr const char* kText = "t_s,x_mps,y_mps,z_mps\n0,1,0,0\n0.5,3,0,0\n1,3,0,0\n";
+};
+
+TEST_F(FedWind, BeginsAnewAtItsEndWhereItIsLooped) {
+  EXPECT_DOUBLE_EQ(x_mps_at(0.25, true), 2.0) << "between its lines";
+  EXPECT_DOUBLE_EQ(x_mps_at(1.25, true), 2.0);
+  EXPECT_DOUBLE_EQ(x_mps_at(1.25, false), 3.0) << "else it stays at its last line";
+}
+
+}  // namespace
+}  // namespace strandcast::ctl_options_test
