@@ -134,7 +134,7 @@ Result<std::string> page_with(PageFiles files, const std::string& tape, const st
   if (index == files.end())
     return make_error(
         ErrorCode::Unsupported,
-        "this build has no page for browsers (build with -DSTRANDCAST_WEB=ON, as deploy/run.sh does)");
+        "this build has no page for browsers (build with -DSTRANDCAST_WEB=ON, as deploy/run.sh --web does)");
   std::string html(index->plain);
   ASSIGN_OR_RETURN(const PageFile* style, part(files, "style."));
   ASSIGN_OR_RETURN(const PageFile* script, part(files, "main."));
