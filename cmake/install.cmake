@@ -7,7 +7,7 @@ set(made ${CMAKE_BINARY_DIR}/installed_files)
 
 install(TARGETS strandcast-server COMPONENT server)
 install(TARGETS strandcast-view COMPONENT viewer)
-install(TARGETS strandcast-ctl strandcast-report COMPONENT tools)
+install(TARGETS strandcast-ctl strandcast-report strandcast-load COMPONENT tools)
 install(DIRECTORY deploy/scenes DESTINATION ${CMAKE_INSTALL_DATADIR}/strandcast COMPONENT server)
 install(DIRECTORY deploy/scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/strandcast COMPONENT tools)
 
@@ -42,7 +42,8 @@ set(component_server server)
 set(component_view viewer)
 set(component_ctl tools)
 set(component_report tools)
-foreach(name server view ctl report)
+set(component_load tools)
+foreach(name server view ctl report load)
   set(program strandcast-${name})
   add_custom_command(OUTPUT ${made}/${program}.1.gz ${made}/completions/${program}
     COMMAND bash ${packages}/from_help.sh $<TARGET_FILE:${program}> ${made} ${PROJECT_VERSION}

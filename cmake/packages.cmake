@@ -47,7 +47,8 @@ strandcast_package(viewer strandcast-viewer "viewer of simulated hair"
 pictures, and plays recordings of it. It needs no strong machine.")
 strandcast_package(tools strandcast-tools "tools for a hair simulation server"
 "strandcast-ctl feeds, steers, watches and tests a Strandcast server;
-strandcast-report compares strand models, codecs and ways to draw.")
+strandcast-report compares strand models, codecs and ways to draw;
+strandcast-load is many viewers at once.")
 strandcast_package(doc strandcast-doc "documents and examples of a hair simulation server"
 "How Strandcast is used and built, its protocol and file formats byte by byte,
 clients in C++, Python and JavaScript as examples, and kept streams to test

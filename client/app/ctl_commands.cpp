@@ -89,6 +89,10 @@ Status add_motion(const FeedOptions& options, FeedPlan& plan, double& length_s) 
   const auto path = std::make_shared<const ClipPath>(std::move(loaded.clip),
                                                      ClipPathOptions{options.is_looped, options.blend_s});
   length_s = path->duration_s();
+  if (path->clip().world_from_head.size() == 1) {
+    length_s = 0.0;
+    std::cerr << fmt::format("{}: one frame: the head is held there\n", options.motion);
+  }
   if (path->way_back_s() > 0.0)
     std::cerr << fmt::format("{}: the way back to its start takes {:.2f} s\n", options.motion,
                              path->way_back_s());

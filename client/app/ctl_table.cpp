@@ -42,7 +42,9 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
   app.add_option("--speed", feed.speed, "Playing speed")
       ->check(without_nan(CLI::Range(1e-3, kMaxSpeed)))
       ->capture_default_str();
-  app.add_option("--seconds", feed.seconds, "Stop after this long (default: the length of the motion file)")
+  app.add_option(
+         "--seconds", feed.seconds,
+         "Stop after this long (default: at the end of the motion file; without one, or with --loop, never)")
       ->check(without_nan(CLI::Range(0.0, 1e6)));
   app.add_option("--rate", feed.rate_hz, "Samples per second")
       ->check(without_nan(CLI::Range(kMinFeedRateHz, kMaxDatagramRateHz)))
@@ -128,6 +130,9 @@ void declare_cameras(CLI::App& app, CtlCommandLine& line) {
   declare_camera(app, line.camera);
 }
 
+void declare_bundled(CLI::App& app, CtlCommandLine& line) {
+  declare_bundle(app, line.bundle);
+}
 void declare_exported(CLI::App& app, CtlCommandLine& line) {
   declare_export(app, line.exported);
 }
@@ -239,6 +244,8 @@ constexpr CtlCommand kCommands[] = {
      [](const Line& line, const Stop&) { return run_save(line.target, line.scene_path); }},
     {"export", "Write the strands as curves for other programs", declare_exported,
      [](const Line& line, const Stop& stop) { return run_export(line.target, line.exported, stop); }},
+    {"bundle", "Make one HTML file of a recording, which browsers play without a server", declare_bundled,
+     [](const Line& line, const Stop&) { return run_bundle(line.bundle); }},
     {"check", "Decode frames with two viewers and compare their states; or look whether a recording is sound",
      declare_check, start_check},
     {"sessions", "List who is connected (needs an admin's token)", nullptr, nullptr, admin<AdminAction::ListSessions>},

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "client/app/bundle_command.h"
 #include "client/app/camera_command.h"
 #include "client/app/ctl_commands.h"
 #include "client/app/export_command.h"
@@ -28,6 +29,7 @@ struct CtlCommandLine {
   double ban_s = 0.0;
   std::string scene_path;
   ExportCommand exported;
+  BundleCommand bundle;
   std::string recording;
   std::string other_recording;
   std::string recording_name;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "client/app/ctl_commands.h"
+#include "client/app/frame_rate.h"
 #include "client/app/live_states.h"
 #include "client/app/recorded_states.h"
 #include "client/export/export_strands.h"
@@ -14,7 +15,7 @@
 namespace strandcast {
 namespace {
 
-constexpr int kUsualFps = 30;
+constexpr double kUsualFps = 30.0;
 constexpr double kMostSeconds = 86'400.0;
 
 std::string size_text(uint64_t bytes) {
@@ -26,7 +27,7 @@ void print(const ExportOptions& options, const ExportReport& report) {
   const std::string frames = report.frame_count == 1
                                  ? fmt::format("the frame at {:.3f} s", report.first_s)
                                  : fmt::format("{} frames at {} fps from {:.3f} s on", report.frame_count,
-                                               options.fps, report.first_s);
+                                               frame_rate_text(options.fps), report.first_s);
   std::cout << fmt::format(
       "{} strands x {} vertices, {}, {} in {}{}\n", report.strand_count, report.vertex_count, frames,
       size_text(report.bytes),
@@ -51,13 +52,13 @@ Result<std::unique_ptr<ExportSource>> open_source(const CtlTarget& target, const
 
 void declare_export(CLI::App& app, ExportCommand& command) {
   app.add_option("paths", command.paths,
-                 "[RECORDING.mcap] OUT.usda, OUT.ply or OUT.csv: what was recorded, or what the server sends "
-                 "from now "
-                 "on; a file of the second name is replaced")
+                 "[RECORDING.mcap] OUT.usda, OUT.abc, OUT.ply or OUT.csv: what was recorded, or what the "
+                 "server sends from now on; a file of the second name is replaced")
       ->required()
       ->expected(1, 2);
-  app.add_option("--fps", command.fps, "Frames per second (default: 30)")
-      ->check(CLI::IsMember({24, 25, 30, 60}));
+  app.add_option("--fps", command.fps, "Frames per second, such as 24, 23.976 or 24000/1001 (default: 30)")
+      ->transform(CLI::Validator(
+          [](std::string& text) { return make_frame_rate(text, kLeastFrameRate, kMostFrameRate); }, ""));
   app.add_option("--units", command.unit, "Unit of the file")
       ->check(CLI::IsMember({"cm", "m"}))
       ->capture_default_str();

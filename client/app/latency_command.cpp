@@ -4,10 +4,11 @@
 
 #include "client/app/ctl_commands.h"
 #include "client/app/frame_trace.h"
+#include "client/app/live_connection.h"
 #include "client/app/step_speed.h"
 #include "client/app/view_options.h"
-#include "client/app/viewer_session.h"
 #include "common/base/file.h"
+#include "common/base/units.h"
 
 namespace strandcast {
 namespace {
@@ -40,21 +41,24 @@ int run_latency(const CtlTarget& target, const LatencyOptions& options, const st
   const auto trace = std::make_shared<FrameTrace>();
   if (const Status opened = open_files(options, *trace); !opened)
     return ctl_failure(opened.error(), kBadInputExit);
-  auto session = ViewerSession::open(*config);
-  if (!session) return ctl_failure(session.error(), kBadInputExit);
+  const auto live = LiveConnection::open(*config);
+  if (!live) return ctl_failure(live.error(), kBadInputExit);
   trace->want_states(true);
-  (*session)->set_trace(trace);
-  const int64_t end_ns = now_ns() + static_cast<int64_t>(options.seconds * 1e9);
-  while (!stop && now_ns() < end_ns)
-    if (const Status pumped = (*session)->pump(milliseconds(20)); !pumped)
-      return ctl_failure(pumped.error(), kRefusedExit);
+  (*live)->set_trace(trace);
+  const int64_t end_ns = now_ns() + static_cast<int64_t>(options.seconds * kNsPerS);
+  while (!stop && now_ns() < end_ns) {
+    (*live)->pump(milliseconds(20));
+    if ((*live)->final_error()) return ctl_failure(*(*live)->final_error(), kRefusedExit);
+  }
   const std::vector<StageTimes> stages = stage_times(trace->frames());
   std::cout << to_table(stages);
-  const ClockOffset clock = (*session)->client().clock();
+  ViewerSession& session = (*live)->session();
+  const ClockOffset clock = session.client().clock();
   std::cout << fmt::format(
       "clocks agree within {:.3f} ms; the server takes {:.2f} ms for a step and {:.2f} ms to encode\n",
-      static_cast<double>(clock.error_ns()) * 1e-6, (*session)->status().sim_ms,
-      (*session)->status().encode_ms);
+      static_cast<double>(clock.error_ns()) * 1e-6, session.status().sim_ms, session.status().encode_ms);
+  if ((*live)->outage_s() > 0.0)
+    std::cout << fmt::format("reconnects {}, outage_s {:.1f}\n", (*live)->reconnects(), (*live)->outage_s());
   if (!options.out.empty()) {
     if (const Status saved = save(options, *trace, stages); !saved)
       return ctl_failure(saved.error(), kBadInputExit);

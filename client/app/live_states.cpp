@@ -1,5 +1,6 @@
 #include "client/app/live_states.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace strandcast {
@@ -12,23 +13,44 @@ constexpr double kNoStateTimeoutS = 15.0;
 
 Result<std::unique_ptr<LiveStates>> LiveStates::open(const ClientConfig& config,
                                                      const std::atomic<bool>& stop) {
-  ASSIGN_OR_RETURN(auto session, ViewerSession::open(config));
-  std::unique_ptr<LiveStates> states(new LiveStates(std::move(session), stop));
+  ASSIGN_OR_RETURN(auto live, LiveConnection::open(config));
+  std::unique_ptr<LiveStates> states(new LiveStates(std::move(live), stop));
   const int64_t begin_ns = now_ns();
-  while (states->waiting_.empty() || states->session_->asset() == nullptr) {
+  while (states->waiting_.empty() || states->live_->session().asset() == nullptr) {
     if (stop) return make_error(ErrorCode::Unavailable, "stopped before the first state had come");
     if (static_cast<double>(now_ns() - begin_ns) * 1e-9 > kNoStateTimeoutS)
       return make_error(ErrorCode::Timeout, "the server sent no state for {} s", kNoStateTimeoutS);
-    RETURN_IF_ERROR(states->session_->pump(kStatesPumpWait));
+    RETURN_IF_ERROR(states->pump());
   }
-  const LookDesc& look = states->session_->look().look;
-  states->scene_ = {states->session_->shared_asset(), look.strand_radius_m, look.tip_scale};
+  ViewerSession& session = states->live_->session();
+  const LookDesc& look = session.look().look;
+  states->scene_ = {session.shared_asset(), look.strand_radius_m, look.tip_scale};
   return states;
 }
 
-LiveStates::LiveStates(std::unique_ptr<ViewerSession> session, const std::atomic<bool>& stop)
-    : session_(std::move(session)), stop_(stop) {
-  session_->set_snapshot_listener([this](const auto& state) { waiting_.push_back(state); });
+LiveStates::LiveStates(std::unique_ptr<LiveConnection> live, const std::atomic<bool>& stop)
+    : live_(std::move(live)), stop_(stop) {
+  listen();
+}
+
+void LiveStates::listen() {
+  live_->session().set_snapshot_listener([this](const auto& state) {
+    // A server that was started anew begins at zero.
+    if (state->sim_time_ns > last_ns_) waiting_.push_back(state);
+    last_ns_ = std::max(last_ns_, state->sim_time_ns);
+  });
+}
+
+/// Fails with what trying again does not mend, or if other hair came back.
+Status LiveStates::pump() {
+  if (live_->pump(kStatesPumpWait)) listen();
+  if (live_->final_error()) return *live_->final_error();
+  const SceneAsset* now = live_->session().asset();
+  if (scene_.asset == nullptr || now == nullptr) return {};
+  if (now->strand_count == scene_.asset->strand_count && now->vertex_count == scene_.asset->vertex_count)
+    return {};
+  return make_error(ErrorCode::Unavailable, "the server has other hair now: {} strands x {} vertices",
+                    now->strand_count, now->vertex_count);
 }
 
 Result<std::shared_ptr<const Snapshot>> LiveStates::next() {
@@ -36,9 +58,9 @@ Result<std::shared_ptr<const Snapshot>> LiveStates::next() {
   while (waiting_.empty()) {
     if (stop_) return std::shared_ptr<const Snapshot>();
     if (static_cast<double>(now_ns() - begin_ns) * 1e-9 > kNoStateTimeoutS)
-      return make_error(ErrorCode::Timeout, "no new state for {} s (is the server paused?)",
-                        kNoStateTimeoutS);
-    RETURN_IF_ERROR(session_->pump(kStatesPumpWait));
+      return make_error(ErrorCode::Timeout, "no new state for {} s ({})", kNoStateTimeoutS,
+                        live_->is_connected() ? "is the server paused?" : live_->trouble());
+    RETURN_IF_ERROR(pump());
   }
   std::shared_ptr<const Snapshot> state = std::move(waiting_.front());
   waiting_.pop_front();
@@ -47,11 +69,15 @@ Result<std::shared_ptr<const Snapshot>> LiveStates::next() {
 
 std::vector<std::string> LiveStates::remarks() const {
   std::vector<std::string> remarks;
-  const uint64_t lost =
-      session_->replay().stats().missed_frames + session_->client().counters().dropped_frames;
+  SessionTotals totals = live_->earlier();
+  totals += totals_of(live_->session());
+  const uint64_t lost = totals.missed_frames + totals.dropped_by_client;
   if (lost > 0)
     remarks.push_back(
         fmt::format("{} states were lost on the way; the frames between are interpolated", lost));
+  if (live_->outage_s() > 0.0)
+    remarks.push_back(
+        fmt::format("the server was away {:.1f} s; the frames of it are interpolated", live_->outage_s()));
   return remarks;
 }
 

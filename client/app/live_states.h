@@ -3,12 +3,14 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "client/app/viewer_session.h"
+#include "client/app/live_connection.h"
 #include "client/export/export_source.h"
 
 namespace strandcast {
@@ -19,17 +21,20 @@ class LiveStates : public ExportSource {
   static Result<std::unique_ptr<LiveStates>> open(const ClientConfig& config, const std::atomic<bool>& stop);
 
   const ExportScene& scene() const override { return scene_; }
-  /// Waits for a state. Returns null once stopped, Timeout if none comes.
+  /// Waits for a state, also for a server that is away. Returns null once stopped, Timeout if none comes.
   Result<std::shared_ptr<const Snapshot>> next() override;
   std::vector<std::string> remarks() const override;
 
  private:
-  LiveStates(std::unique_ptr<ViewerSession> session, const std::atomic<bool>& stop);
+  LiveStates(std::unique_ptr<LiveConnection> live, const std::atomic<bool>& stop);
+  Status pump();
+  void listen();
 
-  std::unique_ptr<ViewerSession> session_;
+  std::unique_ptr<LiveConnection> live_;
   const std::atomic<bool>& stop_;
   ExportScene scene_;
-  std::deque<std::shared_ptr<const Snapshot>> waiting_;  // as much as one pump() brings
+  std::deque<std::shared_ptr<const Snapshot>> waiting_;    // as much as one pump() brings
+  int64_t last_ns_ = std::numeric_limits<int64_t>::min();  // simulated time of the newest
 };
 
 }  // namespace strandcast

@@ -1,6 +1,9 @@
 #include "client/app/parameter_command.h"
 
 #include <iostream>
+#include <memory>
+#include <optional>
+#include <utility>
 
 #include "client/app/attempts.h"
 #include "client/app/ctl_commands.h"
@@ -13,6 +16,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kParametersTimeout{5'000};
+constexpr std::chrono::hours kWatchPatience{24 * 365};
 
 /// One list that answers a request; changes that come meanwhile are in the next answer anyway.
 Result<ParameterList> ask(ViewerClient& client, const ParameterRequest& request,
@@ -45,6 +49,31 @@ Result<uint32_t> print_all(ViewerClient& client, const ParameterOptions& options
   }
 }
 
+/// Prints changes until stopped. After a lost connection, prints the whole list again.
+int watch(std::unique_ptr<ViewerClient> client, const ClientConfig& config, const ParameterOptions& options,
+          const std::atomic<bool>& stop) {
+  LineBudget lines;
+  std::optional<Error> lost;
+  while (!stop && std::cout) {
+    if (lost) {
+      std::cerr << fmt::format("strandcast-ctl: {}; trying again\n", lost->to_string());
+      auto again = connect_patiently(config, kWatchPatience);
+      if (!again) return ctl_failure(again.error(), kRefusedExit);
+      client = std::move(*again);
+      lost.reset();
+      if (const auto listed = print_all(*client, options, stop); !listed) lost = listed.error();
+    }
+    for (const ClientEvent& event : client->wait(milliseconds(100))) {
+      if (const auto* closed = std::get_if<ClosedEvent>(&event)) lost = closed->error;
+      const auto* list = std::get_if<ParameterList>(&event);
+      if (list == nullptr || !list->is_change) continue;
+      for (const ParameterInfo& parameter : list->parameters)
+        if (lines.take(now_ns())) std::cout << to_line(parameter) << std::endl;
+    }
+  }
+  return kDoneExit;
+}
+
 }  // namespace
 
 std::string to_line(const ParameterInfo& parameter) {
@@ -74,18 +103,7 @@ int run_params(const CtlTarget& target, const ParameterOptions& options, const s
     return kRefusedExit;
   }
   std::cout << std::flush;
-  LineBudget lines;
-  while (options.is_watching && !stop && std::cout) {
-    for (const ClientEvent& event : (*client)->wait(milliseconds(100))) {
-      if (const auto* closed = std::get_if<ClosedEvent>(&event))
-        return ctl_failure(closed->error, kRefusedExit);
-      const auto* list = std::get_if<ParameterList>(&event);
-      if (list == nullptr || !list->is_change) continue;
-      for (const ParameterInfo& parameter : list->parameters)
-        if (lines.take(now_ns())) std::cout << to_line(parameter) << std::endl;
-    }
-  }
-  return kDoneExit;
+  return options.is_watching ? watch(std::move(*client), *config, options, stop) : kDoneExit;
 }
 
 }  // namespace strandcast

@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "client/app/frame_rate.h"
 #include "client/app/recording_player.h"
 #include "common/log/progress.h"
 #include "common/pictures/webm_writer.h"
@@ -108,8 +109,9 @@ Result<std::string> run_film(const ViewOptions& options, const std::atomic<bool>
   }
   if (drawn == 0) return make_error(ErrorCode::Unavailable, "stopped before the first frame was drawn");
   RETURN_IF_ERROR(film.finish());
-  std::string said = fmt::format("{} frames of {}x{} at {} fps: {}\n", drawn, options.size.width,
-                                 options.size.height, options.film_fps, options.film.string());
+  std::string said =
+      fmt::format("{} frames of {}x{} at {} fps: {}\n", drawn, options.size.width, options.size.height,
+                  frame_rate_text(options.film_fps), options.film.string());
   for (const std::string& remark : player->remarks()) said += "  " + remark + '\n';
   return said;
 }

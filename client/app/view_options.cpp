@@ -5,6 +5,7 @@
 #include <charconv>
 #include <iostream>
 
+#include "client/app/frame_rate.h"
 #include "client/app/recording_film.h"
 #include "client/app/step_speed.h"
 #include "common/base/command_line_error.h"
@@ -79,12 +80,14 @@ struct RawOptions {
 };
 
 void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
+  const CLI::Validator frame_rates([](std::string& text) { return make_frame_rate(text, 1.0, kMaxClipFps); },
+                                   "");
   app.add_option("recording", options.recording, "A recording (.mcap) to play, instead of a server");
   app.add_option("--export", options.film,
                  "Draw the recording into a film (.webm, or .webp) or into pictures (frames/%04d.png), "
                  "without a window");
-  app.add_option("--fps", options.film_fps, "Frames per second of --export")
-      ->check(without_nan(CLI::Range(1.0, kMaxClipFps)))
+  app.add_option("--fps", options.film_fps, "Frames per second of --export, such as 24, 23.976 or 24000/1001")
+      ->transform(frame_rates)
       ->capture_default_str();
   const auto seconds = without_nan(CLI::Range(0.0, kMostFilmS));
   app.add_option("--from", options.film_from_s, "Begin --export so many seconds after the first state")
@@ -133,7 +136,7 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
       ->check(without_nan(CLI::Range(0.1, kMaxClipS)))
       ->capture_default_str();
   app.add_option("--clip-fps", options.clip_fps, "Pictures per second of the clip")
-      ->check(without_nan(CLI::Range(1.0, kMaxClipFps)))
+      ->transform(frame_rates)
       ->capture_default_str();
   app.add_option("--clip-size", raw.clip_size, "Size of the clip (default: as --size)");
   app.add_option("--seconds", raw.seconds, "Stop receiving after this long; what came is then drawn")

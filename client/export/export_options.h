@@ -16,8 +16,8 @@ enum class ExportRole {
 };
 
 struct ExportOptions {
-  std::filesystem::path path;  // .usda, .ply or .csv
-  double fps = 30.0;           // 24, 25, 30 or 60
+  std::filesystem::path path;  // .usda, .abc, .ply or .csv
+  double fps = 30.0;           // frames per second
   ExportUnit unit = ExportUnit::Centimetre;
   ExportUp up = ExportUp::Y;
   ExportSpace space = ExportSpace::Head;

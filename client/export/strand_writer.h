@@ -36,6 +36,7 @@ class StrandWriter {
 };
 
 /// Make the writer of each format; the rest shape is written as frame 0. `strands` must outlive them.
+Result<std::unique_ptr<StrandWriter>> make_abc_writer(const ExportOptions& options, const StrandSet& strands);
 Result<std::unique_ptr<StrandWriter>> make_usda_writer(const ExportOptions& options,
                                                        const StrandSet& strands);
 Result<std::unique_ptr<StrandWriter>> make_ply_writer(const ExportOptions& options, const StrandSet& strands);

@@ -1,4 +1,4 @@
-// Makes the page's files what the server has of them (server/net/page.h): names with a hash of the content where the
+// Makes the page's files what programs have of them (common/page/page_files.h): names with a hash of the content where the
 // browser may keep them for good, and everything compressed besides.
 //   node client/web/pack_page.mjs OUT.cpp INDEX.html STYLE.css SCRIPT.js FIRST.wasm STEP.wasm WHOLE.wasm
 // Of the index, @ASSETS@ becomes {"core", "stepCore", "wholeCore"} with the names of the modules, as JSON in an attribute, and
@@ -75,7 +75,7 @@ const rows = files.map((file) => `    {"${file.path}", "${MEDIA_TYPES[file.ext]}
     ${literal(file.brotli)}},
 `);
 fs.writeFileSync(out, `// Made by client/web/pack_page.mjs.
-#include "server/net/page.h"
+#include "common/page/page_files.h"
 
 namespace strandcast {
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace strandcast {
 namespace {
@@ -22,7 +23,62 @@ std::array<float, 4> weights_at(CurveBasis basis, float u) {
   return {};
 }
 
+Status check(const KnotCurve& curve) {
+  const size_t count = curve.control.size();
+  if (curve.order < 2 || curve.order > kMaxCurveOrder || count < curve.order)
+    return make_error(ErrorCode::BadInput, "{} control points of order {}, allowed are orders 2 to {}", count,
+                      curve.order, kMaxCurveOrder);
+  if (curve.knots.size() != count + curve.order || (!curve.weights.empty() && curve.weights.size() != count))
+    return make_error(ErrorCode::BadInput, "{} knots and {} weights for {} control points of order {}",
+                      curve.knots.size(), curve.weights.size(), count, curve.order);
+  for (size_t i = 0; i < curve.knots.size(); ++i) {
+    if (!std::isfinite(curve.knots[i]) || (i > 0 && curve.knots[i] < curve.knots[i - 1]))
+      return make_error(ErrorCode::BadInput, "knot {} is {}: knots may not fall", i, curve.knots[i]);
+  }
+  if (!(curve.knots[curve.order - 1] < curve.knots[count]))
+    return make_error(ErrorCode::BadInput, "its knots are all {}", curve.knots[count]);
+  for (const double weight : curve.weights) {
+    if (!(weight > 0.0) || !std::isfinite(weight))
+      return make_error(ErrorCode::BadInput, "a weight is {}, it has to be above 0", weight);
+  }
+  return {};
+}
+
+/// The point at a parameter within knots[k] and knots[k + 1]: de Boor's triangle, with weights as a fourth
+/// coordinate.
+glm::dvec3 point_at(const KnotCurve& curve, size_t k, double t) {
+  const size_t degree = curve.order - 1;
+  std::array<glm::dvec4, kMaxCurveOrder> point;
+  for (size_t j = 0; j <= degree; ++j) {
+    const size_t i = k - degree + j;
+    const double weight = curve.weights.empty() ? 1.0 : curve.weights[i];
+    point[j] = glm::dvec4(glm::dvec3(curve.control[i]), 1.0) * weight;
+  }
+  for (size_t round = 1; round <= degree; ++round) {
+    for (size_t j = degree; j >= round; --j) {
+      const double low = curve.knots[k - degree + j], high = curve.knots[k + 1 + j - round];
+      const double blend = high > low ? (t - low) / (high - low) : 0.0;
+      point[j] = glm::mix(point[j - 1], point[j], blend);
+    }
+  }
+  return glm::dvec3(point[degree]) / point[degree].w;
+}
+
 }  // namespace
+
+Result<std::vector<glm::vec3>> points_on_curve(const KnotCurve& curve) {
+  RETURN_IF_ERROR(check(curve));
+  const size_t count = curve.control.size();
+  const double begin = curve.knots[curve.order - 1], end = curve.knots[count];
+  std::vector<glm::vec3> on_curve;
+  size_t k = curve.order - 1;
+  for (size_t i = 0; i < count; ++i) {
+    const double t = begin + (end - begin) * static_cast<double>(i) / static_cast<double>(count - 1);
+    while (k + 1 < count && curve.knots[k + 1] <= t) ++k;
+    on_curve.emplace_back(point_at(curve, k, t));
+  }
+  return on_curve;
+}
 
 Result<std::vector<glm::vec3>> points_on_curve(std::span<const glm::vec3> control, CurveBasis basis,
                                                CurveEnds ends) {

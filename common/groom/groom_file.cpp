@@ -7,6 +7,7 @@
 
 #include "common/base/text.h"
 #include "common/base/units.h"
+#include "common/groom/abc_loader.h"
 #include "common/groom/hair_loader.h"
 #include "common/groom/ply_loader.h"
 #include "common/groom/resample.h"
@@ -70,8 +71,6 @@ std::string way_out_of(const std::filesystem::path& path, const std::string& ext
   if (is_binary_usd || extension == ".usdz")
     return "this is USD in binary or packed: make text of it ('usdcat IN -o hair.usda', or export .usda from "
            "Blender or Houdini)";
-  if (extension == ".abc")
-    return "Alembic is not read: import it in Blender or Houdini and export its curves as .usda";
   return {};
 }
 
@@ -86,13 +85,15 @@ Result<StatedGroom> load_by_extension(const std::filesystem::path& path, const G
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (extension == ".tfx") return unstated(path, load_tfx(path));
   if (extension == ".hair") return unstated(path, load_hair(path));
+  if (extension == ".abc") return load_abc(path);
   if (extension == ".ply") return load_ply(path, options.strand_vertex_count);
   if (const std::string way_out = way_out_of(path, extension); !way_out.empty())
     return at(path.string(), make_error(ErrorCode::Unsupported, "{}", way_out));
   if (extension == ".usda" || extension == ".usd") return load_usda(path);
-  return at(path.string(),
-            make_error(ErrorCode::Unsupported,
-                       "unknown groom file extension '{}', known: .tfx, .hair, .ply, .usda", extension));
+  return at(
+      path.string(),
+      make_error(ErrorCode::Unsupported,
+                 "unknown groom file extension '{}', known: .tfx, .hair, .ply, .usda, .abc", extension));
 }
 
 uint32_t target_vertex_count(const Groom& groom, uint32_t wanted) {

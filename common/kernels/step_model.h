@@ -112,6 +112,8 @@ struct StepTrail {
   std::shared_ptr<const StepModel> model;
   std::shared_ptr<const StepScene> scene;
   std::vector<StepTick> ticks;  // successive ones, the newest last, no more than kMostTrailTicks
+  /// SharedUpdate::number of the viewers' state from which the strands were stepped; 0 = none.
+  uint64_t shared = 0;
 };
 
 /// Colliders of head space under this bust.

@@ -17,6 +17,8 @@
 
 namespace strandcast {
 
+struct SharedUpdate;  // shared_strands.h
+
 /// One state as two messages: for viewers that follow the chain and for viewers that join it.
 struct JoinFrames {
   EncodedFramePtr frame;     // what everybody else needs
@@ -38,6 +40,9 @@ class StrandEncoder {
   /// Encodes like encode() and also makes a keyframe for late joiners. After either frame a decoder decodes
   /// the same deltas. When the chain begins, both are the same keyframe.
   virtual JoinFrames encode_for_join(const Snapshot& snapshot) = 0;
+  /// Returns the state that viewers have after the last frame, unless steps of the state before, a tick a
+  /// frame, lead to it as well. Nothing for codecs that do not predict by steps.
+  virtual std::shared_ptr<SharedUpdate> take_shared() { return nullptr; }
 };
 
 /// Decodes one stream of all strands or of the first ones (strand_prefix.h). A keyframe states their number;

@@ -35,6 +35,7 @@ class PrefixEncoder final : public StrandEncoder {
     adopt(snapshot);
     return encoder_->encode_for_join(snapshot);
   }
+  std::shared_ptr<SharedUpdate> take_shared() override { return encoder_->take_shared(); }
 
  private:
   void adopt(const Snapshot& snapshot) {

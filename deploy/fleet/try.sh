@@ -5,7 +5,7 @@
 #   bash deploy/fleet/try.sh [--bin FOLDER] [--viewers N] [--seconds S] [--keep]     --keep: waits for Enter before it stops
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-bin=build/release/bin; viewers=100; seconds=10; keep=
+bin=; viewers=100; seconds=10; keep=
 while [ $# -gt 0 ]; do
   case "$1" in
     --bin) bin=$2; shift ;;
@@ -16,7 +16,11 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-bin=$(realpath "$bin")
+if [ -z "$bin" ]; then  # without a build, the programs of the packages
+  bin=build/release/bin
+  [ -d "$bin" ] || ! installed=$(command -v strandcast-load) || bin=$(dirname "$installed")
+fi
+bin=$(realpath -m "$bin")
 export PATH=$PATH:/usr/sbin:/sbin
 for program in munged slurmctld slurmd sbatch haproxy python3; do
   command -v $program > /dev/null || { echo "try.sh: $program is not installed: apt-get install munge slurmctld slurmd slurm-client haproxy python3" >&2; exit 2; }

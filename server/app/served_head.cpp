@@ -37,6 +37,7 @@ Status ServedHead::load(OtherHeads others) {
     ASSIGN_OR_RETURN(records_, RecordDesk::make(config_.record, config_.record_folder));
     config_.tap = records_->first_tap();
   }
+  config_.shared = &shared_;
   ASSIGN_OR_RETURN(source_, config_.make_source(config_, inputs_));
   if (const std::optional<SceneDesc> loaded = source_->scene()) scene.camera = loaded->camera;
   const std::shared_ptr<const SceneAsset> asset = source_->asset();
@@ -52,6 +53,7 @@ Status ServedHead::load(OtherHeads others) {
                                           asset,
                                           make_painter(painter, std::move(others)),
                                           {scene.look, scene.camera},
+                                          &shared_,
                                           [this](const auto& other, const LookDesc& look) {
                                             return config_.make_painter({painting_, other, look});
                                           }}));

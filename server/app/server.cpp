@@ -56,7 +56,8 @@ Result<std::unique_ptr<StateSource>> simulation_source(const ServerConfig& confi
                           config.on_publish,
                           config.tap,
                           nullptr,
-                          config.is_lockstep},
+                          config.is_lockstep,
+                          config.shared},
                          inputs);
 }
 

@@ -53,6 +53,7 @@ struct ServerConfig {
   std::optional<RecordConfig> record;         // from the first state on
   std::optional<RecordFolder> record_folder;  // who controls may record into it
   StepTap* tap = nullptr;  // of the simulation from the first step on; set by the server where it records
+  SharedSlot* shared = nullptr;  // of the head; set by the server
 };
 
 struct ServerCounters {

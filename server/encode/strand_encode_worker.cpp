@@ -38,10 +38,11 @@ Snapshot coarsen(const Snapshot& snapshot, uint32_t factor) {
 }
 
 StrandEncodeWorker::StrandEncodeWorker(SnapshotSlot& slot, std::unique_ptr<StrandEncoder> encoder, Sink sink,
-                                       StrandEncodeConfig config)
+                                       StrandEncodeConfig config, SharedSlot* shared)
     : slot_(slot),
       encoder_(std::move(encoder)),
       sink_(std::move(sink)),
+      shared_(shared),
       stream_id_(config.stream_id),
       config_(config),
       thread_([this] { run(); }) {}
@@ -189,6 +190,8 @@ JoinFrames StrandEncodeWorker::encode(const Snapshot& published, const StrandEnc
     const bool is_keyframe = frames.frame != nullptr && frames.frame->header.opcode == Opcode::StrandKeyframe;
     if (is_keyframe) frames.keyframe = frames.frame;
   }
+  if (shared_ != nullptr && shared_->is_wanted() && config.coarsening == 1)
+    if (const auto update = encoder_->take_shared()) shared_->put(std::move(*update));
   count(frames, static_cast<double>(now_ns() - begin_ns) * kMsPerNs, audience);
   return frames;
 }

@@ -14,6 +14,7 @@
 #include "common/gl/pass_list.h"
 #include "common/strands/frame_header.h"
 #include "common/strands/strand_codec.h"
+#include "server/publish/shared_slot.h"
 #include "server/publish/snapshot_slot.h"
 
 namespace strandcast {
@@ -63,9 +64,10 @@ class StrandEncodeWorker {
   /// 1. A state that is encoded again for joiners while nothing moves gets a new sequence number.
   using Sink = std::function<void(EncodedFramePtr)>;
 
-  /// Starts the thread. `slot` must outlive the worker.
+  /// Starts the thread. `slot` must outlive the worker, and so must `shared`, which gets the strands that
+  /// viewers have (null: nobody).
   StrandEncodeWorker(SnapshotSlot& slot, std::unique_ptr<StrandEncoder> encoder, Sink sink,
-                     StrandEncodeConfig config = {});
+                     StrandEncodeConfig config = {}, SharedSlot* shared = nullptr);
   /// Ends the thread after the current encode.
   ~StrandEncodeWorker();
   StrandEncodeWorker(const StrandEncodeWorker&) = delete;
@@ -107,6 +109,7 @@ class StrandEncodeWorker {
   SnapshotSlot& slot_;
   std::unique_ptr<StrandEncoder> encoder_;
   Sink sink_;
+  SharedSlot* const shared_;
   const uint16_t stream_id_;
 
   mutable std::mutex config_mutex_;

@@ -222,17 +222,20 @@ void InputHub::remove_source(uint64_t source_id) {
   forget(wind_, source_id);
 }
 
-/// Moves the frame's pose to the asked time; true when a jump between samples was passed on the way.
-bool InputHub::update_pose(int64_t server_time_ns) {
+/// Where the head is at the asked time, as its source says.
+InputHub::SeenHead InputHub::see_head(int64_t server_time_ns) {
   const auto& samples = motion_.track.samples();
-  if (samples.empty()) return false;
+  SeenHead seen{frame_.world_from_head};
+  if (samples.empty()) return seen;
   const auto delay = motion_.owner ? delays_ns_.find(*motion_.owner) : delays_ns_.end();
   const int64_t delay_ns = delay != delays_ns_.end() ? delay->second : 0;
-  const int64_t time_ns = steadied_ns(motion_.clock.to_source_ns(server_time_ns) - delay_ns, server_time_ns);
+  const int64_t asked_ns = motion_.clock.to_source_ns(server_time_ns) - delay_ns;
+  seen.is_silent = is_silent(asked_ns, delay_ns);
+  const int64_t time_ns = steadied_ns(asked_ns, server_time_ns);
   const size_t index = motion_.track.index_at(time_ns);
-  bool has_jumped = false;
   // Everything older than the last frame's sample is gone from the track, so this looks at each pair once.
-  for (size_t i = 0; i < index; ++i) has_jumped = has_jumped || is_teleport(samples[i], samples[i + 1]);
+  for (size_t i = 0; i < index; ++i)
+    seen.has_jumped = seen.has_jumped || is_teleport(samples[i], samples[i + 1]);
 
   const bool interpolates = index + 1 < samples.size() && time_ns > samples[index].time_ns &&
                             !is_teleport(samples[index], samples[index + 1]);
@@ -252,13 +255,24 @@ bool InputHub::update_pose(int64_t server_time_ns) {
   }
   // Both signs are the same rotation; consecutive frames keep to one so that their difference is small.
   if (glm::dot(pose.rotation, frame_.world_from_head.rotation) < 0.0) pose.rotation = -pose.rotation;
-  frame_.world_from_head = pose;
-  has_jumped = has_caught_up(interpolates ? time_ns : samples[index].time_ns, server_time_ns) || has_jumped;
-  has_jumped = std::exchange(motion_.is_cut, false) || has_jumped;
+  seen.pose = pose;
+  seen.time_ns = interpolates ? time_ns : samples[index].time_ns;
+  seen.has_caught_up = has_caught_up(seen.time_ns, server_time_ns);
+  seen.has_jumped = std::exchange(motion_.is_cut, false) || seen.has_jumped;
   frame_.motion_time_ns = samples[newest].arrival_ns;
   note_used(samples[newest].arrival_ns, samples[newest].time_ns + motion_.clock.offset_ns());
   motion_.track.use(index, newest);
-  return has_jumped;
+  return seen;
+}
+
+/// True where samples are later than they have been of late, of a source whose samples are shown evenly.
+/// Others are held from sample to sample.
+bool InputHub::is_silent(int64_t time_ns, int64_t delay_ns) const {
+  const double usual_ns = std::max(motion_.usual_spacing_ns, motion_.usual_wait_ns);
+  const bool is_even = kMostSteadiedSpacings * usual_ns <= static_cast<double>(kMostSteadiedNs) ||
+                       usual_ns <= static_cast<double>(delay_ns);
+  const auto late_ns = static_cast<double>(time_ns - motion_.track.samples().back().time_ns);
+  return usual_ns > 0.0 && is_even && late_ns > steady_delay_ns_ + kUnseenLateNs;
 }
 
 /// The time to show: as late behind `time_ns` as samples have been of late. A steady source is as late in
@@ -302,11 +316,24 @@ int64_t InputHub::source_time_ns(int64_t arrival_ns) const {
   return found != used_samples_.rend() ? found->made_ns : 0;
 }
 
-void InputHub::finish_teleport_check(const Pose& before, int64_t server_time_ns, bool has_jumped) {
+/// Moves the frame's head to where it is seen, or eases it there. Strands are carried through a jump.
+void InputHub::show_head(const SeenHead& seen, int64_t server_time_ns) {
   const double passed_s =
       last_frame_ns_ ? static_cast<double>(server_time_ns - *last_frame_ns_) * kSPerNs : kTeleportShortestS;
   const double travel_s = std::clamp(passed_s, kTeleportShortestS, kTeleportLongestS);
-  frame_.has_teleported = has_jumped || is_teleport(before, frame_.world_from_head, travel_s);
+  Pose& head = frame_.world_from_head;
+  const bool is_silent = seen.is_silent && easing_.knows_speed();
+  const bool has_jumped = seen.has_jumped || (!is_silent && is_teleport(head, seen.pose, travel_s));
+  const double since_s = static_cast<double>(seen.time_ns - heard_ns_) * kSPerNs;
+  if (has_jumped)
+    easing_.restart(head = seen.pose);
+  else if (is_silent)
+    head = easing_.coast(std::clamp(passed_s, 0.0, kTeleportLongestS));
+  else
+    head = easing_.follow(seen.pose, std::max(since_s, kTeleportShortestS), std::max(passed_s, 0.0));
+  if (!is_possible(head)) easing_.restart(head = seen.pose);  // at the edge of the world
+  if (has_jumped || !is_silent) heard_ns_ = seen.time_ns;
+  frame_.has_teleported = has_jumped || seen.has_caught_up;
   if (frame_.has_teleported) ++counters_.teleports;
 }
 
@@ -327,14 +354,14 @@ InputFrame InputHub::sample(int64_t server_time_ns) {
   const std::lock_guard lock(mutex_);
   const int64_t now_ns = bounded(server_time_ns);
   if (held_) take_held(now_ns);
-  const Pose before = frame_.world_from_head;
+  // The first pose replaces none: strands must not be dragged there from the origin.
   const bool is_first = !frame_.has_motion && !motion_.track.samples().empty();
-  const bool has_jumped = update_pose(now_ns);
+  SeenHead seen = see_head(now_ns);
+  const bool has_left = std::exchange(has_left_, false);
+  seen.has_jumped = seen.has_jumped || is_first || has_left;
   frame_.has_motion = frame_.has_motion || is_first;
   frame_.motion_speed = motion_speed_;
-  // The first pose replaces none: strands must not be dragged there from the origin.
-  const bool has_left = std::exchange(has_left_, false);
-  finish_teleport_check(before, now_ns, has_jumped || is_first || has_left);
+  show_head(seen, now_ns);
   frame_.is_motion_stale = !motion_.owner || now_ns - motion_.accepted_ns > kMotionStaleNs;
 
   const auto& winds = wind_.track.samples();

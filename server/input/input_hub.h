@@ -10,9 +10,9 @@
 //   it is removed or silent for kMotionStaleNs / kWindStaleNs. Meanwhile samples of others are refused.
 // * Between two samples the pose is interpolated (lerp, slerp). If no sample is later, the newest is held, so
 //   that live feeding adds no delay. Samples that arrive unevenly are shown as late as the latest of the last
-//   seconds (kSteadyShrink), so that the head's speed does not jump from frame to frame. Without motion for
-//   kMotionStaleNs the frame is marked stale and the last pose stays. Without wind for kWindStaleNs the
-//   scene's own wind returns.
+//   seconds (kSteadyShrink), so that the head's speed does not jump from frame to frame. Where samples are
+//   later than that, the head slows to rest, and eases back once they come (head_easing.h). Without motion
+//   for kMotionStaleNs the frame is marked stale. Without wind for kWindStaleNs the scene's own wind returns.
 // * Refused and counted: samples not newer than the newest one used, duplicates, impossible values, more than
 //   kMaxSampleRateHz per source and kind, more than kMaxInputSources sources. Buffers are bounded; the oldest
 //   samples are dropped first.
@@ -37,6 +37,7 @@
 
 #include "common/wire/messages.h"
 #include "server/input/clock_map.h"
+#include "server/input/head_easing.h"
 #include "server/input/held_inputs.h"
 #include "server/input/input_frame.h"
 #include "server/input/sample_track.h"
@@ -145,11 +146,20 @@ class InputHub {
   void restart(Stream<Value>& stream);
   template <class Value>
   void note_spacing(Stream<Value>& stream);
-  bool update_pose(int64_t server_time_ns);
+  /// What its source says of the head at a time.
+  struct SeenHead {
+    Pose pose;
+    int64_t time_ns = 0;         // of the pose, by its source's clock
+    bool is_silent = false;      // nothing of this time
+    bool has_jumped = false;     // strands are carried there
+    bool has_caught_up = false;  // of more motion than time passed
+  };
+  SeenHead see_head(int64_t server_time_ns);
+  bool is_silent(int64_t time_ns, int64_t delay_ns) const;
+  void show_head(const SeenHead& seen, int64_t server_time_ns);
   int64_t steadied_ns(int64_t time_ns, int64_t server_time_ns);
   bool has_caught_up(int64_t shown_ns, int64_t server_time_ns);
   void note_used(int64_t arrival_ns, int64_t made_ns);
-  void finish_teleport_check(const Pose& before, int64_t server_time_ns, bool has_jumped);
 
   void take(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns);
   void take(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns);
@@ -168,10 +178,12 @@ class InputHub {
   int64_t newest_arrival_ns_ = 0;
   std::optional<int64_t> last_frame_ns_;
   std::optional<int64_t> shown_ns_;  // time of the head's source that the last frame shows
-  double steady_delay_ns_ = 0.0;     // by which uneven samples are shown later
-  bool has_left_ = false;            // the source that drove the head, since the last frame
-  double motion_speed_ = 1.0;        // as the owner said last
-  InputFrame frame_;                 // the last one given out
+  HeadEasing easing_;
+  int64_t heard_ns_ = 0;          // SeenHead::time_ns of the last that was not silent
+  double steady_delay_ns_ = 0.0;  // by which uneven samples are shown later
+  bool has_left_ = false;         // the source that drove the head, since the last frame
+  double motion_speed_ = 1.0;     // as the owner said last
+  InputFrame frame_;              // the last one given out
   InputCounters counters_;
 };
 

@@ -14,12 +14,6 @@ namespace {
 constexpr int64_t kSettleNs = 500 * kMsInNs;
 constexpr double kDrainingShare = 0.95;
 
-/// The first class from `first` on that costs no more than is allowed, or the last.
-size_t affordable_class(size_t first, std::span<const double> costs, double allowed_bytes_per_s) {
-  while (allowed_bytes_per_s > 0.0 && first + 1 < costs.size() && costs[first] > allowed_bytes_per_s) ++first;
-  return first;
-}
-
 /// Whether frames wait for decoding; where nothing is known of it, it may be that.
 bool is_viewer_busy(const ClassChoice::Question& question) {
   const std::span<const double> shares = question.decode_shares;
@@ -32,6 +26,11 @@ int64_t curable_ns(const ClassChoice::Question& question, const ClassChoice::Del
 }
 
 }  // namespace
+
+size_t affordable_class(size_t first, std::span<const double> costs, double allowed_bytes_per_s) {
+  while (allowed_bytes_per_s > 0.0 && first + 1 < costs.size() && costs[first] > allowed_bytes_per_s) ++first;
+  return first;
+}
 
 void ClassChoice::on_delay(const Delay& delay, int64_t time_ns) {
   delays_.push_back({time_ns, delay});

@@ -33,6 +33,10 @@ inline constexpr int64_t kLongestProbeNs = 60'000 * kMsInNs;
 /// Time after a change to a better class in which trouble counts as a failed try.
 inline constexpr int64_t kProbationNs = 5'000 * kMsInNs;
 
+/// Returns the first class from `first` on that costs no more than is allowed, else the last; `first` if
+/// `allowed_bytes_per_s` is 0 (unknown).
+size_t affordable_class(size_t first, std::span<const double> costs, double allowed_bytes_per_s);
+
 class ClassChoice {
  public:
   /// Resets the observations, because other frames follow.

@@ -63,15 +63,28 @@ void FlowControl::expect_decodes(const Classes& classes, size_t chosen) {
     decode_ns = static_cast<int64_t>(factor * static_cast<double>(decode_ns));
 }
 
-size_t FlowControl::choose_class(const Classes& classes, int64_t time_ns) {
-  const size_t present = classes.present;
-  if (classes.costs.size() < 2 || (has_acks_ && link_.last_ack_ns() == 0)) return present;
+/// 0 = unknown.
+double FlowControl::allowed_bytes_per_s(const Classes& classes, int64_t time_ns) const {
   const double cap = classes.cap_bytes_per_s;
   const double capacity = link_.capacity_bytes_per_s(time_ns);
   const double usable = kUsableShare * capacity;
-  const double allowed = cap <= 0.0 ? usable : capacity > 0.0 ? std::min(usable, cap) : cap;
+  return cap <= 0.0 ? usable : capacity > 0.0 ? std::min(usable, cap) : cap;
+}
+
+size_t FlowControl::begin_codec(const Classes& classes, int64_t time_ns) {
+  decodes_ns_.clear();
+  choice_ = {};
+  choice_.start_over(time_ns);
+  return affordable_class(0, classes.costs, allowed_bytes_per_s(classes, time_ns));
+}
+
+size_t FlowControl::choose_class(const Classes& classes, int64_t time_ns) {
+  const size_t present = classes.present;
+  if (classes.costs.size() < 2 || (has_acks_ && link_.last_ack_ns() == 0)) return present;
+  const double allowed = allowed_bytes_per_s(classes, time_ns);
   const std::vector<double> shares = decode_shares(classes);
-  const size_t chosen = choice_.choose({present, classes.costs, allowed, cap, has_acks_, shares}, time_ns);
+  const size_t chosen =
+      choice_.choose({present, classes.costs, allowed, classes.cap_bytes_per_s, has_acks_, shares}, time_ns);
   if (chosen != present) expect_decodes(classes, chosen);
   return chosen;
 }

@@ -60,6 +60,10 @@ class FlowControl {
   };
   /// Returns the class to use and notes it as the present one; call it often.
   size_t choose_class(const Classes& classes, int64_t time_ns);
+  /// Returns the class with which another codec begins: the best that the link carries, as far as costs and
+  /// link are known. Forgets what the frames of the codec before have shown of decoding and of better
+  /// classes.
+  size_t begin_codec(const Classes& classes, int64_t time_ns);
 
   /// Returns the queueing delay according to the newest acknowledgement.
   int64_t queue_delay_ns() const { return queue_delay_ns_; }
@@ -71,6 +75,7 @@ class FlowControl {
   int64_t oldest_due_ns(int64_t time_ns) const { return gate_.oldest_due_ns(time_ns); }
 
  private:
+  double allowed_bytes_per_s(const Classes& classes, int64_t time_ns) const;
   std::vector<double> decode_shares(const Classes& classes) const;
   void expect_decodes(const Classes& classes, size_t chosen);
 

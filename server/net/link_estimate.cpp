@@ -38,7 +38,7 @@ int64_t LinkEstimate::on_acked(const AckedFrame& frame, int64_t time_ns) {
   note_look(arrived_ns);
   const int64_t round_trip_ns = time_ns - frame.sent_ns;
   const int64_t known_base_ns = round_trips_.empty() ? round_trip_ns : base_ns();
-  note_capacity(frame, round_trip_ns, time_ns);
+  note_capacity(frame, taken_ns(frame, arrived_ns, time_ns), time_ns);
   note_busy_frame(frame, arrived_ns, time_ns);
   const int64_t own_ns = transfer_ns(frame.bytes, time_ns);
   // Alone on its way a frame waits for nothing: what is left is the bare link, which may have become longer.
@@ -103,11 +103,18 @@ int64_t LinkEstimate::base_ns() const {
   return round_trips_.empty() ? 0 : static_cast<int64_t>(round_trips_.front().value);
 }
 
-void LinkEstimate::note_capacity(const AckedFrame& frame, int64_t round_trip_ns, int64_t time_ns) {
+/// How much longer the frame took than something small. What the client did before it acknowledged does not
+/// count.
+int64_t LinkEstimate::taken_ns(const AckedFrame& frame, int64_t arrived_ns, int64_t time_ns) const {
+  const int64_t by_answer_ns = time_ns - frame.sent_ns - base_ns() - frame.client.decode_ns;
+  if (!has_client_clock_ || ways_.empty()) return by_answer_ns;
+  return std::min(by_answer_ns, arrived_ns - frame.sent_ns - shortest_way_ns());
+}
+
+void LinkEstimate::note_capacity(const AckedFrame& frame, int64_t taken_ns, int64_t time_ns) {
   // A large frame that met nothing on its way shows the rate by how much longer it took than something small.
   // One that took about as long as expected shows nothing new, least of all a short one.
   if (frame.is_large && frame.was_alone && !round_trips_.empty()) {
-    const int64_t taken_ns = round_trip_ns - base_ns() - frame.client.decode_ns;
     const int64_t duration_ns = std::max(taken_ns, kLeastTransferNs);
     const bool is_known = seen_rate_ && seen_rate_->time_ns >= time_ns - capacity_age_ns_;
     const auto bytes = static_cast<double>(frame.bytes);

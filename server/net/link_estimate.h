@@ -67,7 +67,8 @@ class LinkEstimate {
   int64_t arrival_ns(const AckedFrame& frame, int64_t time_ns);
   void note_look(int64_t arrived_ns);
   int64_t shortest_way_ns() const;
-  void note_capacity(const AckedFrame& frame, int64_t round_trip_ns, int64_t time_ns);
+  void note_capacity(const AckedFrame& frame, int64_t taken_ns, int64_t time_ns);
+  int64_t taken_ns(const AckedFrame& frame, int64_t arrived_ns, int64_t time_ns) const;
   void note_busy_frame(const AckedFrame& frame, int64_t arrived_ns, int64_t time_ns);
   double busy_bytes_per_s(int64_t time_ns) const;
 

@@ -1,29 +1,13 @@
-// The page for browsers: files embedded at build time (client/web), and the decision how a request for one is
-// answered. Pure functions on untrusted text, any thread; nothing here sends.
+// How a request for a file of the page is answered. Pure functions on untrusted text, any thread; nothing here
+// sends.
 #pragma once
 
-#include <span>
 #include <string>
 #include <string_view>
 
+#include "common/page/page_files.h"
+
 namespace strandcast {
-
-/// Whether a file's name changes with its content, so that a browser may cache it permanently.
-enum class PageFileName { Fixed, Hashed };
-
-struct PageFile {
-  std::string_view path = {};  // "/", "/app.0123456789.js"
-  std::string_view media_type = {};
-  std::string_view version = {};  // of its content: letters and digits
-  PageFileName name = PageFileName::Fixed;
-  std::string_view plain = {};
-  std::string_view gzip = {};
-  std::string_view brotli = {};
-};
-using PageFiles = std::span<const PageFile>;  // without the page: none
-
-/// Returns the files embedded in this program.
-PageFiles built_in_page();
 
 /// Returns a request's target up to '?'; the query may hold anything and must not be logged.
 std::string_view path_of_target(std::string_view target);

@@ -199,10 +199,18 @@ void Session::change_codec(const CodecAnswer& answer) {
   codec_ = answer.name;
   context_.count(&NetCounters::codec_changes);
   const bool has_strands = subscription_.gets(StreamMode::Strands);
+  const int64_t time_ns = now_ns();
+  // Codecs differ in cost by far more than neighbouring classes do.
+  const std::vector<double> costs = head().strands.bytes_per_s(answer.codec);
+  if (!is_relay() && (answer.codec == 0 || !costs.empty()))
+    subscription_.strands.strand_class =
+        flow_.begin_codec({subscription_.strands.strand_class, costs,
+                           context_.config.limits.viewer_bytes_per_s, head().strands.classes()},
+                          time_ns);
   if (has_strands) queue_.restart_strands();
   head().handler.on_change(id_, SubscriptionChange::Strands);
   announce_quality(answer.reason);
-  if (has_strands) ask_for_keyframe(now_ns());
+  if (has_strands) ask_for_keyframe(time_ns);
 }
 
 void Session::announce_quality(const std::string& reason) {

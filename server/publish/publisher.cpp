@@ -88,8 +88,8 @@ size_t Publisher::place_in_blocks(uint32_t strand_index, uint32_t vertex) const 
   return (size_t{block} * vertex_count_ + vertex) * kBlockStrands + strand_index % kBlockStrands;
 }
 
-void Publisher::read(Solver& solver) {
-  blocks_ = solver.read_blocks();
+void Publisher::read(const SolverBlocks& state) {
+  blocks_ = state;
   for (const StrandBlocksView& blocks : {blocks_.position_m, blocks_.velocity_mps})
     CHECK(blocks.strand_count == strand_count_ && blocks.row_count == vertex_count_);
 }

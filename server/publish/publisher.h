@@ -64,7 +64,9 @@ class Publisher {
     return quantise(input);
   }
   /// Reads the state back to the processor; waits for the device.
-  void read(Solver& solver);
+  void read(Solver& solver) { read(solver.read_blocks()); }
+  /// Takes a state that is there already.
+  void read(const SolverBlocks& blocks);
   /// Makes the snapshot from what read() returned: quarantine, head space, lattice. The solver must not have
   /// been called in between.
   std::shared_ptr<const Snapshot> quantise(const PublishInput& input);

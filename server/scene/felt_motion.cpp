@@ -6,16 +6,21 @@
 
 namespace strandcast {
 
-HeadMovement FeltMotion::feel(const HeadMovement& moved, bool is_cut, double step_s) {
+double felt_share(double rate) {
+  return rate <= 1.0 ? 1.0 : 1.0 / (rate * rate);
+}
+
+HeadMovement FeltMotion::feel(const HeadMovement& moved, double share, bool is_cut, double step_s) {
+  const HeadMovement at_pace{share * moved.shift_m, share * moved.turn_rad};
+  share_ = 0.0;
   if (is_cut) {
     unknown_steps_ = kStepsAfterCut;
     seen_ = {};
-    share_ = 0.0;
     return felt_;
   }
   if (unknown_steps_ > 0) {
-    seen_.shift_m += moved.shift_m;
-    seen_.turn_rad += moved.turn_rad;
+    seen_.shift_m += at_pace.shift_m;
+    seen_.turn_rad += at_pace.turn_rad;
     if (--unknown_steps_ > 0) return felt_;
     constexpr double kShare = 1.0 / kStepsAfterCut;
     beyond_ = {kShare * seen_.shift_m - felt_.shift_m, kShare * seen_.turn_rad - felt_.turn_rad};
@@ -23,11 +28,12 @@ HeadMovement FeltMotion::feel(const HeadMovement& moved, bool is_cut, double ste
     return felt_;
   }
   passed_s_ = std::min(passed_s_ + step_s, kFeltChangeS);
-  share_ = ease(passed_s_ / kFeltChangeS);
-  felt_ = moved;
-  if (share_ < 1.0) {
-    felt_.shift_m -= (1.0 - share_) * beyond_.shift_m;
-    felt_.turn_rad -= (1.0 - share_) * beyond_.turn_rad;
+  const double of_change = ease(passed_s_ / kFeltChangeS);
+  share_ = share * of_change;
+  felt_ = at_pace;
+  if (of_change < 1.0) {
+    felt_.shift_m -= (1.0 - of_change) * beyond_.shift_m;
+    felt_.turn_rad -= (1.0 - of_change) * beyond_.turn_rad;
   }
   return felt_;
 }

@@ -66,10 +66,6 @@ std::vector<GustWave> make_gust_waves(const WindDesc& wind) {
   return waves;
 }
 
-double felt_share(double rate) {
-  return rate <= 1.0 ? 1.0 : 1.0 / (rate * rate);
-}
-
 StepBuilder::StepBuilder(const SceneDesc& scene, std::vector<SphereCollider> colliders)
     : groom_gravity_in_head_mps2_(scene.gravity_mps2) {
   world_from_head_.position_m = scene.place_m;
@@ -185,10 +181,9 @@ void StepBuilder::begin(const InputFrame& input, double end_time_s, double input
   // The first pose is a jump too: until then the head stood at its place.
   const bool has_jumped = input.has_motion && (input.has_teleported || !has_motion_);
   const double step_s = 1.0 / scene_.step_rate_hz;
-  const Pose from = place_before(target, has_jumped, felt_share(input_rate * input.motion_speed));
+  const Pose from = place_before(target, has_jumped, input_rate * input.motion_speed);
   step_.carried_to_rotation.reset();
-  const bool is_carried = felt_ < 1.0 || felt_motion_.share() < 1.0;
-  if (input.has_motion && is_carried) step_.carried_to_rotation = from.rotation;
+  if (input.has_motion && felt_motion_.share() < 1.0) step_.carried_to_rotation = from.rotation;
   has_motion_ = has_motion_ || input.has_motion;
 
   const auto count = static_cast<double>(step_.substeps.size());
@@ -219,18 +214,14 @@ void StepBuilder::begin(const InputFrame& input, double end_time_s, double input
   move_bust(input, has_jumped);
 }
 
-/// Where the head was before the step, as strands feel it: `share` of its way, and after a cut that a source
-/// made, no sudden change of speed.
-Pose StepBuilder::place_before(const Pose& target, bool has_jumped, double share) {
+/// Where the head was before the step, as strands feel it. `rate`: of the motion per simulated time.
+Pose StepBuilder::place_before(const Pose& target, bool has_jumped, double rate) {
+  felt_ = has_jumped ? 0.0 : felt_share(rate);
   const HeadMovement moved{target.position_m - world_from_head_.position_m,
                            turn_between(world_from_head_.rotation, target.rotation)};
-  const HeadMovement felt = felt_motion_.feel(has_jumped ? HeadMovement{} : moved, input_.has_teleported,
-                                              1.0 / scene_.step_rate_hz);
-  felt_ = has_jumped ? 0.0 : share;
-  if (felt_motion_.share() < 1.0)
-    return {target.position_m - share * felt.shift_m, turned(target.rotation, -share * felt.turn_rad)};
-  if (has_jumped) return target;
-  return share < 1.0 ? interpolate(world_from_head_, target, 1.0 - share) : world_from_head_;
+  const HeadMovement felt = felt_motion_.feel(moved, felt_, input_.has_teleported, 1.0 / scene_.step_rate_hz);
+  if (felt_motion_.share() == 1.0) return world_from_head_;
+  return {target.position_m - felt.shift_m, turned(target.rotation, -felt.turn_rad)};
 }
 
 /// Neck and chest of the step, before what collides is placed.

@@ -25,12 +25,6 @@ struct SceneStep {
   std::optional<glm::dquat> carried_to_rotation;
 };
 
-/// Returns the share of the head's motion in a step that strands feel; they are carried along with the rest.
-/// It is 1 if inputs pass no faster than simulated time. At input rate `rate` it is 1 / rate^2, so that
-/// accelerations keep their true size: a step covers `rate` steps of motion, which would scale them by rate^2
-/// and make hair stand on end.
-double felt_share(double rate);
-
 class StepBuilder {
  public:
   /// Starts with a scene; `colliders` are in head space.
@@ -77,7 +71,7 @@ class StepBuilder {
 
  private:
   bool has_bust() const { return bust_rig_.exists() && scene_.colliders.empty(); }
-  Pose place_before(const Pose& target, bool has_jumped, double share);
+  Pose place_before(const Pose& target, bool has_jumped, double rate);
   void move_bust(const InputFrame& input, bool has_jumped);
 
   SceneDesc scene_;
@@ -97,7 +91,7 @@ class StepBuilder {
   std::vector<BodyCapsule> capsules_;  // as of the newest step
   std::vector<std::string> missing_joints_;
   bool is_body_new_ = true;  // its shapes are not those of the step before
-  double felt_ = 1.0;        // of the step
+  double felt_ = 1.0;        // share of the step's motion, by its pace
   SceneStep step_;
   InputFrame input_;                         // of the step
   std::vector<double> end_time_s_;           // of each substep

@@ -28,9 +28,9 @@ double StepLog::step_cost() const {
   return cost + kForcesCost + kVolumeCost / (scene_ == nullptr ? 1.0 : scene_->substeps);
 }
 
-std::shared_ptr<const StepTrail> StepLog::trail() const {
+std::shared_ptr<const StepTrail> StepLog::trail(uint64_t shared) const {
   if (model_ == nullptr || scene_ == nullptr) return nullptr;
-  return std::make_shared<StepTrail>(StepTrail{model_, scene_, ticks_});
+  return std::make_shared<StepTrail>(StepTrail{model_, scene_, ticks_, shared});
 }
 
 }  // namespace strandcast

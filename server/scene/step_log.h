@@ -17,8 +17,8 @@ class StepLog {
   void add(const StepTick& tick);
   /// Returns StepKernel::cost of the model; 0 without one.
   double step_cost() const;
-  /// Returns the current trail; nullptr while there is no model.
-  std::shared_ptr<const StepTrail> trail() const;
+  /// Returns the current trail, with StepTrail::shared; nullptr while there is no model.
+  std::shared_ptr<const StepTrail> trail(uint64_t shared = 0) const;
 
  private:
   std::shared_ptr<const StepModel> model_;

@@ -11,8 +11,8 @@
 namespace strandcast {
 
 inline constexpr double kTinyLengthM = 1e-10;
-/// Number of rounds of resolving contacts with a field or body: at least two, and more while this much
-/// penetration remains.
+/// Number of rounds of resolving contacts with a field or body, at most. With a body at least two, and more
+/// while this much penetration remains.
 inline constexpr int kMostRounds = 5;
 inline constexpr double kResidueM = 5e-5;
 /// Displacement beyond which an end moved by the middle's rotation is checked again; it may have met

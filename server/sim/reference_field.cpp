@@ -11,6 +11,8 @@ namespace {
 /// So much nearer than in the groom is no contact yet.
 constexpr double kFieldSlackM = 1e-6;
 constexpr double kLeastSlope = 0.5;
+/// Rounds go on until the end is so near to its clearance, from either side.
+constexpr double kFieldResidueM = 2e-6;
 
 /// The nearest part of the skin as a plane that a point is in front of.
 struct FieldContact {
@@ -41,8 +43,8 @@ glm::dvec3 after_friction(const glm::dvec3& before_m, const glm::dvec3& end_m, c
   const glm::dvec3 slip = end_m - before_m;
   const glm::dvec3 sliding = slip - glm::dot(slip, contact.normal) * contact.normal;
   const double way_m = glm::length(sliding);
-  if (way_m <= friction * contact.depth_m) return end_m - sliding;
-  return end_m - friction * contact.depth_m / way_m * sliding;
+  const double hold_m = friction * std::max(0.0, contact.depth_m);
+  return way_m <= hold_m ? end_m - sliding : end_m - hold_m / way_m * sliding;
 }
 
 }  // namespace
@@ -86,14 +88,18 @@ bool keep_out_of(const DistanceField& field, const ReferenceFieldStrand& strand)
         for (int round = 0; round < kMostRounds; ++round) {
           const DistanceField::Sample found = sampled(end);
           const FieldContact contact = contact_of(found, clearance_m);
-          if (!(clearance_m - found.distance_m > (round < 2 ? 0.0 : kResidueM))) break;
+          const double short_m = clearance_m - found.distance_m;
+          if (!(round == 0 ? short_m > 0.0 : std::abs(short_m) > kFieldResidueM)) break;
           const glm::dvec3 held = after_friction(carried(strand.before_m[i]), end, contact, strand.friction);
           end = start + segment_at_height(held - start, contact.normal, length_m,
                                           glm::dot(end - start, contact.normal) + contact.depth_m);
         }
-        const FieldContact cut = contact_of(sampled(0.5 * (start + end)), middle_clearance_m);
+        const glm::dvec3 middle = 0.5 * (start + end);
+        const FieldContact cut = contact_of(sampled(middle), middle_clearance_m);
         if (!(cut.depth_m > 0.0)) break;
-        end = start + segment_at_height(end - start, cut.normal, length_m,
+        const glm::dvec3 middle_before = carried(0.5 * (strand.before_m[i - 1] + strand.before_m[i]));
+        const glm::dvec3 held = after_friction(middle_before, middle, cut, strand.friction);
+        end = start + segment_at_height(held - start, cut.normal, length_m,
                                         glm::dot(end - start, cut.normal) + 2.0 * cut.depth_m);
         if (!(cut.depth_m > kLookAgainM)) break;
       }

@@ -24,9 +24,10 @@ struct ReferenceFieldStrand {
   BustInput bust = {};
 };
 
-/// Rotates segments about their starts until end and middle have their clearance: two rounds for the end,
-/// then one for the middle. Lengths are kept, and friction holds the ends. The part beyond a moved vertex
-/// follows it towards its former position. Returns false if nothing had to move.
+/// Rotates segments about their starts until end and middle have their clearance: rounds for the end, until
+/// it is there from either side, then one for the middle. Lengths are kept, and friction holds ends and
+/// middles. The part beyond a moved vertex follows it towards its former position. Returns false if nothing
+/// had to move.
 bool keep_out_of(const DistanceField& field, const ReferenceFieldStrand& strand);
 
 /// Samples the field of the skin in the bust's pose: distance and its gradient at a place.

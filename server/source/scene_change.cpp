@@ -144,6 +144,17 @@ Result<SceneDesc> choose_solver(const SceneDesc& scene, const SolverDesc& scene_
   return fitted;
 }
 
+namespace {
+
+/// An override is told as the server's option that makes it, which nobody gave here.
+Error without_option(Error error) {
+  constexpr std::string_view kOption = "--set ";
+  if (error.place.starts_with(kOption)) error.place.erase(0, kOption.size());
+  return error;
+}
+
+}  // namespace
+
 Result<SceneDesc> change_scene(const SceneDesc& scene, const std::string& assignment) {
   const std::string path = assignment.substr(0, assignment.find_first_of("= "));
   const std::vector<std::string>& fields = live_fields();
@@ -153,7 +164,9 @@ Result<SceneDesc> change_scene(const SceneDesc& scene, const std::string& assign
   if (!is_live)
     return make_error(ErrorCode::BadInput, "'{}' cannot change while running (known: {})", path,
                       fmt::join(fields, ", "));
-  ASSIGN_OR_RETURN(SceneDesc changed, with_overrides(scene, {assignment}));
+  auto with_change = with_overrides(scene, {assignment});
+  if (!with_change) return without_option(with_change.error());
+  SceneDesc changed = std::move(*with_change);
   // What is loaded stays: a quality that is chosen now meets the head as it is.
   changed.head.collider = scene.head.collider;
   if (changed.solver.name != scene.solver.name) fit_to_solver(changed);

@@ -24,6 +24,7 @@
 #include "common/wire/messages.h"
 #include "server/input/input_hub.h"
 #include "server/publish/publisher.h"
+#include "server/publish/shared_slot.h"
 #include "server/scene/input_clock.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/sim_clock.h"
@@ -54,7 +55,8 @@ struct SimLoopConfig {
   // Both outlive the loop. With either every step is published, and nothing is left out for want of readers.
   StepTap* tap = nullptr;  // from the first step on; the loop puts set_tap()'s in its place
   StepScript* script = nullptr;
-  bool is_lockstep = false;  // simulated time goes on by commands only
+  bool is_lockstep = false;      // simulated time goes on by commands only
+  SharedSlot* shared = nullptr;  // strands that viewers have; may be null
   int64_t longest_steps_ns = kLongestStepsNs;
 };
 
@@ -174,6 +176,10 @@ class SimLoop {
   void sleep_through();
   bool is_counting() const { return static_cast<bool>(steps_reply_); }
   int64_t next_step_ns(int64_t time_ns) const;
+  bool shares() const;
+  void follow_viewers();
+  void leave_viewers();
+  StageTurn turn();
   void take_input(int64_t time_ns);
   void carry_step();
   void catch_up();
@@ -205,6 +211,7 @@ class SimLoop {
   std::shared_ptr<const Snapshot> carried_;  // the state that goes with the head, where nothing is simulated
   std::optional<StepBuilder> builder_;
   StepLog step_log_;  // for a codec that predicts by steps
+  SharedHair shared_hair_;
   std::optional<Publisher> publisher_;
   std::optional<SimClock> clock_;
   std::optional<InputClock> input_clock_;

@@ -97,6 +97,7 @@ std::optional<Notice> SimLoop::command(const ControlCommand& command, const Job&
       steps_begin_tick_ = tick_;
       return std::nullopt;
     case Command::Reset:
+      shared_hair_.drop(tick_);
       if (const Status status = solver_->load(config_.content->groom, builder_->world_from_head().rotation);
           !status)
         return Notice{true, status.error().to_string()};
@@ -170,6 +171,7 @@ Status SimLoop::reshape(const SceneDesc& scene, const SceneFeatures& features,
 void SimLoop::take_content(std::shared_ptr<const SceneContent> content) {
   config_.content = std::move(content);
   builder_->set_bust(config_.content->bust);
+  shared_hair_.drop(tick_);
   solver_.reset();
   is_behind_ = false;
   carried_.reset();
@@ -213,6 +215,7 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
   ASSIGN_OR_RETURN(const SolverParameters parameters, moving_parameters(*row, scene));
   catch_up();
+  if (solver_ != nullptr) leave_viewers();
   const SimulatedPart part = simulated_part(scene, facts_, config_.content->groom);
   const bool are_followed = !part.is_all();
   const bool are_kept = !are_followed && solver_ != nullptr && solver_->strands() != nullptr;

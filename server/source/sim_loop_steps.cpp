@@ -51,6 +51,7 @@ void SimLoop::sleep_through() {
 /// The solver's strands, which have stood still, go along to where the head is now.
 void SimLoop::catch_up() {
   if (!std::exchange(is_behind_, false)) return;
+  leave_viewers();
   solver_->rebase(builder_->world_from_head().rotation);
 }
 
@@ -71,10 +72,44 @@ void SimLoop::find_head(int64_t time_ns) {
 /// Strands go on from where they went along with the head, as fast as it.
 void SimLoop::wake() {
   catch_up();
+  leave_viewers();
   const bool has_path = head_path_.size() > 1 && input_.has_motion && !input_.has_teleported;
   const double passed_s = static_cast<double>(head_path_.size() - 1) / config_.scene.step_rate_hz;
   move_with_head(*solver_,
                  has_path ? head_motion(head_path_.front(), head_path_.back(), passed_s) : HeadMotion{});
+}
+
+/// Returns whether the simulation goes on from the viewers' strands. Recordings and steps by commands must
+/// not depend on who watches.
+bool SimLoop::shares() const {
+  return config_.shared != nullptr && !is_recorded() && !config_.is_lockstep && !config_.on_publish &&
+         !solver_features_.is_carried && executor_->info().device == SimDevice::Lanes;
+}
+
+/// Before a step: takes over the viewers' strands if the encoder has handed them over.
+void SimLoop::follow_viewers() {
+  if (config_.shared == nullptr) return;
+  config_.shared->set_wanted(shares());
+  std::optional<SharedUpdate> update = config_.shared->take();
+  if (!shares()) return leave_viewers();
+  if (!update) return;
+  if (const auto trail = step_log_.trail())
+    shared_hair_.follow(std::move(*update), *trail, config_.scene.step_rate_hz);
+}
+
+/// The solver goes on with the strands as they are.
+void SimLoop::leave_viewers() {
+  shared_hair_.leave(*solver_, builder_->world_from_head().rotation, tick_);
+}
+
+StageTurn SimLoop::turn() {
+  StageTurn turn(*builder_, *solver_, *publisher_);
+  if (!shared_hair_.is_active()) return turn;
+  turn.shared = &shared_hair_;
+  turn.tick = tick_;
+  turn.step_rate_hz = config_.scene.step_rate_hz;
+  turn.features = &solver_features_;
+  return turn;
 }
 
 void SimLoop::take_input(int64_t time_ns) {
@@ -114,10 +149,11 @@ void SimLoop::step(int64_t time_ns) {
     return;
   }
   take_input(time_ns);
+  follow_viewers();
   ++tick_;
   if (solver_features_.is_carried) return carry_step();
   const double end_time_s = static_cast<double>(tick_) / config_.scene.step_rate_hz;
-  StageTurn turn(*builder_, *solver_, *publisher_);
+  StageTurn turn = this->turn();
   turn.input = input_;
   turn.end_time_s = end_time_s;
   turn.input_rate = input_rate_;
@@ -160,11 +196,11 @@ void SimLoop::publish_carried() {
 
 void SimLoop::publish() {
   catch_up();
-  StageTurn turn(*builder_, *solver_, *publisher_);
+  StageTurn turn = this->turn();
   PublishInput& input = turn.publish;
   input = publish_input();
   step_log_.set_scene(builder_->step_scene(solver_features_));
-  if (!solver_features_.is_carried) input.trail = step_log_.trail();
+  if (!solver_features_.is_carried) input.trail = step_log_.trail(shared_hair_.number());
   CHECK(stages_->publish(turn).ok());  // likewise
   std::shared_ptr<const Snapshot> snapshot = std::move(turn.snapshot);
   if (solver_features_.is_carried) carried_ = snapshot;
@@ -174,6 +210,7 @@ void SimLoop::publish() {
   published_tick_ = tick_;
   ++published_count_;
   if (publisher_->quarantined().empty()) return;
+  leave_viewers();
   publisher_->repair(*solver_);
   report_quarantine();
 }

@@ -28,6 +28,7 @@ class Stage final : public gl::Pass<StageTurn> {
 };
 
 void carry(StageTurn& turn) {
+  if (turn.shared != nullptr) return;  // a tick says it
   const SceneStep& step = turn.builder.step();
   if (step.carried_to_rotation && !turn.is_carried) turn.solver.rebase(*step.carried_to_rotation);
   turn.is_carried = true;
@@ -35,10 +36,15 @@ void carry(StageTurn& turn) {
 
 void gather_volume(StageTurn& turn) {
   carry(turn);
-  turn.solver.gather(turn.builder.step().substeps.front());
+  if (turn.shared == nullptr) turn.solver.gather(turn.builder.step().substeps.front());
 }
 
 void run_substeps(StageTurn& turn) {
+  if (turn.shared != nullptr) {
+    turn.shared->step(turn.builder.step_tick(turn.tick), turn.builder.step_scene(*turn.features),
+                      turn.step_rate_hz);
+    return;
+  }
   carry(turn);
   const SceneStep& step = turn.builder.step();
   for (const StepInput& substep : step.substeps) {
@@ -77,8 +83,9 @@ void SimStages::plan_publish(const FeatureReason& follows) {
   if (follows.value) read.push_back(&followed_);
   add({"publish/follow", {state_.get()}, {&followed_}, follows.value, follows.reason},
       [](StageTurn& turn) { turn.solver.follow_guides(); });
-  add({"publish/read", read, {&host_state_}, true, {}},
-      [](StageTurn& turn) { turn.publisher.read(turn.solver); });
+  add({"publish/read", read, {&host_state_}, true, {}}, [](StageTurn& turn) {
+    turn.publisher.read(turn.shared != nullptr ? turn.shared->read_blocks() : turn.solver.read_blocks());
+  });
   add({"publish/quantise", {&host_state_}, {&snapshot_}, true, {}}, [](StageTurn& turn) {
     turn.publish.head_velocity_mps = turn.builder.head_velocity_mps();
     turn.snapshot = turn.publisher.quantise(turn.publish);

@@ -13,6 +13,7 @@
 #include "common/scene/features.h"
 #include "server/input/input_frame.h"
 #include "server/publish/publisher.h"
+#include "server/scene/shared_hair.h"
 #include "server/scene/step_builder.h"
 #include "server/sim/solver.h"
 
@@ -32,9 +33,14 @@ struct StageTurn : gl::PassTurn {
   Publisher& publisher;
   // A step takes
   InputFrame input;
-  double end_time_s = 0.0;                         // of the step, simulated
-  double input_rate = 1.0;                         // InputClock::rate()
-  bool is_carried = false;                         // strands went along with a jump of the head
+  double end_time_s = 0.0;  // of the step, simulated
+  double input_rate = 1.0;  // InputClock::rate()
+  bool is_carried = false;  // strands went along with a jump of the head
+  // Steps the strands instead of the solver, and needs the three after it; may be null.
+  SharedHair* shared = nullptr;
+  uint64_t tick = 0;
+  double step_rate_hz = 0.0;
+  const SceneFeatures* features = nullptr;
   const std::atomic<bool>* is_stopping = nullptr;  // looked at between substeps; may be null
   // Publishing takes, besides how the head moved in the newest step,
   PublishInput publish;

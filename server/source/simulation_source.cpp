@@ -24,8 +24,8 @@ class SimulationSource : public StateSource {
     return newest != nullptr ? newest : asset_;
   }
   Status start(StateSink& sink, const StreamDesc& stream) override {
-    SimLoopConfig config{config_.scene, content_,       config_.device,     config_.on_publish,
-                         config_.tap,   config_.script, config_.is_lockstep};
+    SimLoopConfig config{config_.scene, content_,       config_.device,      config_.on_publish,
+                         config_.tap,   config_.script, config_.is_lockstep, config_.shared};
     config.scene.stream = stream;
     ASSIGN_OR_RETURN(loop_, SimLoop::start(std::move(config), inputs_, sink));
     return {};

@@ -19,6 +19,7 @@ struct SimulationConfig {
   StepTap* tap = nullptr;
   StepScript* script = nullptr;
   bool is_lockstep = false;  // simulated time goes on by commands only
+  SharedSlot* shared = nullptr;
 };
 
 /// Checks and loads the scene; start() opens the executor. `inputs` must outlive the source.

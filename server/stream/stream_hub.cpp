@@ -194,7 +194,7 @@ StrandEncodeWorker& StreamHub::encoder(uint16_t stream_id) {
   (*made)->set_rest_shape(asset_->rest_position_m);
   auto worker = std::make_unique<StrandEncodeWorker>(
       slot_, std::move(*made), [this](const EncodedFramePtr& frame) { give_strands(frame); },
-      encode_config(stream_id));
+      encode_config(stream_id), stream_id == 0 ? config_.shared : nullptr);
   return *(encoders_[stream_id] = std::move(worker));
 }
 

@@ -30,6 +30,7 @@ struct StreamHubConfig {
   std::shared_ptr<const SceneAsset> asset;
   MakePicturePainter make_painter;  // called when somebody wants pictures
   LookChange look = {};             // that the painters are made with
+  SharedSlot* shared = nullptr;     // gets what viewers of all strands have; may be null
   /// Makes a new `make_painter` after a change of rest shape; empty if the shape never changes.
   std::function<MakePicturePainter(const std::shared_ptr<const SceneAsset>&, const LookDesc&)> painter_of =
       {};

@@ -1,11 +1,11 @@
 // The head as a distance field (common/groom/distance_field.h) that strands collide with: after a substep of any
 // model, a segment whose end or middle is nearer to the skin than its clearance is turned about its start, at its
-// length, until it is not; two rounds or more for the end, then one for the middle, and both once more where that
-// one was large. The clearance is half a millimetre, or what the groom itself has there: strands of real grooms
-// begin inside, and nothing pops. Friction holds the end against sliding over the skin. What hangs on it follows
-// the leader to where the model put it. Seen from the head throughout, so the skin moves with it, and the bust's with
-// the chest (sim/bust.glsl); what a vertex is moved by counts as an impulse, once in its velocity. One invocation per
-// strand; what touches nothing is not written, not by a rounding either.
+// length, until it is not: rounds for the end, until it is there from either side, then one for the middle, and both
+// once more where that one was large. The clearance is half a millimetre, or what the groom itself has there: strands
+// of real grooms begin inside, and nothing pops. Friction holds end and middle against sliding over the skin. What hangs
+// on it follows the leader to where the model put it. Seen from the head throughout, so the skin moves with it, and the
+// bust's with the chest (sim/bust.glsl); what a vertex is moved by counts as an impulse, once in its velocity. One
+// invocation per strand; what touches nothing is not written, not by a rounding either.
 #include "sim/carried.glsl"
 #include "sim/turned_segment.glsl"
 
@@ -31,11 +31,12 @@ const float kSlack = 1e-6;
 // Distances between nodes change by at most so much per way.
 const float kMostSlope = 1.3;
 const float kLeastSlopeSquared = 0.25;
-// Two rounds, and more where so much is left: at ears and noses, whose sides are near.
+// Rounds until no more than so much is left, either way: skin is round, and bends where a bust is turned.
 const int kMostRounds = 5;
-const float kResidue = 5e-5;
+const float kResidue = 2e-6;
 // An end that the middle's turn moved by more than twice this may have met something else.
 const float kLookAgain = 2e-4;
+const float kFarFromBend = 1e6;
 
 // xyz = gradient, w = distance: trilinear between nodes, of the skin at rest.
 vec4 sample_at_rest(vec3 point) {
@@ -74,7 +75,30 @@ vec4 sample_field(vec3 point) {
   return found;
 }
 
+// How far the place is from where neck and skin bend: there distances change faster than kMostSlope says. Head and
+// chest, where they are rigid, end at planes.
+float way_to_bend(vec3 point) {
+  float way = kFarFromBend;
+  if (u_step.bust[2].w > 0.0) {
+    const vec3 pivot = u_step.bust[2].xyz;
+    const vec4 turn = u_step.bust[0];
+    const vec4 share = u_step.bust[3];
+    const float down = share.w - dot(share.xyz, point);
+    const vec3 rest = pivot + turned_by_part(point - pivot, 1.0, -turn.xyz, turn.w);
+    const float down_at_rest = share.w - dot(share.xyz, rest);
+    way = max(-down, min(down, down_at_rest - 1.0)) * inversesqrt(max(dot(share.xyz, share.xyz), kTinySquared));
+  }
+  return way;
+}
+
 float clearance_at(vec3 groomed) { return min(kClearance, sample_at_rest(groomed).w - kSlack); }
+
+// Where what lay on the skin before the substep is now.
+vec3 carried_by_bust(vec3 before) {
+  vec3 carried = before;
+  if (u_step.bust[2].w > 0.0) carried = moved_with_bust(before);
+  return carried;
+}
 
 vec3 normal_of(vec4 found) { return found.xyz * inversesqrt(max(dot(found.xyz, found.xyz), kTinySquared)); }
 
@@ -90,6 +114,7 @@ void main() {
   uint at = (u_step.shape.z - 1u) * stride + strand;
   vec3 placed_start = in_head(texelFetch(u_position, int(at)).xyz);  // by the model
   vec3 start = placed_start;
+  vec3 start_before = start;
   float room = 0.0;  // that the start has to the skin, at least
   for (uint i = u_step.shape.z; i < u_step.shape.y; ++i) {
     at += stride;
@@ -106,27 +131,28 @@ void main() {
       const vec3 direction = select(squared > kTinySquared, along * (segment * inversesqrt(squared)), edge);
       end = select(is_led, start + direction, end);
     }
+    const vec3 stored = texelFetch(u_before, int(at)).xyz;
+    const vec3 before = select(is_broken(stored), end, stored);
 
     room -= kMostSlope * segment;
     const lane_bool is_near = room < kClearance && has_length;
     lane_bool is_open = is_near;
     for (int attempt = 0; attempt < 2 && is_any(is_open); ++attempt) {
       vec4 found = sample_field(end);
-      room = select(is_open, found.w, room);
+      room = select(is_open, min(found.w, way_to_bend(end)), room);
       lane_bool is_deep = is_open && found.w < kClearance;
       if (is_any(is_deep)) {
         const lane_bool was_deep = is_deep;
         const float clearance = clearance_at(texelFetch(u_rest, int(at)).xyz);
-        vec3 before = texelFetch(u_before, int(at)).xyz;
-        before = select(is_broken(before), end, before);
-        if (u_step.bust[2].w > 0.0) before = moved_with_bust(before);
+        is_deep = is_deep && found.w < clearance;
+        const vec3 was = carried_by_bust(before);
         for (int round = 0; round < kMostRounds; ++round) {
           if (round > 0) found = sample_field(end);
-          is_deep = is_deep && found.w < (round < 2 ? clearance : clearance - kResidue);
+          is_deep = is_deep && (round == 0 || abs(clearance - found.w) > kResidue);
           if (!is_any(is_deep)) break;
           const vec3 normal = normal_of(found);
           const float depth = depth_of(found, clearance);
-          const vec3 held = held_back(before, end, normal, u_step.contact.x * depth);
+          const vec3 held = held_back(was, end, normal, u_step.contact.x * max(depth, 0.0));
           const float height = dot(normal, end - start) + depth;
           end = select(is_deep, turned_to_height(start, held - start, segment, normal, height), end);
         }
@@ -135,7 +161,8 @@ void main() {
 
       is_open = is_open && room < 0.5 * kMostSlope * segment + kClearance;
       if (!is_any(is_open)) break;
-      const vec4 below = sample_field(0.5 * (start + end));
+      const vec3 middle = 0.5 * (start + end);
+      const vec4 below = sample_field(middle);
       is_open = is_open && below.w < kClearance;
       if (!is_any(is_open)) break;
       const float clearance =
@@ -143,8 +170,10 @@ void main() {
       is_open = is_open && below.w < clearance;
       const vec3 normal = normal_of(below);
       const float depth = depth_of(below, clearance);
+      const vec3 held =
+          held_back(carried_by_bust(0.5 * (start_before + before)), middle, normal, u_step.contact.x * depth);
       const float height = dot(normal, end - start) + 2.0 * depth;
-      end = select(is_open, turned_to_height(start, end - start, segment, normal, height), end);
+      end = select(is_open, turned_to_height(start, held - start, segment, normal, height), end);
       room = select(is_open, min(room, 0.0), room);
       is_open = is_open && depth > kLookAgain;
     }
@@ -162,5 +191,6 @@ void main() {
     b_before.value[at] = vec4(end, 0.0);
     placed_start = place;
     start = end;
+    start_before = before;
   }
 }

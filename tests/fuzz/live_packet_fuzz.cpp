@@ -7,7 +7,7 @@ namespace strandcast::live_packet_fuzz {
 namespace {
 
 constexpr const char* kProtocols[] = {"opentrack", "freed", "natnet", "vrpn", "livelinkface"};
-constexpr const char* kVersions[] = {"", "3.0", "4.0", "4.1"};
+constexpr const char* kVersions[] = {"", "3.0", "4.0", "4.1", "2.5", "2.9"};
 
 /// A stream says the same however it is cut, unless a piece was refused.
 void check_cuts(const LiveParserConfig& config, std::span<const std::byte> stream, size_t piece) {

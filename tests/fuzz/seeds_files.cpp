@@ -3,9 +3,11 @@
 
 #include "common/scene/scene_file.h"
 #include "tests/fuzz/seed_folder.h"
+#include "tests/support/made_abc.h"
 #include "tests/support/proxy_header.h"
 #include "tests/support/sample_asset.h"
 #include "tests/support/sample_recording.h"
+#include "tests/support/temporary_folder.h"
 
 namespace strandcast {
 namespace {
@@ -104,6 +106,42 @@ void add_curves(const SeedFolder& seeds) {
             "point3f[] points = [(0,0,0), (0,0,1)] token outputs:x } }\n");
 }
 
+void add_alembic(const SeedFolder& seeds) {
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder.path() / "seed.abc";
+  const std::vector<int16_t> guides = {1, 0};
+  const std::vector<float> widths = {0.1f, 0.05f}, knots = {0, 0, 0, 0, 1, 2, 2, 2, 2};
+  const std::vector<glm::vec2> values = {{0.25f, 0.5f}, {0.75f, 1.0f}};
+  const std::vector<uint32_t> indices = {1, 0};
+  {
+    test::MadeAbc file(path);
+    seeds.add("abc", "linear", file.finish({file.curves({})}, "unit_m=0.01;up_axis=Z"));
+  }
+  {
+    test::MadeAbc file(path);
+    test::MadeCurves moving;
+    moving.shift = {0, 1, 2};
+    auto source = file.xform({0x10, 0x40, 0x20, 0x00}, {1, 0, 0, 90, 0, 1, 0, 45, 1, 2, 1}, true,
+                             {file.curves(moving, {file.param("width", AbcType::Float, 1, widths, "uni")},
+                                          {file.param("groom_guide", AbcType::I16, 1, guides, "uni"),
+                                           file.param("groom_root_uv", AbcType::Float, 2, values)})});
+    source.name = "source";
+    seeds.add("abc", "instance", file.finish({std::move(source), file.instance("copy", "/source")}));
+  }
+  for (const uint8_t type : {uint8_t{0}, uint8_t{2}}) {
+    test::MadeAbc file(path);
+    test::MadeCurves spline;
+    spline.kinds = {type, 0, 2, 2};
+    spline.counts = {5};
+    std::vector<AbcEntry> own = {file.entry(".knots", AbcForm::Array, AbcType::Float, 1, knots)};
+    if (type == 2)
+      own.push_back(file.entry(".orders", AbcForm::Array, AbcType::U8, 1, std::array{uint8_t{4}}));
+    own.push_back(test::MadeAbc::compound("uv", {file.param(".vals", AbcType::Float, 2, values),
+                                                 file.param(".indices", AbcType::U32, 1, indices)}));
+    seeds.add("abc", type == 0 ? "bspline" : "orders", file.finish({file.curves(spline, std::move(own))}));
+  }
+}
+
 void add_texts(const SeedFolder& seeds) {
   const std::string bvh =
       "HIERARCHY\nROOT Hips\n{\n OFFSET 9 9 9\n CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation "
@@ -164,6 +202,7 @@ void add_recordings(const SeedFolder& seeds) {
 void add_file_seeds(const SeedFolder& seeds) {
   add_grooms(seeds);
   add_curves(seeds);
+  add_alembic(seeds);
   add_texts(seeds);
   add_recordings(seeds);
 }

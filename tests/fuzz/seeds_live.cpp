@@ -101,7 +101,7 @@ void add_live_packets(const SeedFolder& seeds) {
   add(kOpentrack, 0, "opentrack", {places, cut(places, 1), test::opentrack({NAN, 0, 0, 1e308, 0, 0})});
   const Bytes camera = test::freed({2, {10, 20, 30}, {100, 200, 300}});
   add(kFreed, 1, "freed", {camera, with(camera, 28, 0), with(camera, 0, 0xD0), cut(camera, 1)});
-  for (const std::string version : {"3.1", "4.0", "4.1"}) {
+  for (const std::string version : {"2.5", "2.9", "3.1", "4.0", "4.1"}) {
     test::NatnetPacket frame;
     frame.version = version;
     frame.bodies = {{2, {1, 2, 3}, {0, 0, 0, 1}, true}, {3, {1, 2, 3}, {0, 0, 0, 0}, false}};

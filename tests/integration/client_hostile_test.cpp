@@ -18,7 +18,7 @@
 #include "tests/support/sample_asset.h"
 #include "tests/support/sanitizers.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/tools/load_viewers.h"
+#include "tests/tools/load/load_viewers.h"
 
 namespace strandcast::client_hostile_test {
 namespace {

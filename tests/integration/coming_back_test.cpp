@@ -9,7 +9,10 @@
 
 #include "client/app/ctl_commands.h"
 #include "client/app/headless_view.h"
+#include "client/app/latency_command.h"
 #include "client/app/live_connection.h"
+#include "client/app/live_states.h"
+#include "client/app/parameter_command.h"
 #include "client/app/steady_client.h"
 #include "client/app/view_report.h"
 #include "common/strands/strand_codec.h"
@@ -26,6 +29,8 @@ using test::config_for;
 using test::FakePeer;
 using test::FakeServer;
 using test::make_welcome;
+using testing::ContainsRegex;
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 constexpr uint32_t kStrands = 20;
@@ -34,6 +39,7 @@ constexpr uint32_t kVertices = 8;
 EncodedFramePtr keyframe(uint64_t tick) {
   Snapshot snapshot;
   snapshot.tick = tick;
+  snapshot.sim_time_ns = static_cast<int64_t>(tick) * 10'000'000;
   snapshot.strand_count = kStrands;
   snapshot.vertex_count = kVertices;
   snapshot.quantum_m = 1e-4f;
@@ -180,6 +186,67 @@ TEST(ComingBack, AMonitorComesBack) {
   EXPECT_THAT(printed, HasSubstr("not connected"));
   EXPECT_EQ(code, kDoneExit);
   EXPECT_EQ(door.count(), 2u);
+}
+
+TEST(ComingBack, AWatchOfParametersComesBack) {
+  std::atomic<bool> stop{false};
+  const auto list = [](const char* value) { return ParameterList{{{"hair.wind", value}}, 1}; };
+  const Door door({[&](FakePeer& peer) {
+                     peer.welcome(make_welcome(kStrands, kVertices));
+                     if (peer.read_until<ParameterRequest>()) peer.send(list("1"));
+                     peer.read_until<Ping>();
+                     peer.reset();
+                   },
+                   [&](FakePeer& peer) {
+                     peer.welcome(make_welcome(kStrands, kVertices));
+                     if (peer.read_until<ParameterRequest>()) peer.send(list("2"));
+                     peer.read_until<Ping>();
+                     stop = true;
+                     peer.read_to_end();
+                   }});
+  testing::internal::CaptureStdout();
+  const int code = run_params(target_of(door.port()), {"hair.", true}, stop);
+  const std::string printed = testing::internal::GetCapturedStdout();
+  EXPECT_THAT(printed, ContainsRegex("hair.wind +1"));
+  EXPECT_THAT(printed, ContainsRegex("hair.wind +2"));
+  EXPECT_EQ(code, kDoneExit);
+}
+
+TEST(ComingBack, AnExportGoesOnAndSaysHowLongTheServerWasAway) {
+  const std::atomic<bool> stop{false};
+  const Door door({[](FakePeer& peer) {
+                     peer.welcome(make_welcome(kStrands, kVertices));
+                     peer.send(stream_list());
+                     peer.send(*asset_frame());
+                     peer.send(*keyframe(1));
+                     peer.read_until<Ping>();
+                   },
+                   [](FakePeer& peer) { serve(peer, 2); }});
+  const auto states = LiveStates::open(config_for(door.port()), stop);
+  ASSERT_TRUE(states) << states.error().to_string();
+  EXPECT_TRUE((*states)->remarks().empty());
+  for (const uint64_t tick : {1, 2}) {
+    const auto state = (*states)->next();
+    ASSERT_TRUE(state) << state.error().to_string();
+    EXPECT_EQ((*state)->tick, tick);
+  }
+  EXPECT_THAT((*states)->remarks(), ElementsAre(HasSubstr("was away")));
+}
+
+TEST(ComingBack, ALatencyCountsConnections) {
+  const std::atomic<bool> stop{false};
+  const Door door({[](FakePeer& peer) {
+                     peer.welcome(make_welcome(kStrands, kVertices));
+                     peer.send(stream_list());
+                     peer.send(*asset_frame());
+                     peer.send(*keyframe(1));
+                     peer.read_until<Ping>();
+                   },
+                   [](FakePeer& peer) { serve(peer, 2); }});
+  testing::internal::CaptureStdout();
+  const int code = run_latency(target_of(door.port()), {.seconds = 2.0}, stop);
+  EXPECT_THAT(testing::internal::GetCapturedStdout(), HasSubstr("reconnects 1"));
+  EXPECT_EQ(code, kDoneExit);
 }
 
 /// Of the answers that are final each ends a viewer at once.

@@ -13,7 +13,7 @@
 #include "tests/support/eventually.h"
 #include "tests/support/lacks_gl.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/tools/load_viewers.h"
+#include "tests/tools/load/load_viewers.h"
 
 namespace strandcast::process_faults_test {
 namespace {

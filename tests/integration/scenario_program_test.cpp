@@ -82,6 +82,28 @@ TEST_F(ScenarioProgram, AnExpectationThatFailsIsExitCodeOneWithEvidence) {
   EXPECT_TRUE(std::filesystem::exists(folder_.path() / "out/bad_server.log"));
 }
 
+// What was measured comes first, then what was wanted, where, and what helps.
+TEST_F(ScenarioProgram, AStretchThatFailsSaysWhereAndWhatHelps) {
+  const auto path = write("soft.textproto",
+                          "name: \"soft\"\n"
+                          "do { start { set: \"groom.procedural.strand_count=20\" set: \"solver.name=xpbd\" "
+                          "set: \"solver.parameters.stretch_compliance_m_per_n=1\" lockstep: true } }\n"
+                          "do { view { name: \"a\" } }\n"
+                          "do { feed { motion: \"shake\" } }\n"
+                          "do { step: 60 }\n"
+                          "do { expect { stretch_below: 0.1 } }\n"
+                          "do { expect { stretch_below: 1e-6 } }\n");
+  EXPECT_EQ(run({"--scenario", path.string()}), 1) << text_of("said");
+  const std::string where = ", at strand [0-9]+, from vertex [0-9]+ to [0-9]+, [0-9.]+ s .state [0-9]+.: ";
+  EXPECT_THAT(text_of("said"),
+              testing::ContainsRegex("FAIL  line 6    stretch of a: measured [0-9.]+ .seen within [0-9.]+., "
+                                     "wanted below 0.1" +
+                                     where + "more substeps, or quality=full"));
+  EXPECT_THAT(text_of("said"), testing::ContainsRegex("wanted below 1e-06" + where +
+                                                      "a stream.bound_m that is [0-9]+ times finer"));
+  EXPECT_THAT(text_of("results.xml"), testing::ContainsRegex("<failure message=\"measured [0-9.]+ .seen"));
+}
+
 // What is needed for the rest is not there: the rest is not done, and the limit ends what would take for
 // ever.
 TEST_F(ScenarioProgram, TroubleEndsAScenarioAndIsAFailure) {

@@ -9,8 +9,11 @@
 #include <optional>
 #include <thread>
 
+#include "common/groom/groom_asset.h"
 #include "common/scene/scene_file.h"
 #include "common/strands/scene_asset.h"
+#include "common/strands/shared_strands.h"
+#include "common/strands/strand_codec.h"
 #include "server/source/sim_loop.h"
 #include "tests/support/server_fixture.h"
 
@@ -374,6 +377,66 @@ TEST(SimLoopJobs, StopDoesNotWaitForTheRestOfTheSubsteps) {
   give_time_to_misbehave();
   loop->stop();
   EXPECT_EQ(loop->stats().last_step_ns, 0) << "the first step was finished";
+}
+
+/// Encodes every state, and tells the simulation what viewers have.
+class EncodingSink final : public LoopSink {
+ public:
+  EncodingSink(SharedSlot& slot, const Groom& groom) : slot_(slot) {
+    encoder_ = make_strand_encoder("step").value();
+    encoder_->set_rest_shape(make_scene_asset(groom, {}).rest_position_m);
+  }
+  void put(std::shared_ptr<const Snapshot> snapshot) override {
+    encoder_->encode(*snapshot);
+    const auto update = encoder_->take_shared();
+    if (update != nullptr && slot_.is_wanted()) slot_.put(*update);
+    shared_ = snapshot->trail == nullptr ? 0 : snapshot->trail->shared;
+    if (shared_ == 0) ++alone_count_;
+    ++count_;
+  }
+  uint64_t shared() const { return shared_; }
+  int count() const { return count_; }
+  int alone_count() const { return alone_count_; }  // states of strands that are not shared
+
+ private:
+  SharedSlot& slot_;
+  std::unique_ptr<StrandEncoder> encoder_;
+  std::atomic<uint64_t> shared_ = 0;
+  std::atomic<int> count_ = 0, alone_count_ = 0;
+};
+
+// With an observer, which stands for a recording, they are not: what is recorded does not hang on viewers.
+TEST(SimLoopShared, StrandsGoOnFromThoseOfViewersUnlessSomebodyRecords) {
+  for (const bool is_observed : {false, true}) {
+    SharedSlot slot;
+    SimLoopConfig config;
+    config.scene = test::small_scene(kStrands, kVertices);
+    config.device.sim_device = "lanes";
+    config.shared = &slot;
+    if (is_observed) config.on_publish = [](const auto&) {};
+    auto content = load_scene_content(config.scene);
+    ASSERT_TRUE(content.ok());
+    config.content = std::make_shared<const SceneContent>(std::move(*content));
+    EncodingSink sink(slot, config.content->groom);
+    InputHub hub;
+    auto loop = SimLoop::start(std::move(config), hub, sink);
+    ASSERT_TRUE(loop.ok()) << loop.error().to_string();
+    const auto wait_for = [&](const auto& holds) {
+      for (int i = 0; i < 2000 && !holds(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      return holds();
+    };
+    if (is_observed) {
+      ASSERT_TRUE(wait_for([&] { return sink.count() > 40; }));
+      EXPECT_EQ(sink.alone_count(), sink.count());
+      continue;
+    }
+    ASSERT_TRUE(wait_for([&] { return sink.shared() != 0; }));
+    const int before = sink.alone_count();
+    const uint64_t number = sink.shared();
+    (*loop)->post(ControlCommand{Command::Reset}, [](const Notice&) {});
+    EXPECT_TRUE(wait_for([&] { return sink.shared() > number; })) << "shared again after the reset";
+    EXPECT_GT(sink.alone_count(), before) << "the reset hair is the solver's";
+  }
 }
 
 }  // namespace

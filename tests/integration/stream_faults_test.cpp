@@ -11,7 +11,7 @@
 #include "common/chaos/chaos_relay.h"
 #include "common/strands/strand_prefix.h"
 #include "tests/support/server_fixture.h"
-#include "tests/tools/load_viewers.h"
+#include "tests/tools/load/load_viewers.h"
 
 namespace strandcast::stream_faults_test {
 namespace {

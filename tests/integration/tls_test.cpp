@@ -15,7 +15,7 @@
 #include "tests/support/server_net_fixture.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_certificate.h"
-#include "tests/tools/load_viewers.h"
+#include "tests/tools/load/load_viewers.h"
 
 namespace strandcast::tls_test {
 namespace {

@@ -21,7 +21,7 @@ for file in share/strandcast/scenes/default.textproto share/strandcast/scenarios
   lib/strandcast/strandcast-fleet share/mime/packages/strandcast.xml lib/systemd/system/strandcast-server.socket; do
   [ -s "$root/$file" ] || fail "$file is not installed"
 done
-for program in server view ctl report; do
+for program in server view ctl report load; do
   name="strandcast-$program"
   "$root/bin/$name" --help >"$work/help" || fail "$name does not run where it was installed"
   # Every option that the program knows is in its page and its completion.

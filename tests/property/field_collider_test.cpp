@@ -185,8 +185,8 @@ TEST_P(FieldOnEveryExecutor, DoesWhatTheLawSaysInDouble) {
   EXPECT_LE(*std::max_element(errors_m.begin(), errors_m.end()), 3e-3);
 }
 
-/// Of a pass under a turned bust against the law for this one: how far 99 of 100 vertices are off at most.
-double error_m(const PassRun& run, const BustInput& bust) {
+/// Of a pass under a turned bust against the law for this one: how far this share of vertices is off at most.
+double error_m(const PassRun& run, const BustInput& bust, double share = 0.99) {
   const StrandLayout& layout = run.layout;
   std::vector<double> errors_m;
   for (uint32_t s = 0; s < layout.strand_count; ++s) {
@@ -200,7 +200,7 @@ double error_m(const PassRun& run, const BustInput& bust) {
       errors_m.push_back(
           glm::distance(glm::dvec3(run.after.position_m[layout.index(i, s)]), kTurned * expected[i]));
   }
-  return quantile(errors_m, 0.99);
+  return quantile(errors_m, share);
 }
 
 TEST_P(FieldOnEveryExecutor, ABustIsWhereTheLawInDoubleHasIt) {
@@ -210,6 +210,17 @@ TEST_P(FieldOnEveryExecutor, ABustIsWhereTheLawInDoubleHasIt) {
   BustInput still = turned_bust();
   still.turn_before = still.turn;
   EXPECT_GT(error_m(run, still), 2e-4) << "a skin that nothing is carried along with";
+}
+
+// Where a neck bends, distances change faster than in a rigid head: whoever passes a vertex over by the way
+// to the skin alone leaves it 3 mm off the law here.
+TEST_P(FieldOnEveryExecutor, NoVertexIsPassedOverWhereTheNeckBends) {
+  BustInput bent = turned_bust();
+  bent.turn = bent.turn_before = {0.0, 0.0, 0.4};
+  const PassRun run =
+      run_pass(executor_, make_hair({.strand_count = 2000, .vertex_count = 12}), 0.8, kFriction, bent);
+  EXPECT_LE(error_m(run, bent, 1.0), 2e-4);
+  EXPECT_GT(error_m(run, turned_bust(), 1.0), 2e-3) << "another bust";
 }
 
 TEST_P(FieldOnEveryExecutor, KeepsLengthsAndWhatModelsKeepBesideVelocities) {

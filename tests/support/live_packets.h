@@ -143,7 +143,7 @@ struct NatnetPacketBody {
   bool is_tracked = true;
 };
 struct NatnetPacket {
-  std::string version = "3.1";  // 3.0, 3.1, 4.0 or 4.1
+  std::string version = "3.1";  // 2.5 to 2.11, 3.0, 3.1, 4.0 or 4.1
   uint32_t frame = 1;
   double time_s = 0;
   std::vector<NatnetPacketBody> bodies;
@@ -161,8 +161,36 @@ inline PacketBytes natnet_message(uint16_t id, const PacketBytes& payload) {
       .bytes();
 }
 
-inline void put_natnet_body(PacketWriter& writer, const NatnetPacketBody& body) {
-  writer.put(body.id).put(body.position_m).put(body.rotation).put(0.0005f).put(uint16_t{body.is_tracked});
+/// 207 for 2.7, 401 for 4.1: numbers that are in the order of the versions.
+inline int natnet_number(const std::string& version) {
+  return 100 * std::stoi(version) + std::stoi(version.substr(version.find('.') + 1));
+}
+
+inline void put_natnet_body(PacketWriter& writer, const NatnetPacketBody& body, const NatnetPacket& packet) {
+  const int number = natnet_number(packet.version);
+  writer.put(body.id).put(body.position_m).put(body.rotation);
+  if (number < 300 && !packet.has_all_kinds) writer.put(uint32_t{0});
+  if (number < 300 && packet.has_all_kinds)  // two markers: places, numbers, sizes
+    writer.put(uint32_t{2})
+        .put(Triple{1, 2, 3})
+        .put(Triple{4, 5, 6})
+        .put(std::array<uint32_t, 2>{7, 8})
+        .put(std::array<float, 2>{0.01f, 0.02f});
+  writer.put(0.0005f);
+  if (number >= 206) writer.put(uint16_t{body.is_tracked});
+}
+
+/// Time and flags, as each version has them.
+inline void put_natnet_end(PacketWriter& frame, const NatnetPacket& packet) {
+  const int number = natnet_number(packet.version);
+  if (number < 300) frame.put(0.004f);  // latency
+  frame.put(uint32_t{0}).put(uint32_t{0});
+  if (number >= 207) frame.put(packet.time_s);
+  if (number == 206) frame.put(static_cast<float>(packet.time_s));
+  if (number >= 300) frame.put(std::array<uint64_t, 3>{1, 2, 3});
+  if (number >= 401) frame.put(std::array<uint32_t, 2>{4, 5});
+  if (number >= 206) frame.put(packet.flags);
+  frame.put(uint32_t{0});
 }
 
 /// How many, from 4.1 their bytes, and they themselves.
@@ -173,12 +201,15 @@ inline void put_natnet_section(PacketWriter& writer, bool is_sized, size_t count
 }
 
 inline PacketBytes natnet(const NatnetPacket& packet) {
-  const bool is_sized = packet.version == "4.1";
+  const int number = natnet_number(packet.version);
+  const bool is_sized = number >= 401;
   const size_t one = packet.has_all_kinds ? 1 : 0;
   const Triple place = {1, 2, 3};
   const auto little = [] { return PacketWriter(std::endian::little); };
   const auto put_marker = [&](PacketWriter& writer) {
-    writer.put(uint32_t{9}).put(place).put(0.02f).put(uint16_t{10}).put(0.001f);
+    writer.put(uint32_t{9}).put(place).put(0.02f);
+    if (number >= 206) writer.put(uint16_t{10});
+    if (number >= 300) writer.put(0.001f);
   };
   PacketWriter marker_sets = little(), markers = little(), bodies = little(), skeletons = little(),
                assets = little(), labelled = little(), channels = little();
@@ -186,17 +217,17 @@ inline PacketBytes natnet(const NatnetPacket& packet) {
     marker_sets.text_with_nul("all").put(uint32_t{2}).put(place).put(place);
     markers.put(place);
     assets.put(uint32_t{3}).put(uint32_t{1});
-    put_natnet_body(assets, {});
+    put_natnet_body(assets, {}, packet);
     assets.put(uint32_t{1});
     put_marker(assets);
     put_marker(labelled);
     channels.put(uint32_t{4}).put(uint32_t{2}).put(uint32_t{1}).put(0.5f).put(uint32_t{0});
   }
-  for (const NatnetPacketBody& body : packet.bodies) put_natnet_body(bodies, body);
+  for (const NatnetPacketBody& body : packet.bodies) put_natnet_body(bodies, body, packet);
   if (!packet.bones.empty()) skeletons.put(packet.skeleton).put(static_cast<uint32_t>(packet.bones.size()));
   for (NatnetPacketBody bone : packet.bones) {
     bone.id |= packet.skeleton << 16;
-    put_natnet_body(skeletons, bone);
+    put_natnet_body(skeletons, bone, packet);
   }
   PacketWriter frame = little().put(packet.frame);
   put_natnet_section(frame, is_sized, one, marker_sets);
@@ -205,11 +236,10 @@ inline PacketBytes natnet(const NatnetPacket& packet) {
   put_natnet_section(frame, is_sized, packet.bones.empty() ? 0 : 1, skeletons);
   if (is_sized) put_natnet_section(frame, is_sized, one, assets);
   put_natnet_section(frame, is_sized, one, labelled);
-  put_natnet_section(frame, is_sized, one, channels);  // force plates
-  put_natnet_section(frame, is_sized, one, channels);  // devices
-  frame.put(uint32_t{0}).put(uint32_t{0}).put(packet.time_s).put(std::array<uint64_t, 3>{1, 2, 3});
-  if (is_sized) frame.put(std::array<uint32_t, 2>{4, 5});
-  return natnet_message(7, frame.put(packet.flags).put(uint32_t{0}).bytes());
+  if (number >= 209) put_natnet_section(frame, is_sized, one, channels);  // force plates
+  if (number >= 211) put_natnet_section(frame, is_sized, one, channels);  // devices
+  put_natnet_end(frame, packet);
+  return natnet_message(7, frame.bytes());
 }
 
 inline PacketBytes natnet_server(uint8_t major, uint8_t minor) {
@@ -226,7 +256,9 @@ inline PacketBytes natnet_names(const std::string& version,
                                 const std::vector<std::pair<uint32_t, std::string>>& bones) {
   const bool is_sized = version == "4.1";
   const auto put_body = [&](PacketWriter& writer, uint32_t id, const std::string& name) {
-    writer.text_with_nul(name).put(id).put(int32_t{-1}).put(Triple{}).put(uint32_t{2}).put(Triple{1, 1, 1});
+    writer.text_with_nul(name).put(id).put(int32_t{-1}).put(Triple{});
+    if (natnet_number(version) < 300) return;
+    writer.put(uint32_t{2}).put(Triple{1, 1, 1});
     writer.put(Triple{2, 2, 2}).put(uint32_t{1}).put(uint32_t{2});
     if (version[0] == '4') writer.text_with_nul("first").text_with_nul("second");
   };

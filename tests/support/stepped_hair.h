@@ -15,6 +15,7 @@
 #include "common/strands/snapshot.h"
 #include "common/strands/strand_codec.h"
 #include "server/scene/scene_content.h"
+#include "server/scene/shared_hair.h"
 #include "server/scene/step_builder.h"
 #include "server/scene/step_log.h"
 #include "server/sim/executor/lanes_executor.h"
@@ -100,7 +101,10 @@ class SteppedHair {
   /// As it is now, published once more.
   SteppedState state() {
     SolverState solver_state;
-    solver_->read(solver_state);
+    if (shared_.is_active())
+      solver_state = state_of(shared_.read_blocks());
+    else
+      solver_->read(solver_state);
     const Pose& pose = builder_.world_from_head();
     const glm::dmat3 head_from_world = glm::transpose(glm::mat3_cast(pose.rotation));
     SteppedState state;
@@ -115,13 +119,18 @@ class SteppedHair {
     input.vertex_count = vertex_count();
     input.quantum_m = lattice_step_m("step", kBoundM).value();
     log_.set_scene(builder_.step_scene(features_));
-    input.trail = log_.trail();
+    input.trail = log_.trail(shared_.number());
     input.position_in_head_m = state.position_in_head_m;
     state.snapshot = quantise(input).snapshot;
     return state;
   }
   /// All strands at rest, at the same tick.
-  void reset() { EXPECT_TRUE(solver_->load(content_.groom, builder_.world_from_head().rotation)); }
+  void reset() {
+    shared_.drop(tick_);
+    EXPECT_TRUE(solver_->load(content_.groom, builder_.world_from_head().rotation));
+  }
+  /// Goes on from what viewers have, as a simulation that shares their steps.
+  void share(const SharedUpdate& update) { shared_.follow(update, *log_.trail(), scene_.step_rate_hz); }
   /// As a change of a scene that runs: another solver goes on where the one before is.
   void change(const SceneDesc& scene) {
     const bool is_other_solver = !(scene.solver == scene_.solver);
@@ -129,6 +138,7 @@ class SteppedHair {
     features_ = analyse(scene, {});
     builder_.change(scene, colliders_of(scene, content_.head_colliders));
     if (!is_other_solver) return;
+    shared_.leave(*solver_, builder_.world_from_head().rotation, tick_);
     std::unique_ptr<Solver> before = std::move(solver_);
     solver_ = made();
     const glm::dquat& rotation = builder_.world_from_head().rotation;
@@ -184,6 +194,11 @@ class SteppedHair {
     if (features_.has_colliders) builder_.add_colliders();
     if (features_.has_follicle_limit) builder_.add_follicle_limit();
     if (features_.has_body) builder_.add_body();
+    if (shared_.is_active()) {
+      shared_.step(builder_.step_tick(tick_), builder_.step_scene(features_), scene_.step_rate_hz);
+      log_.add(builder_.step_tick(tick_));
+      return;
+    }
     const SceneStep& step = builder_.step();
     if (step.carried_to_rotation) solver_->rebase(*step.carried_to_rotation);
     for (const StepInput& substep : step.substeps) solver_->substep(substep);
@@ -199,6 +214,7 @@ class SteppedHair {
   StepLog log_;
   std::vector<glm::vec3> rest_in_head_m_;
   uint64_t tick_ = 0;
+  SharedHair shared_;
 };
 
 inline constexpr uint32_t kWalkingStrands = 120;

@@ -23,6 +23,9 @@ inline void tell(FieldTexts& told, const std::string& where, const FeedOptions& 
 inline void tell(FieldTexts& told, const std::string& where, const ExportCommand& all) {
   OPTION_FIELDS(all, paths, fps, unit, up, space, is_guides, from_s, to_s, seconds, at_s);
 }
+inline void tell(FieldTexts& told, const std::string& where, const BundleCommand& all) {
+  OPTION_FIELDS(all, recording, page, seconds, has_all_solvers);
+}
 inline void tell(FieldTexts& told, const std::string& where, const TestOptions& all) {
   OPTION_FIELDS(all, scenarios, junit, out, server, uses_running, renews_goldens);
 }
@@ -37,8 +40,8 @@ inline void tell(FieldTexts& told, const std::string& where, const CameraOptions
 }
 inline void tell(FieldTexts& told, const std::string& where, const CtlCommandLine& all) {
   OPTION_FIELDS(all, target, log_level, feed, monitor_s, assignment, subject, check_frames, check_timeout_s,
-                session, ban_s, scene_path, exported, recording, other_recording, recording_name, step_count,
-                test, params, latency, camera, script_words);
+                session, ban_s, scene_path, exported, bundle, recording, other_recording, recording_name,
+                step_count, test, params, latency, camera, script_words);
 }
 
 }  // namespace strandcast::test
@@ -65,6 +68,7 @@ std::optional<test::FieldTexts> fields_of(const Arguments& given) {
 
 const Arguments kScenario = {"--scenario", "s"};
 const Arguments kOut = {"o.usda"};
+const Arguments kBundle = {"a.mcap", "o.html"};
 
 // Options of all commands stand behind one here.
 const OptionRow kTargetRows[] = {
@@ -119,6 +123,8 @@ const OptionRow kCommandRows[] = {
     {"--seconds", {"2"}, {{"exported.seconds", "2"}}, kOut, "export"},
     {"--at", {"2"}, {{"exported.at_s", "2"}}, kOut, "export"},
     {"recording", {"a.mcap"}, {{"recording", "a.mcap"}}, {}, "check"},
+    {"--seconds", {"2"}, {{"bundle.seconds", "2"}}, kBundle, "bundle"},
+    {"--all-solvers", {}, {{"bundle.has_all_solvers", "true"}}, kBundle, "bundle"},
     {"--frames", {"7"}, {{"check_frames", "7"}}, {}, "check"},
     {"--timeout", {"7"}, {{"check_timeout_s", "7"}}, {}, "check"},
     {"--ban", {"60"}, {{"ban_s", "60"}}, {"7"}, "kick"},
@@ -136,6 +142,8 @@ const OptionRow kRequiredRows[] = {
     {"assignment", {"look.ambient=1"}, {{"assignment", "look.ambient=1"}}, {}, "set"},
     {"file", {"s.textproto"}, {{"scene_path", "s.textproto"}}, {}, "save"},
     {"paths", {"a.mcap", "o.usda"}, {{"exported.paths", "a.mcap o.usda"}}, {}, "export"},
+    {"recording", kBundle, {{"bundle.recording", "a.mcap"}, {"bundle.page", "o.html"}}, {}, "bundle"},
+    {"page", kBundle, {{"bundle.recording", "a.mcap"}, {"bundle.page", "o.html"}}, {}, "bundle"},
     {"session", {"7"}, {{"session", "7"}}, {}, "kick"},
     {"recording", {"a.mcap"}, {{"recording", "a.mcap"}}, {}, "info"},
     {"recording", {"a.mcap"}, {{"recording", "a.mcap"}}, {}, "recover"},

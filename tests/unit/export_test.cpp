@@ -2,10 +2,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "client/app/frame_rate.h"
 #include "client/export/export_strands.h"
 #include "client/export/frame_sampler.h"
 #include "client/export/number_text.h"
+#include "client/export/strand_writer.h"
 #include "common/base/file.h"
+#include "common/groom/abc_curves.h"
+#include "common/groom/abc_tree.h"
 #include "common/groom/groom_file.h"
 #include "tests/support/temporary_folder.h"
 
@@ -18,7 +22,7 @@ using ::testing::HasSubstr;
 
 constexpr uint32_t kStrands = 7, kVertices = 5;
 constexpr float kQuantumM = 1e-5f;
-constexpr double kReimportM = 1e-5;
+constexpr double kReimportM = 1e-5, kAbcReimportM = 1e-6;
 constexpr int64_t kStepNs = 16'666'667;
 
 /// Hair that hangs from a ring and swings as cubics of time do, on a head that walks and turns.
@@ -155,7 +159,7 @@ TEST(FrameSampler, ARangeIsKeptAndTimeThatBeginsAnewEndsIt) {
 
 TEST(Export, EveryFormatUnitAxisAndSpaceComesBackWithinTheBound) {
   const TemporaryFolder folder;
-  for (const char* const extension : {".usda", ".ply"}) {
+  for (const char* const extension : {".usda", ".abc", ".ply"}) {
     for (const ExportUnit unit : {ExportUnit::Centimetre, ExportUnit::Metre}) {
       for (const ExportUp up : {ExportUp::Y, ExportUp::Z}) {
         for (const ExportSpace space : {ExportSpace::Head, ExportSpace::World}) {
@@ -173,14 +177,15 @@ TEST(Export, EveryFormatUnitAxisAndSpaceComesBackWithinTheBound) {
           const Groom groom = imported(options.path);
           ASSERT_EQ(groom.strand_count(), kStrands);
           ASSERT_EQ(groom.uniform_vertex_count(), kVertices);
-          // USD's own points are the rest shape; on the head of the first frame.
-          const bool is_rest = options.path.extension() == ".usda";
+          // What USD and Alembic have first is the rest shape, on the head of the first frame.
+          const bool is_rest = options.path.extension() != ".ply";
+          const double bound_m = options.path.extension() == ".abc" ? kAbcReimportM : kReimportM;
           const Pose pose = space == ExportSpace::World ? pose_of(0.2) : Pose{};
           for (uint32_t strand = 0; strand < kStrands; ++strand) {
             for (uint32_t vertex = 0; vertex < kVertices; ++vertex) {
               const glm::dvec3 expected = pose * glm::dvec3(place_of(strand, vertex, is_rest ? 0.0 : 0.2));
               const glm::dvec3 found(groom.rest_position_m[groom.offset[strand] + vertex]);
-              EXPECT_LT(glm::distance(found, expected), kReimportM + (is_rest ? 0.0 : 2.0 * kQuantumM));
+              EXPECT_LT(glm::distance(found, expected), bound_m + (is_rest ? 0.0 : 2.0 * kQuantumM));
             }
           }
         }
@@ -273,6 +278,60 @@ TEST(Export, UsdaSaysWhatProgramsGuessWrongOtherwise) {
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "hair.usda.part"));
 }
 
+// Rates of film and television: frames lie where the exact quotient says, over a minute and at its end.
+TEST(Export, FramesOfRationalRatesAreAtTheirTimes) {
+  for (const std::string asked : {"23.976", "24000/1001", "29.97", "59.94", "0.5", "240"}) {
+    const TemporaryFolder folder;
+    MadeStates states(61);
+    ExportOptions options;
+    options.path = folder.path() / "hair.csv";
+    options.fps = *parse_frame_rate(asked, kLeastFrameRate, kMostFrameRate);
+    const ExportReport report = exported(states, options);
+    EXPECT_EQ(report.frame_count, static_cast<uint64_t>(options.fps + 1e-9) + 1) << asked;
+    const auto rows = rows_of(options.path);
+    for (size_t i = kStrands * kVertices; i < rows.size(); i += kStrands * kVertices)
+      EXPECT_NEAR(rows[i][1], (rows[i][0] - 1.0) / options.fps, 1e-6) << asked;
+    options.path = folder.path() / "hair.usda";
+    MadeStates same(61);
+    exported(same, options);
+    const std::string text = *load_text(options.path, 1 << 26);
+    EXPECT_THAT(text, HasSubstr(fmt::format("timeCodesPerSecond = {}\n", options.fps))) << asked;
+  }
+}
+
+TEST(FrameRate, IsReadAsPeopleWriteIt) {
+  const auto rate = [](std::string_view text) {
+    return parse_frame_rate(text, kLeastFrameRate, kMostFrameRate);
+  };
+  for (const auto& [text, exact] :
+       std::vector<std::pair<const char*, double>>{{"24", 24.0},
+                                                   {"23.976", 24000.0 / 1001.0},
+                                                   {"23.98", 24000.0 / 1001.0},
+                                                   {"24000/1001", 24000.0 / 1001.0},
+                                                   {"29.97", 30000.0 / 1001.0},
+                                                   {"59.94", 60000.0 / 1001.0},
+                                                   {"119.88", 120000.0 / 1001.0},
+                                                   {"50", 50.0},
+                                                   {"12.5", 12.5},
+                                                   {"25/2", 12.5},
+                                                   {"240", 240.0},
+                                                   {"0.001", 0.001}}) {
+    ASSERT_TRUE(rate(text)) << text;
+    EXPECT_DOUBLE_EQ(*rate(text), exact) << text;
+  }
+  for (const char* text : {"", "fast", "24fps", "24/", "/1001", "24/0", "nan", "inf", "24 ", "1/2/3"}) {
+    ASSERT_FALSE(rate(text)) << text;
+    EXPECT_THAT(rate(text).error().message, HasSubstr("24000/1001")) << text;
+  }
+  for (const char* text : {"0", "-24", "240.5", "1e9", "1e-9", "24/-1"}) {
+    ASSERT_FALSE(rate(text)) << text;
+    EXPECT_THAT(rate(text).error().message, HasSubstr("0.001 to 240 are possible")) << text;
+  }
+  EXPECT_EQ(frame_rate_text(24000.0 / 1001.0), "23.976");
+  EXPECT_EQ(frame_rate_text(119.88011988), "119.88");
+  EXPECT_EQ(frame_rate_text(30.0), "30");
+}
+
 TEST(Export, UsdaFramesAreTheStatesAtTheirTimes) {
   const TemporaryFolder folder;
   MadeStates states(61);
@@ -308,6 +367,101 @@ TEST(Export, UsdaFramesAreTheStatesAtTheirTimes) {
       }
     }
   }
+}
+
+/// The one curves object of a file, by the reader's own parts.
+struct AbcFound {
+  explicit AbcFound(const std::filesystem::path& path)
+      : archive(*AbcArchive::read(*AbcContainer::open(path))), tree(*AbcTree::read(archive)) {
+    for (const AbcNode& node : tree.nodes())
+      if (node.kind == AbcKind::Curves) reader.emplace(*AbcCurvesReader::open(archive, node.object));
+  }
+  AbcArchive archive;
+  AbcTree tree;
+  std::optional<AbcCurvesReader> reader;
+};
+
+TEST(Export, AbcSamplesAreTheFramesWithinAMicrometre) {
+  const TemporaryFolder folder;
+  for (const ExportUnit unit : {ExportUnit::Centimetre, ExportUnit::Metre}) {
+    MadeStates states(61);
+    ExportOptions options;
+    options.path = folder.path() / "hair.abc";
+    options.unit = unit;
+    options.space = ExportSpace::World;
+    options.fps = 24;
+    const ExportReport report = exported(states, options);
+    EXPECT_EQ(report.frame_count, 25u);
+    EXPECT_EQ(report.bytes, std::filesystem::file_size(options.path));
+    FrameSampler sampler({24.0, 0.0, {}}, StrandFill());
+    for (const auto& state : states.states_) sampler.add(state);
+    sampler.finish();
+    std::optional<SampledFrame> frame = sampler.next();
+    const StrandSet strands(states.scene(), options, frame->strands);
+    const AbcFound found(options.path);
+    ASSERT_EQ(found.reader->sample_count(), 26u);
+    const auto expect_sample = [&](uint64_t sample, const std::vector<glm::dvec3>& expected) {
+      EXPECT_NEAR(found.reader->time_s(sample), static_cast<double>(sample) / 24.0, 1e-12);
+      const auto curves = found.reader->read(sample, kMaxStrandCount, kMaxGroomVertices);
+      ASSERT_TRUE(curves) << curves.error().to_string();
+      EXPECT_EQ(curves->vertex_counts, std::vector<uint32_t>(kStrands, kVertices));
+      for (size_t i = 0; i < expected.size(); ++i)
+        EXPECT_LT(glm::distance(glm::dvec3(curves->points[i]), expected[i]) * metres_of(unit), kAbcReimportM);
+    };
+    expect_sample(0, strands.rest_points());
+    for (; frame; frame = sampler.next()) expect_sample(frame->index + 1, strands.points(frame->strands));
+  }
+}
+
+TEST(Export, AbcSaysWhatUnrealAsksOfAGroom) {
+  const TemporaryFolder folder;
+  for (const ExportRole role : {ExportRole::Strands, ExportRole::Guides}) {
+    MadeStates states(3);
+    ExportOptions options;
+    options.path = folder.path() / "hair.abc";
+    options.role = role;
+    exported(states, options);
+    const AbcFound found(options.path);
+    const auto value = [&](const char* name, size_t element, uint32_t axis = 0) {
+      const auto param = found.reader->param(name, 0);
+      EXPECT_TRUE(param && param->has_value()) << name;
+      EXPECT_EQ((*param)->stated_scope, std::string(name) == "width" ? "vtx" : "uni");
+      return (*param)->number(element, axis);
+    };
+    const StrandSet strands(states.scene(), options, {pose_of(0.0), states.scene().asset->rest_position_m});
+    for (size_t strand = 0; strand < kStrands; ++strand) {
+      EXPECT_EQ(value("groom_guide", strand), role == ExportRole::Guides ? 1.0 : 0.0);
+      EXPECT_EQ(value("groom_id", strand), static_cast<double>(strand));
+      EXPECT_EQ(value("groom_group_id", strand), 0.0);
+      for (uint32_t axis = 0; axis < 2; ++axis)
+        EXPECT_EQ(value("groom_root_uv", strand, axis),
+                  static_cast<double>(strands.root_uv()[strand][static_cast<int>(axis)]));
+      for (size_t vertex = 0; vertex < kVertices; ++vertex)
+        EXPECT_EQ(value("width", strand * kVertices + vertex), static_cast<double>(strands.widths()[vertex]));
+    }
+    const auto of_hair = found.archive.properties(found.tree.nodes()[1].object);
+    const auto xform = found.archive.properties(*find_abc_property(*of_hair, ".xform"));
+    const auto user = found.archive.properties(*find_abc_property(*xform, ".userProperties"));
+    EXPECT_EQ(found.archive.sample(*find_abc_property(*user, "groom_version_major"), 0, 1)->number(0), 1.0);
+    EXPECT_EQ(found.archive.sample(*find_abc_property(*user, "groom_version_minor"), 0, 1)->number(0), 5.0);
+  }
+}
+
+TEST(Export, AbcFramesOfHairThatStandsStillTakeNoSpace) {
+  const TemporaryFolder folder;
+  const auto bytes_of = [&](size_t count, bool moves) {
+    MadeStates states(0);
+    for (size_t i = 0; i < count; ++i) {
+      const auto time_ns = static_cast<int64_t>(i) * kStepNs;
+      states.states_.push_back(state_at(time_ns, positions_at(moves ? static_cast<double>(i) : 0.0)));
+    }
+    ExportOptions options;
+    options.path = folder.path() / "hair.abc";
+    return exported(states, options).bytes;
+  };
+  constexpr uint64_t kFrameBytes = kStrands * kVertices * 3 * sizeof(float);
+  EXPECT_LT(bytes_of(61, false), bytes_of(3, false) + kFrameBytes);
+  EXPECT_GT(bytes_of(61, true), bytes_of(3, true) + 28 * kFrameBytes) << "30 frames of motion against one";
 }
 
 TEST(Export, PlySequencesAreNumberedFromTheRestShape) {
@@ -392,10 +546,9 @@ TEST(Export, WhatCannotBeWrittenIsToldTheWayOut) {
   };
   EXPECT_EQ(refusal("a.usda"), "accepted");
   EXPECT_EQ(refusal("A.CSV"), "accepted");
-  EXPECT_THAT(refusal("a.abc"),
-              AllOf(HasSubstr("Alembic is not written"), HasSubstr(".usda"), HasSubstr("Blender")));
+  EXPECT_EQ(refusal("a.abc"), "accepted");
   EXPECT_THAT(refusal("a.usdc"), HasSubstr("usdcat"));
-  EXPECT_THAT(refusal("a.obj"), HasSubstr("known are .usda, .ply and .csv"));
+  EXPECT_THAT(refusal("a.obj"), HasSubstr("known are .usda, .abc, .ply and .csv"));
   ExportOptions backwards;
   backwards.path = "a.usda";
   backwards.from_s = 2.0;

@@ -33,15 +33,14 @@ struct FedClip {
 };
 
 /// Somebody who walks 2 m, nods, and turns by 60 degrees; the first frame is 58 mm and 17.5 degrees off.
-std::string walk_with_t_pose() {
-  constexpr int kFrames = 361;
+std::string walk_with_t_pose(int frames = 361) {
   std::string text =
       "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation "
       "Yrotation\n"
       "JOINT Head\n{\nOFFSET 0 1.6 0\nCHANNELS 3 Zrotation Xrotation Yrotation\nEnd Site\n{\nOFFSET 0 0.2 "
       "0\n}\n}\n}\n";
-  text += fmt::format("MOTION\nFrames: {}\nFrame Time: {}\n", kFrames, 1.0 / kRateHz);
-  for (int i = 0; i < kFrames; ++i) {
+  text += fmt::format("MOTION\nFrames: {}\nFrame Time: {}\n", frames, 1.0 / kRateHz);
+  for (int i = 0; i < frames; ++i) {
     const double t_s = i / kRateHz;
     const double off_m = i == 0 ? 0.058 : 0.0;
     const double off_deg = i == 0 ? 17.5 : 0.0;
@@ -174,6 +173,27 @@ TEST_F(FedMotion, IsAllOfTheClipOnce) {
   EXPECT_EQ(plan->motion_s, clip.duration_s() + 0.5 * start_s) << "a start lags by half of itself";
   EXPECT_EQ(plan->motion(plan->motion_s), clip.world_from_head.back());
   EXPECT_EQ(plan->motion(0.0), clip.world_from_head.front());
+}
+
+// A pose is a motion of one frame: the head is held there for as long as it is fed.
+TEST_F(FedMotion, OneFrameIsHeldAndSaid) {
+  for (const bool is_looped : {false, true}) {
+    const auto path = folder_.path() / "pose.bvh";
+    const std::string text = walk_with_t_pose(1);
+    ASSERT_TRUE(save_file(path, std::as_bytes(std::span(text))));
+    FeedOptions options = options_for({"pose", path});
+    options.is_looped = is_looped;
+    testing::internal::CaptureStderr();
+    const auto plan = make_feed_plan(options);
+    EXPECT_THAT(testing::internal::GetCapturedStderr(),
+                HasSubstr("pose.bvh: one frame: the head is held there"));
+    ASSERT_TRUE(plan) << plan.error().to_string();
+    EXPECT_EQ(plan->motion_s, 0.0) << "without end";
+    for (const double t_s : {0.0, 0.1, 5.0, 1e4}) EXPECT_EQ(plan->motion(t_s), plan->motion(0.0)) << t_s;
+  }
+  testing::internal::CaptureStderr();
+  EXPECT_GT(make_feed_plan(options_for(clips_.front()))->motion_s, 0.0);
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), testing::Not(HasSubstr("one frame")));
 }
 
 TEST_F(FedMotion, LeavesOutFramesBeforeTheMotion) {

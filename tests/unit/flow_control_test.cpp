@@ -204,6 +204,24 @@ TEST(FlowControl, TriesThatFailAreRepeatedAtDoubledTimes) {
   EXPECT_EQ(viewer.present, 0u);
 }
 
+// From the worst class it would take a probe for each better one.
+TEST(FlowControl, AnotherCodecBeginsWithTheBestClassThatTheLinkCarries) {
+  Viewer viewer({.bytes_per_s = 0.25 * kFullBytesPerS, .round_trip_ns = 80 * kMsInNs});
+  viewer.run(20 * kSInNs);
+  ASSERT_GT(viewer.present, 1u);
+  const std::vector<StrandClass> classes = make_strand_classes(built_in_plan());
+  const auto begun_with = [&](double bytes_per_s) {
+    std::vector<double> costs;
+    for (const StrandClass& row : classes) costs.push_back(bytes_per_s * relative_cost(row));
+    return viewer.flow.begin_codec({viewer.present, costs, 0.0, classes}, viewer.time_ns);
+  };
+  EXPECT_EQ(begun_with(0.05 * kFullBytesPerS), 0u);
+  const size_t carried = begun_with(kFullBytesPerS);
+  EXPECT_LE(relative_cost(classes[carried]), 0.25);
+  EXPECT_GT(relative_cost(classes[carried - 1]), 0.2);
+  EXPECT_EQ(viewer.flow.begin_codec({viewer.present, {}, 0.0, classes}, viewer.time_ns), 0u) << "not known";
+}
+
 TEST(FlowControl, CapIsKept) {
   Viewer viewer({.round_trip_ns = 5 * kMsInNs});
   viewer.cap_bytes_per_s = 0.5 * kFullBytesPerS;

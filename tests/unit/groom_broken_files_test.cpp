@@ -216,8 +216,8 @@ TEST(GroomFile, NamesTheKnownExtensionsAndWrongOptions) {
   const TemporaryFolder folder;
   const ByteFile file = small_v4();
   EXPECT_THAT(refusal(folder, file, "groom.xyz"),
-              AllOf(HasSubstr("'.xyz'"), HasSubstr("known: .tfx, .hair, .ply, .usda")));
-  EXPECT_THAT(refusal(folder, file, "groom"), HasSubstr("known: .tfx, .hair, .ply, .usda"));
+              AllOf(HasSubstr("'.xyz'"), HasSubstr("known: .tfx, .hair, .ply, .usda, .abc")));
+  EXPECT_THAT(refusal(folder, file, "groom"), HasSubstr("known: .tfx, .hair, .ply, .usda, .abc"));
   GroomFileOptions options;
   options.path = folder.path() / "missing.tfx";
   EXPECT_EQ(load_groom(options).error().code, ErrorCode::NotFound);

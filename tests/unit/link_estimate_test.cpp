@@ -41,6 +41,24 @@ TEST(LinkEstimate, ALargeFrameThatMetNothingShowsTheRateAndForSoLong) {
   EXPECT_EQ(link.capacity_bytes_per_s(time_ns + kCapacityAgeNs + 1), 0.0);
 }
 
+// The client compiles, say, before it answers; it noted when the frame came.
+TEST(LinkEstimate, ALateAnswerToALargeFrameIsNoSlowLink) {
+  for (const bool tells_times : {true, false}) {
+    LinkEstimate link;
+    int64_t time_ns = kSInNs;
+    constexpr int64_t kClockNs = 77 * kSInNs;  // of the client's clock before ours
+    const auto received = [&](int64_t at_ns) { return tells_times ? at_ns + kClockNs : 0; };
+    link.on_round_trip(20 * kMsInNs, time_ns);
+    time_ns += kSInNs;
+    link.on_acked({100, time_ns - 20 * kMsInNs, false, true, {received(time_ns - 10 * kMsInNs)}}, time_ns);
+    // 100 kB in half a second, and an answer a second later.
+    const int64_t sent_ns = time_ns += kSInNs;
+    time_ns += 1'520 * kMsInNs;
+    link.on_acked({100'000, sent_ns, true, true, {received(sent_ns + 510 * kMsInNs)}}, time_ns);
+    EXPECT_NEAR(link.capacity_bytes_per_s(time_ns), tells_times ? 200e3 : 66.7e3, 1e2);
+  }
+}
+
 TEST(LinkEstimate, SmallFramesOnAFreeLinkSayNothingOfItsRate) {
   LinkEstimate link;
   int64_t time_ns = kSInNs;

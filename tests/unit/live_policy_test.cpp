@@ -313,7 +313,7 @@ TEST(LivePolicy, ABodyThatStaysElsewhereHasJumped) {
 
 TEST(LivePolicy, AStepIsTakenAtTheSpeedOfAHead) {
   Stage stage;
-  const Pose turned{{0.7, 0.0, 0.0}, glm::angleAxis(2.5, glm::dvec3(0, 1, 0))};
+  const Pose turned{{0.7, 0.0, 0.0}, glm::angleAxis(0.55, glm::dvec3(0, 1, 0))};
   for (int i = 0; i < 10; ++i) stage.send(live_pose({}), kStart + i * 10 * kMsInNs);
   for (int i = 10; i < 40; ++i) stage.send(live_pose(turned), kStart + i * 10 * kMsInNs);
   stage.expect_no_faster_than_a_head();
@@ -336,43 +336,24 @@ TEST(LivePolicy, BurstsOfAHeadThatMovesAsHeadsDoAreNotClamped) {
   EXPECT_EQ(stage.policy.counters().clamped, 0u);
 }
 
-TEST(LivePolicy, LossIsHeldThenEasedToRestThenStale) {
+// Where it is meanwhile is the hub's to say.
+TEST(LivePolicy, ALostHeadSaysNothingAndIsStaleAfterASecond) {
   Stage stage;
-  const glm::dvec3 speed_mps(0.5, 0.0, -1.0);
-  const double turn_rad_per_s = 1.5;
-  const auto moving = [&](int i) {
-    const double t_s = 0.01 * i;
-    return Pose{speed_mps * t_s, glm::angleAxis(turn_rad_per_s * t_s, glm::dvec3(0, 1, 0))};
-  };
-  for (int i = 0; i <= 100; ++i) stage.send(live_pose(moving(i)), kStart + i * 10 * kMsInNs);
+  for (int i = 0; i <= 100; ++i)
+    stage.send(live_pose({{0.005 * i, 0.0, 0.0}, {1, 0, 0, 0}}), kStart + i * 10 * kMsInNs);
   const int64_t lost_ns = kStart + 1'000 * kMsInNs;
   const size_t before = stage.heads.size();
-  stage.until(lost_ns + kHoldNs - 5 * kMsInNs);
-  EXPECT_EQ(stage.heads.size(), before) << "the newest is held";
   stage.until(lost_ns + kMotionStaleNs);
   EXPECT_FALSE(stage.policy.is_stale(stage.now_ns));
-  const double on_s = static_cast<double>(kExtrapolateNs) * 1e-9;
-  for (size_t i = before; i < stage.heads.size(); ++i) {
-    const Pose& pose = stage.heads[i].world_from_head;
-    // On the way that it had, never further, never back.
-    const double way_s =
-        glm::dot(pose.position_m - moving(100).position_m, speed_mps) / glm::dot(speed_mps, speed_mps);
-    EXPECT_GE(way_s, -1e-9);
-    EXPECT_LE(way_s, on_s + 1e-9);
-    EXPECT_LT(glm::distance(pose.position_m, moving(100).position_m + speed_mps * way_s), 1e-9);
-    EXPECT_NEAR(angle_between_rad(moving(100).rotation, pose.rotation), turn_rad_per_s * way_s, 1e-6);
-  }
-  EXPECT_LT(glm::distance(stage.last().position_m, moving(100).position_m + speed_mps * on_s), 1e-6);
-  const Pose at_rest = stage.last();
   stage.until(lost_ns + kMotionStaleNs + 5 * kMsInNs);
   EXPECT_TRUE(stage.policy.is_stale(stage.now_ns));
-  const size_t at_end = stage.heads.size();
-  stage.until(lost_ns + 3 * kMotionStaleNs);
-  EXPECT_EQ(stage.heads.size(), at_end) << "a stale head says nothing";
-  // It comes back near by: the head goes there as a head goes.
-  stage.send(live_pose({at_rest.position_m + glm::dvec3(0.3, 0, 0), at_rest.rotation}), stage.now_ns);
+  EXPECT_EQ(stage.heads.size(), before);
+  // It comes back near by, where a head gets in that time.
+  const glm::dvec3 back_m = stage.last().position_m + glm::dvec3(0.3, 0.0, 0.0);
+  stage.send(live_pose({back_m, {1, 0, 0, 0}}), stage.now_ns);
   EXPECT_FALSE(stage.policy.is_stale(stage.now_ns));
-  EXPECT_LT(glm::distance(stage.last().position_m, at_rest.position_m), 0.3);
+  EXPECT_EQ(stage.last().position_m, back_m);
+  EXPECT_EQ(stage.policy.counters().clamped, 0u);
   stage.expect_no_faster_than_a_head();
 }
 

@@ -146,6 +146,29 @@ TEST(LiveSource, WhatCameBeforeAStepIsInIt) {
   EXPECT_EQ(hub.counters().rejected(), 0u);
 }
 
+// Through parser, policy and hub: no step shows a blow, where a head that is held stops dead and leaps.
+TEST(LiveSource, AHeadThatATrackerLosesSlowsAndComesBackGently) {
+  const auto source = make({.protocol = "opentrack"});
+  InputHub hub;
+  constexpr int64_t kStepNs = 16'666'667;
+  constexpr double kStepS = 1.0 / 60.0, kSpeedMps = 1.0;
+  std::vector<Pose> shown, held;
+  for (int i = 0; i < 300; ++i) {
+    const int64_t time_ns = kStart + i * kStepNs;
+    const Pose pose{{kSpeedMps * i * kStepS, 0.0, 0.0}, {1, 0, 0, 0}};
+    const bool is_lost = i >= 120 && i < 150;
+    held.push_back(is_lost ? held.back() : pose);
+    if (!is_lost) {
+      ASSERT_TRUE(source->take(kFirst, at_x(100.0 * pose.position_m.x), time_ns));
+    }
+    for (const MotionSamples& samples : source->advance(time_ns).motion) hub.push(7, samples, time_ns);
+    shown.push_back(hub.sample(time_ns).world_from_head);
+  }
+  EXPECT_LT(peaks_of(shown, kStepS).mps2, 1.05 * kEasyStart.mps2);
+  EXPECT_NEAR(shown.back().position_m.x, held.back().position_m.x, 1e-6 + kSpeedMps * 1.5 * kStepS);
+  EXPECT_GT(peaks_of(held, kStepS).mps2, 10.0 * kEasyStart.mps2);
+}
+
 TEST(LiveSource, AHeadIsChosenElseTheFirst) {
   const auto source = make({.protocol = "vmc"});
   int64_t time_ns = kStart;

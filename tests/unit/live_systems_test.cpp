@@ -18,7 +18,8 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-const std::vector<std::string> kVersions = {"3.0", "3.1", "4.0", "4.1"};
+const std::vector<std::string> kVersions = {"2.5",  "2.6", "2.7", "2.8", "2.9", "2.10",
+                                            "2.11", "3.0", "3.1", "4.0", "4.1"};
 
 std::vector<std::string> subjects(const LivePacket& packet) {
   std::vector<std::string> names;
@@ -53,7 +54,13 @@ TEST(NatnetParser, ReadsBodiesOfEveryVersion) {
         const LivePose& pose = packet.poses[0];
         EXPECT_EQ(pose.subject, "2");
         EXPECT_EQ(pose.frame, 162'734u);
-        EXPECT_EQ(pose.source_time_ns, 1'356'117'000'000);
+        // 2.5 tells no time, 2.6 a float, which has steps of 2^-13 s there.
+        if (version == "2.5")
+          EXPECT_FALSE(pose.source_time_ns.has_value());
+        else if (version == "2.6")
+          EXPECT_NEAR(static_cast<double>(pose.source_time_ns.value_or(0)), 1356.117e9, 1e9 / 16384);
+        else
+          EXPECT_EQ(pose.source_time_ns, 1'356'117'000'000) << version;
         EXPECT_TRUE(test::is_near(pose.world_from_subject.position_m, {0.1744466, 1.4471314, -0.7343040}));
         EXPECT_FLOAT_EQ(static_cast<float>(pose.world_from_subject.rotation.y), 0.5099482f);
         EXPECT_FLOAT_EQ(static_cast<float>(pose.world_from_subject.rotation.w), -0.8573577f);
@@ -131,6 +138,38 @@ TEST(NatnetParser, AsksForWhatItDoesNotKnow) {
   EXPECT_EQ(parser->describe().at(0), "server \"Motive\", NatNet 4.1");
 }
 
+// The server's answer tells the version; what it says is read first, and named where nothing fits.
+TEST(NatnetParser, ReadsWhatAServerOfAnOlderVersionSends) {
+  for (const std::string& version : kVersions) {
+    const auto parser = live_parser_of("natnet");
+    const int number = test::natnet_number(version);
+    (void)parsed(*parser,
+                 test::natnet_server(static_cast<uint8_t>(number / 100), static_cast<uint8_t>(number % 100)));
+    test::NatnetPacket values = recorded_values(version);
+    for (uint32_t markers = 0; markers < 2; ++markers) {
+      values.has_all_kinds = markers == 1;
+      EXPECT_THAT(subjects(parsed(*parser, test::natnet(values))), ElementsAre("2")) << version;
+    }
+    const PacketBytes whole = test::natnet(values);
+    const auto cut = parser->parse(std::span(whole).first(whole.size() - 1), 0);
+    ASSERT_FALSE(cut);
+    EXPECT_THAT(cut.error().message, HasSubstr("2.5 to 4.1; its server says " + version));
+    // One that its server does not track any more has no pose. Before 2.6 nothing tells.
+    values.bodies[0].is_tracked = false;
+    EXPECT_EQ(parsed(*parser, test::natnet(values)).poses.size(), version == "2.5" ? 1u : 0u) << version;
+  }
+}
+
+// A float of 36,000 s has steps of 4 ms: the times of arrival are better.
+TEST(NatnetParser, LeavesOutTimesThatAreTooCoarse) {
+  const auto parser = live_parser_of("natnet", "", "2.6");
+  test::NatnetPacket values = recorded_values("2.6");
+  EXPECT_TRUE(parsed(*parser, test::natnet(values)).poses.at(0).source_time_ns.has_value());
+  values.time_s = 36'000.0;
+  EXPECT_FALSE(parsed(*parser, test::natnet(values)).poses.at(0).source_time_ns.has_value());
+  EXPECT_THAT(parser->describe().at(0), testing::Eq("frame 162734"));
+}
+
 TEST(NatnetParser, HoldsToTheVersionThatWasSet) {
   const auto parser = live_parser_of("natnet", "", "3.1");
   EXPECT_TRUE(parser->parse(test::natnet(recorded_values("3.0")), 0)) << "the same layout";
@@ -139,8 +178,8 @@ TEST(NatnetParser, HoldsToTheVersionThatWasSet) {
   EXPECT_THAT(other.error().message, HasSubstr("3.1"));
   LiveParserConfig config;
   config.protocol = "natnet";
-  config.protocol_version = "2.9";
-  EXPECT_THAT(make_live_parser(config).error().message, HasSubstr("4.1, 4.0, 3.1, 3.0"));
+  config.protocol_version = "2.4";
+  EXPECT_THAT(make_live_parser(config).error().message, HasSubstr("4.1, 4.0, 3.1, 3.0, 2.11"));
   // What a server says is tried first only: its bitstream may be set to another version.
   const auto open = live_parser_of("natnet");
   (void)parsed(*open, test::natnet_server(4, 1));

@@ -37,6 +37,10 @@ TEST(SceneChange, ChangesLiveFieldsOnly) {
     EXPECT_THAT(error_of(change_scene(scene, wrong)), HasSubstr("0 .. 1000")) << wrong;
   EXPECT_THAT(error_of(change_scene(scene, "stream.codec=raw")), HasSubstr("'stream.codec' cannot change"));
   EXPECT_THAT(error_of(change_scene(scene, "")), HasSubstr("known: solver"));
+  // What is wrong is told by the assignment, and by no option of the server that nobody gave.
+  EXPECT_THAT(error_of(change_scene(scene, "substeps=0")), testing::StartsWith("substeps=0: substeps is 0"));
+  EXPECT_THAT(error_of(change_scene(scene, "wind.gusts=1")),
+              testing::StartsWith("wind.gusts=1: wind has no field"));
 }
 
 TEST(SceneChange, LookAndCameraAreLive) {

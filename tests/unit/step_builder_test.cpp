@@ -80,28 +80,36 @@ TEST(StepBuilder, JumpsAndTheFirstPoseMoveStrandsRigidly) {
   }
 }
 
-/// The greatest acceleration that strands feel, m/s^2, of a head that goes at `before_mps`, jumps by 3 m
-/// where its source is cut, and goes on at `after_mps`.
-double most_felt_mps2(double before_mps, double after_mps, bool is_cut) {
+/// A head that goes at a speed and from step 60 on at another, while `rate` steps of motion pass in a step.
+struct Change {
+  double before_mps, after_mps;
+  bool is_cut = true;  // its source is, where the head jumps by 3 m
+  double rate_before = 1.0, rate_after = 1.0;
+};
+
+/// The greatest acceleration that strands feel of it, m/s^2.
+double most_felt_mps2(const Change& change) {
   SceneDesc scene = still_scene();
   scene.substeps = 1;
   StepBuilder builder(scene, {});
   const double h_s = 1.0 / scene.step_rate_hz;
   double most_mps2 = 0.0, x_m = 0.0;
-  glm::dvec3 felt_mps(before_mps, 0.0, 0.0);
-  builder.build(moved(glm::dvec3(0.0), 0.0), {}, 0.0);
+  glm::dvec3 felt_mps(change.before_mps / change.rate_before, 0.0, 0.0);
+  builder.begin(moved(glm::dvec3(0.0), 0.0), 0.0);
   for (int i = 1; i < 180; ++i) {
-    const bool jumps = i == 60 && is_cut;
-    x_m += jumps ? 3.0 : h_s * (i <= 60 ? before_mps : after_mps);
+    const bool jumps = i == 60 && change.is_cut;
+    const double rate = i < 60 ? change.rate_before : change.rate_after;
+    x_m += jumps ? 3.0 : rate * h_s * (i < 60 ? change.before_mps : change.after_mps);
     InputFrame input = moved({x_m, 0.0, 0.0}, 0.0);
     input.has_teleported = jumps;
-    const SceneStep& step = builder.build(input, {}, 0.0);
+    builder.begin(input, 0.0, rate);
+    const SceneStep& step = builder.step();
     EXPECT_EQ(step.world_from_head.position_m.x, x_m) << "the head is where it is";
     const glm::dvec3 mps = step.substeps[0].head_shift_m / h_s;
     most_mps2 = std::max(most_mps2, glm::length(mps - felt_mps) / h_s);
     felt_mps = mps;
   }
-  EXPECT_NEAR(felt_mps.x, after_mps, 1e-9) << "in the end all is felt";
+  EXPECT_NEAR(felt_mps.x, change.after_mps / change.rate_after, 1e-9) << "in the end all is felt";
   return most_mps2;
 }
 
@@ -109,10 +117,21 @@ double most_felt_mps2(double before_mps, double after_mps, bool is_cut) {
 // second: 1.875 is a quintic's steepest slope. The same change of one source is felt as it is.
 TEST(StepBuilder, ACutChangesTheFeltSpeedGently) {
   const double gently_mps2 = 1.01 * 1.875 * 2.3 / kFeltChangeS;
-  EXPECT_LT(most_felt_mps2(0.0, 2.3, true), gently_mps2) << "a head at rest";
-  EXPECT_LT(most_felt_mps2(2.3, 0.0, true), gently_mps2) << "a head that stops";
-  EXPECT_LT(most_felt_mps2(2.3, 2.3, true), 1e-6) << "a cut within a flight";
-  EXPECT_GT(most_felt_mps2(0.0, 2.3, false), 20.0 * gently_mps2);
+  EXPECT_LT(most_felt_mps2({0.0, 2.3}), gently_mps2) << "a head at rest";
+  EXPECT_LT(most_felt_mps2({2.3, 0.0}), gently_mps2) << "a head that stops";
+  EXPECT_LT(most_felt_mps2({2.3, 2.3}), 1e-6) << "a cut within a flight";
+  EXPECT_GT(most_felt_mps2({0.0, 2.3, false}), 20.0 * gently_mps2);
+}
+
+// Of a head whose inputs pass twice as fast, strands feel half the speed. Where the pace changes at a cut,
+// they go on at the speed that they felt, and come to the other over a second, as by the cut alone.
+TEST(StepBuilder, ACutOfAHeadThatIsTooFastIsFeltOnce) {
+  const double gently_mps2 = 1.01 * 1.875 * 0.5 * 2.3 / kFeltChangeS;
+  EXPECT_LT(most_felt_mps2({0.0, 2.3, true, 2.0, 2.0}), gently_mps2) << "at one pace";
+  EXPECT_LT(most_felt_mps2({2.3, 2.3, true, 2.0, 2.0}), 1e-6) << "a cut within a flight";
+  EXPECT_LT(most_felt_mps2({2.3, 2.3, true, 1.0, 2.0}), gently_mps2) << "the simulation falls behind";
+  EXPECT_LT(most_felt_mps2({2.3, 2.3, true, 2.0, 1.0}), gently_mps2) << "and comes back";
+  EXPECT_GT(most_felt_mps2({2.3, 2.3, false, 1.0, 2.0}), 20.0 * gently_mps2) << "without a cut";
 }
 
 /// What the strands feel of a head that swings to and fro, when in each step `rate` steps of its motion pass:

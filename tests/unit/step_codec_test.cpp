@@ -260,7 +260,8 @@ TEST(StepCodec, DamagedBytesChangeNothing) {
         if (decoded) break;
         ++refused;
       }
-      if (!decoded) decoded = stream.decoder->decode(good);
+      // The first frame tells the field, of which strands may reach a damaged part later.
+      if (!decoded || i == 0) decoded = stream.decoder->decode(good);
       ASSERT_TRUE(decoded) << "frame " << i << ": " << decoded.error().to_string();
       EXPECT_EQ((*decoded)->tick, state.snapshot.tick);
       EXPECT_LE(largest_error_m(state, **decoded), kBoundM);

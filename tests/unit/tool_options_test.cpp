@@ -3,7 +3,7 @@
 
 #include "tests/support/option_table.h"
 #include "tests/tools/chaos_options.h"
-#include "tests/tools/load_options.h"
+#include "tests/tools/load/load_options.h"
 
 namespace strandcast::test {
 

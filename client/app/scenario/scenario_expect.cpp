@@ -87,9 +87,9 @@ Result<Image> draw(const ViewerPicture& picture, RenderSize size) {
 }
 
 void ScenarioRun::report(const std::string& what, const std::string& wanted, const std::string& measured,
-                         bool has_passed) {
+                         bool has_passed, const std::string& detail) {
   const double time_s = elapsed_s();
-  const CheckResult check{line_, what, wanted, measured, has_passed, time_s - last_check_s_};
+  const CheckResult check{line_, what, wanted, measured, has_passed, time_s - last_check_s_, detail};
   last_check_s_ = time_s;
   result_.checks.push_back(check);
   if (listener_) listener_(check);
@@ -217,15 +217,22 @@ void ScenarioRun::expect_mode(const ScenarioExpect& expect) {
 
 void ScenarioRun::expect_stretch(const std::string& name, const MeasuredSpan::Seen& seen, double limit) {
   const bool has_seen = seen.after.counts.strand_frames > seen.before.strand_frames;
-  const bool is_too_fine = limit <= seen.after.stretch_grain;
-  const std::string measured =
-      !has_seen     ? std::string("no strands were decoded")
-      : is_too_fine ? fmt::format("the stream's bound shows no less than {:.2g}: set stream.bound_m finer",
-                                  seen.after.stretch_grain)
-                    : fmt::format("measured {:.2g} (seen within {:.2g})", seen.after.largest_stretch,
-                                  seen.after.stretch_grain);
-  report("stretch of " + name, fmt::format("below {:g}", limit), measured,
-         has_seen && !is_too_fine && seen.after.largest_stretch < limit);
+  const double stretch = seen.after.largest_stretch, grain = seen.after.stretch_grain;
+  const bool is_too_fine = limit <= grain;
+  const bool has_passed = has_seen && !is_too_fine && stretch < limit;
+  const std::string measured = has_seen ? fmt::format("measured {:.2g} (seen within {:.2g})", stretch, grain)
+                                        : std::string("no strands were decoded");
+  std::string detail;
+  if (has_seen && !has_passed) {
+    const StretchPlace& place = seen.after.stretch_place;
+    detail =
+        fmt::format("at strand {}, from vertex {} to {}, {:.3f} s (state {}): {}", place.strand, place.vertex,
+                    place.vertex + 1, place.time_s, place.tick,
+                    is_too_fine ? fmt::format("a stream.bound_m that is {:.0f} times finer shows so little",
+                                              std::floor(grain / limit) + 1.0)
+                                : std::string("more substeps, or quality=full, stretch hair less"));
+  }
+  report("stretch of " + name, fmt::format("below {:g}", limit), measured, has_passed, detail);
 }
 
 void ScenarioRun::expect_state(const ScenarioExpect& expect) {

@@ -42,6 +42,11 @@ std::string panel_svg(const ScenarioResult& result, const Panel& panel) {
   return make_svg_plot(desc);
 }
 
+std::string sentence_of(const CheckResult& check) {
+  if (check.detail.empty()) return fmt::format("wanted {}, {}", check.wanted, check.measured);
+  return fmt::format("{}, wanted {}, {}", check.measured, check.wanted, check.detail);
+}
+
 }  // namespace
 
 size_t ScenarioResult::failed_count() const {
@@ -50,8 +55,8 @@ size_t ScenarioResult::failed_count() const {
 }
 
 std::string to_line(const CheckResult& check) {
-  return fmt::format("  {}  line {:<4} {}: wanted {}, {}", check.has_passed ? "ok  " : "FAIL", check.line,
-                     check.what, check.wanted, check.measured);
+  return fmt::format("  {}  line {:<4} {}: {}", check.has_passed ? "ok  " : "FAIL", check.line, check.what,
+                     sentence_of(check));
 }
 
 std::string to_junit(const std::vector<ScenarioResult>& results) {
@@ -66,7 +71,7 @@ std::string to_junit(const std::vector<ScenarioResult>& results) {
     for (const CheckResult& check : result.checks) {
       suites += fmt::format("    <testcase classname=\"{}\" name=\"line {}: {}\" time=\"{:.3f}\"",
                             html_escaped(result.name), check.line, html_escaped(check.what), check.seconds);
-      const std::string sentence = html_escaped(fmt::format("wanted {}, {}", check.wanted, check.measured));
+      const std::string sentence = html_escaped(sentence_of(check));
       suites += check.has_passed ? fmt::format("><system-out>{}</system-out></testcase>\n", sentence)
                                  : fmt::format("><failure message=\"{}\"/></testcase>\n", sentence);
     }

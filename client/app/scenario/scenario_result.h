@@ -14,7 +14,8 @@ struct CheckResult {
   std::string wanted;
   std::string measured;
   bool has_passed = false;
-  double seconds = 0.0;  // since the one before
+  double seconds = 0.0;     // since the one before
+  std::string detail = {};  // of one that fails: where, and what helps; empty: nothing is known of it
 };
 
 /// Measurements at one moment.
@@ -40,7 +41,8 @@ struct ScenarioResult {
   size_t failed_count() const;
 };
 
-/// Formats a check: "  ok    12  stretch of viewer: wanted below 0.01, measured 0.002".
+/// Formats a check: "  ok    12  stretch of viewer: wanted below 0.01, measured 0.002". Where there is a
+/// detail, what was measured comes first, and the detail last.
 std::string to_line(const CheckResult& check);
 
 /// Formats JUnit XML with one <testsuite> per scenario and one <testcase> per check.

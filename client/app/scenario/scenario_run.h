@@ -87,7 +87,7 @@ class ScenarioRun {
 
   Result<const ScenarioViewer*> viewer(const std::string& name) const;
   void report(const std::string& what, const std::string& wanted, const std::string& measured,
-              bool has_passed);
+              bool has_passed, const std::string& detail = {});
   void expect_span(const ScenarioExpect& expect);
   void expect_stretch(const std::string& name, const MeasuredSpan::Seen& seen, double limit);
   void expect_picture(const ScenarioExpect& expect);

@@ -145,6 +145,7 @@ double ScenarioViewer::head_mps(const Snapshot& state) {
 void ScenarioViewer::take(ViewerSession& session, const std::shared_ptr<const Snapshot>& state) {
   measure_rest(session.shared_asset());
   double stretch = 0.0, grain = 0.0;
+  StretchPlace place;
   const std::vector<glm::vec3> position_m = positions_in_head(*state);
   const size_t sent = state->strand_count;
   const double bound_m = static_cast<double>(session.quality().bound_m);
@@ -155,7 +156,11 @@ void ScenarioViewer::take(ViewerSession& session, const std::shared_ptr<const Sn
       if (rest_m <= 0.0) continue;
       const size_t i = vertex * sent + strand;
       const double length_m = static_cast<double>(glm::distance(position_m[i], position_m[i + sent]));
-      stretch = std::max(stretch, length_m / rest_m - 1.0);
+      if (const double more = length_m / rest_m - 1.0; more > stretch) {
+        stretch = more;
+        place.strand = strand;
+        place.vertex = vertex;
+      }
       grain = std::max(grain, 2.0 * bound_m / rest_m);
     }
   }
@@ -164,7 +169,12 @@ void ScenarioViewer::take(ViewerSession& session, const std::shared_ptr<const Sn
   look_.largest_head_mps = std::max(look_.largest_head_mps, mps);
   look_.tick = state->tick;
   look_.vertices = state->strand_count * state->vertex_count;
-  look_.largest_stretch = std::max(look_.largest_stretch, stretch);
+  if (stretch > look_.largest_stretch) {
+    look_.largest_stretch = stretch;
+    look_.stretch_place = place;
+    look_.stretch_place.time_s = static_cast<double>(state->sim_time_ns) * kSPerNs;
+    look_.stretch_place.tick = state->tick;
+  }
   look_.stretch_grain = grain;
 }
 
@@ -181,6 +191,7 @@ ViewerPicture ScenarioViewer::picture() const {
 void ScenarioViewer::begin_measure() {
   const std::lock_guard lock(mutex_);
   look_.largest_stretch = 0.0;
+  look_.stretch_place = {};
   look_.largest_head_mps = 0.0;
 }
 

@@ -27,6 +27,14 @@ struct ViewerCounts {
   uint64_t rejected_frames = 0;
 };
 
+/// Segment and state in which something was seen.
+struct StretchPlace {
+  size_t strand = 0;
+  uint32_t vertex = 0;  // at the segment's root end
+  double time_s = 0.0;  // simulated
+  uint64_t tick = 0;
+};
+
 /// State of the viewer at one moment.
 struct ViewerLook {
   ViewerCounts counts;
@@ -38,6 +46,7 @@ struct ViewerLook {
   uint32_t rate_divisor = 1;
   uint32_t vertices = 0;          // of a state of strands
   double largest_stretch = 0.0;   // since begin_measure()
+  StretchPlace stretch_place;     // of it
   double stretch_grain = 0.0;     // no finer than this is seen, through the bound of the stream
   double largest_head_mps = 0.0;  // likewise, between two states; infinite for what is no number
   std::string codec;

@@ -4,6 +4,8 @@ import { keepToken, keptToken, linkTo, readFragment, withoutToken } from './addr
 import { compileCore } from './core';
 import type { Asked, Camera, DrawFigures, FromDraw, FromNet, NetFigures, ToDraw, ToNet } from './messages';
 import { Hud, Row, Warnings } from './ui/hud';
+import type { SocketStart } from './socket';
+import { TAPE_URL } from './tape';
 import { followKey, followPointers, presets } from './ui/orbit';
 import { Panel } from './ui/panel';
 import {
@@ -18,7 +20,8 @@ const QUIET_MS = 1500; // so long a picture may stand without a word about the c
 
 // The token leaves the address before anything is asked for.
 const wishes = readFragment(location.hash);
-history.replaceState(null, '', location.pathname + location.search + withoutToken(location.hash));
+const bundle = globalThis.strandcastBundle;
+if (!bundle) history.replaceState(null, '', location.pathname + location.search + withoutToken(location.hash));
 if (wishes.token && wishes.keepsToken) keepToken(wishes.token);
 wishes.token ||= keptToken();
 
@@ -38,6 +41,8 @@ function assets(): Assets {
   const content = document.querySelector<HTMLMetaElement>('meta[name=strandcast-assets]')?.content ?? '';
   return content.startsWith('{') ? (JSON.parse(content) as Assets) : { core: 'strand_page.wasm', stepCore: 'strand_step.wasm', wholeCore: 'strand_core.wasm' };
 }
+
+const ownScript = (): string => document.querySelector<HTMLScriptElement>('script[type=module]')!.src;
 
 const toScene = (v: { x: number; y: number; z: number } | undefined, otherwise: [number, number, number]): [number, number, number] =>
   v ? [v.x, v.y, v.z] : otherwise;
@@ -107,12 +112,14 @@ class Viewer {
     const scheme = location.protocol === 'https:' ? 'wss:' : 'ws:';
     const beside = location.pathname.replace(/[^/]*$/, ''); // behind a proxy a session has a folder of its own
     this.asked = {
-      url: `${scheme}//${location.host}${beside}v1`, token: wishes.token, mode: wishes.mode, codec: wishes.codec, head: wishes.head, pictures: wishes.pictures,
+      url: bundle ? TAPE_URL : `${scheme}//${location.host}${beside}v1`, token: wishes.token, mode: bundle ? Mode.strands : wishes.mode,
+      codec: bundle?.codec ?? wishes.codec, head: wishes.head, pictures: wishes.pictures,
       role: wishes.isViewOnly ? Role.viewer : Role.controller, ...size, drawsStrands: this.canDraw,
     };
     const sockets = new MessageChannel();
     const { stepCore, wholeCore } = assets();
-    this.startWorker('socket').postMessage(sockets.port2, [sockets.port2]);
+    const start: SocketStart = { port: sockets.port2, tape: bundle?.tape };
+    this.startWorker('socket').postMessage(start, [sockets.port2]);
     this.net = this.startWorker('net');
     this.net.onmessage = (event: MessageEvent<FromNet>) => this.fromNet(event.data);
     this.toNet({ kind: 'start', stepCore, wholeCore, asked: this.asked, states: this.states.port1, sockets: sockets.port1 },
@@ -130,6 +137,7 @@ class Viewer {
       close: () => this.togglePanel(),
     });
     this.bind();
+    if (bundle) for (const id of ['mode', 'link']) (at(id).closest('label') ?? at(id)).hidden = true;
     setInterval(() => this.tick(), 500);
     if (!isSecureContext) {
       warnings.say('This page came without TLS: the browser then decodes no video. Over https pictures would take less of the link.');
@@ -137,7 +145,8 @@ class Viewer {
   }
 
   private startWorker(name: string): Worker {
-    const made = new Worker(import.meta.url, { type: 'module', name });
+    // A file's document may start no modules of its own as workers.
+    const made = bundle ? new Worker(bundle.script, { name }) : new Worker(ownScript(), { type: 'module', name });
     made.onerror = () => this.ended('this browser does not start the page’s workers');
     return made;
   }

@@ -1,5 +1,12 @@
 // The socket in a worker of its own: what arrives is stamped when it arrives, however long decoding of what came
 // before takes, so that the server does not take a busy viewer for a slow link. DistantSocket is its other end.
+import { playTape, TAPE_URL } from './tape';
+
+/** Once, from the page: the port that DistantSockets speak by, and a recording to play instead of a server. */
+export interface SocketStart {
+  port: MessagePort;
+  tape?: ArrayBuffer;
+}
 type ToSocket =
   | { kind: 'open'; number: number; url: string; protocol: string; originMs: number }
   | { kind: 'send'; number: number; bytes: Uint8Array }
@@ -10,9 +17,9 @@ type FromSocket =
   | { kind: 'closed'; number: number; code: number; reason: string };
 
 export function runSocket(): void {
-  self.onmessage = (event: MessageEvent<MessagePort>) => {
-    const port = event.data;
+  self.onmessage = ({ data: { port, tape } }: MessageEvent<SocketStart>) => {
     let socket: WebSocket | undefined;
+    let stopTape = (): void => {};
     let present = 0;
     port.onmessage = ({ data: wish }: MessageEvent<ToSocket>) => {
       const post = (message: FromSocket, transfer: Transferable[] = []): void => port.postMessage(message, transfer);
@@ -20,6 +27,16 @@ export function runSocket(): void {
         const { number, url, protocol, originMs } = wish;
         present = number;
         const early = performance.timeOrigin - originMs;
+        const give = (data: unknown): void => {
+          const receivedNs = Math.round((performance.now() + early) * 1e6);
+          post({ kind: 'message', number, data, receivedNs }, data instanceof ArrayBuffer ? [data] : []);
+        };
+        stopTape();
+        if (url === TAPE_URL && tape) {
+          post({ kind: 'open', number });
+          stopTape = playTape(tape, give);
+          return;
+        }
         try {
           socket = new WebSocket(url, protocol);
         } catch (error) {
@@ -27,11 +44,10 @@ export function runSocket(): void {
         }
         socket.binaryType = 'arraybuffer';
         socket.onopen = () => post({ kind: 'open', number });
-        socket.onmessage = ({ data }: MessageEvent<unknown>) => {
-          const receivedNs = Math.round((performance.now() + early) * 1e6);
-          post({ kind: 'message', number, data, receivedNs }, data instanceof ArrayBuffer ? [data] : []);
-        };
+        socket.onmessage = ({ data }: MessageEvent<unknown>) => give(data);
         socket.onclose = ({ code, reason }) => post({ kind: 'closed', number, code, reason });
+      } else if (wish.number === present && wish.kind === 'close' && !socket) {
+        stopTape();
       } else if (wish.number === present && socket) {
         if (wish.kind === 'close') socket.close(wish.code);
         else if (socket.readyState === WebSocket.OPEN) socket.send(wish.bytes);

@@ -86,7 +86,7 @@ Status Predictor::prepare() {
   if (kernel == nullptr || follicle_kernel == nullptr)
     return make_error(ErrorCode::Unsupported, "this build has no {} for this processor to predict with",
                       model_.kernel.shader_path);
-  LaneWork work{places_, vertex_count, true, true, &ground_.workers, Priority::Encoding};
+  LaneWork work{places_, vertex_count, true, true, &ground_.workers, ground_.priority};
   // Gusts pull by the model's own drag alone.
   work.has_turbulence = model_.parameters.air_drag_per_s > 0.0;
   program_.emplace(*kernel, model_.kernel, work);
@@ -119,9 +119,8 @@ Status Predictor::prepare_passes(simd::InstructionSet set) {
     if (kernel == nullptr)
       return make_error(ErrorCode::Unsupported, "this build has no {} for this processor to predict with",
                         desc.shader_path);
-    program.emplace(
-        *kernel, desc,
-        LaneWork{places_, model_.vertex_count, false, true, &ground_.workers, Priority::Encoding});
+    program.emplace(*kernel, desc,
+                    LaneWork{places_, model_.vertex_count, false, true, &ground_.workers, ground_.priority});
     return {};
   };
   if (model_.drag_along_share != 1.0)
@@ -155,7 +154,7 @@ Status Predictor::prepare_volume(simd::InstructionSet set) {
   const VolumeStrands strands{places_, model_.vertex_count, rest_in_head_m, hairs};
   VolumeOptions options;
   options.workers = &ground_.workers;
-  options.priority = Priority::Encoding;
+  options.priority = ground_.priority;
   options.set = ground_.set;
   ASSIGN_OR_RETURN(volume_, VolumeLaw::make(strands, model_.volume, options));
   const KernelDesc desc = volume_->kernel(kernel_.carries_way);
@@ -164,8 +163,7 @@ Status Predictor::prepare_volume(simd::InstructionSet set) {
     return make_error(ErrorCode::Unsupported, "this build has no {} for this processor to predict with",
                       desc.shader_path);
   volume_program_.emplace(
-      *kernel, desc,
-      LaneWork{places_, model_.vertex_count, false, true, &ground_.workers, Priority::Encoding});
+      *kernel, desc, LaneWork{places_, model_.vertex_count, false, true, &ground_.workers, ground_.priority});
   volume_table_.resize(volume_->most_elements());
   const std::vector<glm::vec4>& density = volume_->rest_density();
   auto blocks = std::make_unique<StrandBlocks>(places_, static_cast<uint32_t>(density.size() / places_));
@@ -421,12 +419,16 @@ void Predictor::correct(const Correction& of) {
   });
 }
 
+void Predictor::copy(const State& from, State& to) {
+  for (size_t role = 0; role < kPlaneRoleCount; ++role) copy_blocks(from.planes[role], to.planes[role]);
+  copy_blocks(from.body_before, to.body_before);
+  to.is_body_known = from.is_body_known;
+  to.head = from.head;
+  to.pose = from.pose;
+}
+
 void Predictor::save() {
-  for (size_t role = 0; role < kPlaneRoleCount; ++role) copy_blocks(state_.planes[role], saved_.planes[role]);
-  copy_blocks(state_.body_before, saved_.body_before);
-  saved_.is_body_known = state_.is_body_known;
-  saved_.head = state_.head;
-  saved_.pose = state_.pose;
+  copy(state_, saved_);
 }
 
 void Predictor::restore() {

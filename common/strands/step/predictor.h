@@ -28,6 +28,7 @@ struct PredictorGround {
   std::span<const glm::vec3> rest_in_head_m;  // (vertex_count x strand_count), strand fastest
   WorkerPool& workers;
   simd::InstructionSet set;
+  Priority priority = Priority::Encoding;
 };
 
 /// Largest number of vertices that are predicted by steps; each takes up to 200 bytes of memory.
@@ -35,6 +36,15 @@ inline constexpr size_t kMostStepVertices = 2'000'000;
 
 class Predictor {
  public:
+  /// State that changes from frame to frame.
+  struct State {
+    std::array<std::unique_ptr<StrandBlocks>, kPlaneRoleCount> planes;
+    HeadPath head;
+    Pose pose;
+    std::unique_ptr<StrandBlocks> body_before;  // where strands were, w = how near to the body they may come
+    bool is_body_known = false;                 // w is
+  };
+
   /// Makes a predictor. Unsupported if there is no rest shape or this build lacks the model's kernel.
   static Result<std::unique_ptr<Predictor>> make(StepModel model, const PredictorGround& ground);
 
@@ -79,6 +89,12 @@ class Predictor {
   /// Completes read_state() with the decoded positions of the strands.
   void place(const tangent::Planes<int32_t>& decoded, float quantum_m);
 
+  const State& state() const { return state_; }
+  /// Continues from the state of another predictor of the same model and layout.
+  void set_state(const State& state) { copy(state, state_); }
+  /// Copies a state into memory that is kept if it fits.
+  static void copy(const State& from, State& to);
+
   /// Saves the state, so that restore() can undo a frame that failed its checks.
   void save();
   void restore();
@@ -118,20 +134,12 @@ class Predictor {
   template <class Work>
   void for_blocks(const Work& work) const {
     constexpr size_t kGrain = 32;
-    tangent::encode_terms(ground_.layout, ground_.workers)
+    const bool has_many = ground_.layout.plane_size() >= tangent::kManyVertices;
+    ground_.workers.at(ground_.priority, has_many ? kMaxWorkers : 1)
         .for_ranges(block_count(), kGrain, [&](size_t begin, size_t end) {
           work(static_cast<uint32_t>(begin), static_cast<uint32_t>(end));
         });
   }
-
-  /// State that changes from frame to frame.
-  struct State {
-    std::array<std::unique_ptr<StrandBlocks>, kPlaneRoleCount> planes;
-    HeadPath head;
-    Pose pose;
-    std::unique_ptr<StrandBlocks> body_before;  // where strands were, w = how near to the body they may come
-    bool is_body_known = false;                 // w is
-  };
 
   StepModel model_;
   StepScene scene_;

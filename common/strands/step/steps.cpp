@@ -143,6 +143,8 @@ void EncoderSteps::restart(const SnapshotInfo& snapshot, const tangent::Layout& 
   last_ = moment_of(snapshot);
   bytes_.clear();
   has_said_ = false;
+  is_disturbed_ = true;
+  shared_tick_ = 0;
   if (snapshot.trail == nullptr || snapshot.trail->scene == nullptr) return;
   take_scene(*snapshot.trail->scene);
   told_scene_ = snapshot.trail->scene;
@@ -170,7 +172,7 @@ uint8_t EncoderSteps::judge(const tangent::Layout& layout, const tangent::Histor
 }
 
 uint8_t EncoderSteps::begin(const SnapshotInfo& snapshot, const tangent::Layout& layout,
-                            tangent::History& history, const tangent::Planes<int32_t>& target) {
+                            tangent::History& history, tangent::Planes<int32_t>& target) {
   bytes_.clear();
   is_stepping_ = is_following_ = false;
   const uint8_t flags = say(snapshot, layout, history, target);
@@ -181,7 +183,7 @@ uint8_t EncoderSteps::begin(const SnapshotInfo& snapshot, const tangent::Layout&
 
 /// The flags; bytes_ are what they announce.
 uint8_t EncoderSteps::say(const SnapshotInfo& snapshot, const tangent::Layout& layout,
-                          tangent::History& history, const tangent::Planes<int32_t>& target) {
+                          tangent::History& history, tangent::Planes<int32_t>& target) {
   if (snapshot.trail == nullptr || snapshot.trail->scene == nullptr) return 0;
   const StepTrail& trail = *snapshot.trail;
   uint8_t flags = 0;
@@ -213,7 +215,11 @@ uint8_t EncoderSteps::say(const SnapshotInfo& snapshot, const tangent::Layout& l
   CHECK(ticks.ok());
   step(*ticks, moment_of(snapshot), layout, history);
   if (count == 0 && !is_near(history.lattice, target)) return flags;
-  const uint8_t how = judge(layout, history, target);
+  uint8_t how = judge(layout, history, target);
+  if (is_waiting(snapshot) && (trail.shared != 0 || (how & kSparseFlag) != 0)) {
+    how = kStepFlag | kSparseFlag;
+    target = expected_;
+  }
   if (how == 0) return flags;
   base_ = std::move(base_read);
   bytes_.insert(bytes_.end(), said.begin(), said.end());
@@ -221,6 +227,14 @@ uint8_t EncoderSteps::say(const SnapshotInfo& snapshot, const tangent::Layout& l
   is_following_ = how == kFollowFlag;
   if (is_stepping_) std::swap(history.lattice, expected_);
   return flags | how;
+}
+
+/// Returns whether the simulation has yet to take over the newest update. Its strands are then those that it
+/// is about to forget, so that corrections towards them would be wrong one moment later.
+bool EncoderSteps::is_waiting(const SnapshotInfo& snapshot) const {
+  constexpr uint64_t kMostTicks = 30;  // later ones are not taken over any more
+  return shared_number_ != 0 && snapshot.trail->shared != shared_number_ &&
+         snapshot.tick - shared_tick_ <= kMostTicks;
 }
 
 void EncoderSteps::append_bytes(std::vector<std::byte>& body) const {
@@ -232,7 +246,42 @@ void EncoderSteps::append_bytes(std::vector<std::byte>& body) const {
 
 void EncoderSteps::finish(const SnapshotInfo& snapshot, const tangent::Frame& frame,
                           const tangent::History& history) {
+  const bool is_one_step = is_stepping_ && snapshot.tick == last_.tick + 1;
+  is_disturbed_ = is_disturbed_ || !is_one_step || frame.lattice != history.lattice;
   follow(moment_of(snapshot), frame, history);
+}
+
+std::shared_ptr<SharedUpdate> EncoderSteps::take_shared(const tangent::Layout& layout,
+                                                        const tangent::History& history) {
+  constexpr uint32_t kFirstFrames = 4;  // strands that start without velocities are not the simulation's yet
+  const bool is_whole = told_model_ != nullptr && told_model_->strand_count == layout.strand_count;
+  if (!is_disturbed_ || !predictor_ || !has_model_ || !is_whole || age_ < kFirstFrames) return nullptr;
+  if (layout.plane_size() > kMostSharedVertices) return nullptr;
+  auto update =
+      std::make_shared<SharedUpdate>(SharedUpdate{++shared_number_, last_.tick, told_model_, nullptr});
+  shared_tick_ = last_.tick;
+  if (shared_model_ != told_model_) {
+    ByteReader reader(model_bytes_);
+    Result<StepModel> model = read_model(reader, rest_in_head_m_, layout.strand_count, layout.vertex_count);
+    CHECK(model.ok());
+    Result<std::shared_ptr<SharedSteps>> strands =
+        SharedSteps::make(std::move(*model), rest_in_head_m_, workers_, set_);
+    CHECK(strands.ok());  // as the predictor's
+    update->strands = std::move(*strands);
+    shared_model_ = told_model_;
+  }
+  auto free = std::find_if(shared_states_.begin(), shared_states_.end(),
+                           [](const auto& state) { return state.use_count() == 1; });
+  if (free == shared_states_.end())
+    free = shared_states_.insert(shared_states_.end(), std::make_shared<PredictedState>());
+  PredictedState& state = **free;
+  Predictor::copy(predictor_->state(), state.state);
+  state.base = base_;
+  state.lattice = history.lattice;
+  state.quantum_m = history.quantum_m;
+  update->state = *free;
+  is_disturbed_ = false;
+  return update;
 }
 
 void EncoderSteps::append_state(std::vector<std::byte>& body) {

@@ -13,6 +13,7 @@
 #include "common/strands/byte_io.h"
 #include "common/strands/snapshot.h"
 #include "common/strands/step/predictor.h"
+#include "common/strands/step/shared_steps.h"
 #include "common/strands/step/step_reader.h"
 #include "common/strands/step/wire.h"
 #include "common/strands/tangent/motion.h"
@@ -57,16 +58,25 @@ class EncoderSteps : public Steps {
   /// Begins a chain with an empty state.
   void restart(const SnapshotInfo& snapshot, const tangent::Layout& layout);
   /// Decides how the frame is predicted. Returns its flags; append_bytes() writes the bytes that follow them.
+  /// Sets the target to the prediction if the simulation is about to take the viewers' state over.
   uint8_t begin(const SnapshotInfo& snapshot, const tangent::Layout& layout, tangent::History& history,
-                const tangent::Planes<int32_t>& target);
+                tangent::Planes<int32_t>& target);
   void append_bytes(std::vector<std::byte>& body) const;
   void finish(const SnapshotInfo& snapshot, const tangent::Frame& frame, const tangent::History& history);
+  /// After an anchor: rounds the state to the one that joiners receive.
+  void settle(const tangent::History& history) {
+    Steps::settle(history);
+    is_disturbed_ = true;
+  }
   /// Appends the state for a joiner; call settle() first.
   void append_state(std::vector<std::byte>& body);
+  /// As StrandEncoder::take_shared(), after a frame.
+  std::shared_ptr<SharedUpdate> take_shared(const tangent::Layout& layout, const tangent::History& history);
 
  private:
   uint8_t say(const SnapshotInfo& snapshot, const tangent::Layout& layout, tangent::History& history,
-              const tangent::Planes<int32_t>& target);
+              tangent::Planes<int32_t>& target);
+  bool is_waiting(const SnapshotInfo& snapshot) const;
   std::span<const StepTick> ticks_since(const SnapshotInfo& snapshot) const;
   uint8_t judge(const tangent::Layout& layout, const tangent::History& history,
                 const tangent::Planes<int32_t>& target) const;
@@ -80,6 +90,11 @@ class EncoderSteps : public Steps {
   std::vector<std::byte> bytes_;  // that the flags of the frame at work announce
   uint16_t check_ = 0;
   bool has_said_ = false;
+  bool is_disturbed_ = false;                      // more than a step a frame acted since take_shared()
+  std::shared_ptr<const StepModel> shared_model_;  // whose strands were given away
+  uint64_t shared_number_ = 0;                     // of the newest update
+  uint64_t shared_tick_ = 0;                       // of its state
+  std::vector<std::shared_ptr<PredictedState>> shared_states_;  // for their memory
 };
 
 class DecoderSteps final : public Steps, public StepReader {

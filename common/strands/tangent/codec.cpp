@@ -24,7 +24,7 @@ namespace strandcast::tangent {
 namespace {
 
 constexpr uint8_t kTangentNumber = 5;
-constexpr uint8_t kStepNumber = 9;
+constexpr uint8_t kStepNumber = 10;
 constexpr int kTableLevel = 3;
 constexpr uint8_t kAnchorFlag = 1;
 
@@ -104,6 +104,10 @@ class Encoder final : public StrandEncoder {
     JoinFrames frames = encode_anchor(snapshot, Followers::Some);
     checked(frames.frame);
     return frames;
+  }
+
+  std::shared_ptr<SharedUpdate> take_shared() override {
+    return steps_ && has_chain_ ? steps_->take_shared(layout_, chain_.history) : nullptr;
   }
 
  private:

@@ -1,10 +1,11 @@
 // Converts the axes of live protocols to Strandcast's world: right-handed, +Y up, metres. A head without
-// rotation looks along +Z, so +X is to its left. All conversions of axes are here. Values are not checked;
-// non-finite ones pass through. Any thread.
+// rotation looks along +Z, so +X is to its left. All conversions of axes are here. Values are not checked,
+// non-finite ones pass through; only an angle that no head has gives no rotation (NaN). Any thread.
 #pragma once
 
 #include <glm/glm.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <limits>
 #include <numbers>
 
 #include "common/base/units.h"
@@ -23,7 +24,14 @@ struct HeadTurn {
   double down_rad = 0.0;
   double tilt_right_rad = 0.0;
 };
+/// Angles beyond two turns are no angles of a head: they were read wrongly, or are of something else.
+inline constexpr double kMostAngleRad = 720.001 * kRadPerDegree;
 inline glm::dquat rotation_of(const HeadTurn& turn) {
+  const auto is_possible = [](double angle_rad) { return glm::abs(angle_rad) <= kMostAngleRad; };
+  if (!is_possible(turn.left_rad) || !is_possible(turn.down_rad) || !is_possible(turn.tilt_right_rad)) {
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    return {kNone, kNone, kNone, kNone};
+  }
   return glm::angleAxis(turn.left_rad, glm::dvec3(0.0, 1.0, 0.0)) *
          glm::angleAxis(turn.down_rad, glm::dvec3(1.0, 0.0, 0.0)) *
          glm::angleAxis(turn.tilt_right_rad, glm::dvec3(0.0, 0.0, 1.0));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/base/text.h"
 #include "server/input/live/parsers_private.h"
@@ -22,7 +23,7 @@ std::span<const LiveProtocol> live_protocols() {
       {"vmc", "VMC of a performer (bones, trackers), and wind as OSC", kUdp, 39539, 0, {}, ""},
       {"opentrack", "opentrack's output \"UDP over network\"", kUdp, 4242, 0, {"xyz-ypr", "ypr-xyz"}, ""},
       {"freed", "FreeD D1 of cameras and heads", kUdp, 40000, 0, {"pan-tilt-roll", "tilt-pan-roll"}, ""},
-      {"natnet", "OptiTrack's NatNet 3.0 to 4.1 (Motive)", kUdp, 1511, 1510, up_axes, "239.255.42.99"},
+      {"natnet", "OptiTrack's NatNet 2.5 to 4.1 (Motive)", kUdp, 1511, 1510, up_axes, "239.255.42.99"},
       {"vrpn", "trackers of a VRPN server", kTcp, 3883, 0, up_axes, ""},
       {"livelinkface",
        "Live Link Face of a phone: how the head is turned",
@@ -64,6 +65,13 @@ std::optional<int64_t> nanoseconds_of(double seconds) {
   constexpr double kMostSeconds = 9e9;  // 285 years: below what 63 bits of nanoseconds hold
   if (!(std::abs(seconds) <= kMostSeconds)) return std::nullopt;
   return static_cast<int64_t>(std::llround(seconds * 1e9));
+}
+
+std::optional<double> fine_seconds(float seconds) {
+  const float next = std::nextafter(std::abs(seconds), std::numeric_limits<float>::infinity());
+  // The negation is true for what is no number.
+  if (!(static_cast<double>(next) - std::abs(static_cast<double>(seconds)) <= kCoarsestTimeS)) return {};
+  return seconds;
 }
 
 void MonitorLines::add(std::string line) {

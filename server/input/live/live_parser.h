@@ -21,9 +21,10 @@ constexpr size_t kMaxMonitorLines = 64;
 
 /// How packets of a protocol are read; points on which senders and documents disagree are settings.
 struct LiveParserConfig {
-  std::string protocol;          // a name of live_protocols()
-  std::string axis_order;        // one of LiveProtocol::axis_orders; empty = the first
-  std::string protocol_version;  // natnet: 3.0, 3.1, 4.0 or 4.1; empty = what the server says, or what fits
+  std::string protocol;    // a name of live_protocols()
+  std::string axis_order;  // one of LiveProtocol::axis_orders; empty = the first
+  std::string
+      protocol_version;  // natnet: 2.5 to 2.11, 3.0 to 4.1; empty = what the server says, or what fits
   bool ignores_zero_positions = true;  // vmc: bones whose position is zero keep the bind offset
   uint32_t max_datagram_bytes = 1500;  // vmc: OSC beyond it is refused
 };
@@ -61,6 +62,8 @@ class LiveParser {
   virtual uint64_t ignored() const = 0;
   /// Describes the last packet for a person: fields and values as sent, at most kMaxMonitorLines.
   virtual std::vector<std::string> describe() const = 0;
+  /// Returns sentences for the log since the last call: what the peer does that it should not, each once.
+  virtual std::vector<std::string> take_notes() { return {}; }
 };
 
 /// Makes a parser. NotFound lists the known protocols, axis orders or versions.

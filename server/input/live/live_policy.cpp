@@ -1,5 +1,7 @@
 #include "server/input/live/live_policy.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -13,7 +15,6 @@ namespace {
 
 constexpr int64_t kBetweenJumpsNs = 1'000'000;  // the hub sees a jump where two samples are this near
 constexpr int64_t kShortestStepNs = 1'000;      // between two poses
-constexpr double kVelocityMemoryS = 0.03;       // a velocity is that of about so long
 constexpr uint32_t kSteadyCount = 8;            // equal steps in a row that make a habit
 constexpr double kSteadyShare = 0.2;            // how much periods of a steady source differ
 constexpr double kLeastTurn = 1e-9;             // of a quaternion's vector part
@@ -48,7 +49,7 @@ glm::dquat rotation_by(const glm::dvec3& turn_rad) {
 }
 
 /// From 0 to 1, at rest at both ends.
-double eased(double share) {
+double eased_share(double share) {
   const double t = std::clamp(share, 0.0, 1.0);
   return t * t * (3.0 - 2.0 * t);
 }
@@ -67,14 +68,29 @@ void LivePolicy::take(const LivePose& pose, int64_t arrival_ns) {
   if (is_stale(arrival_ns)) {
     forget_order();
     jumps_ = jumps_ || !last_;
-    doubted_m_.reset();
+    doubted_.reset();
   }
+  leave_out_stalled_time(fit);
   order(fit, arrival_ns);
+}
+
+/// A time that stood still while the pose changed is none: of a sender that counts in large steps, or tells
+/// it once for many poses.
+void LivePolicy::leave_out_stalled_time(LivePose& pose) {
+  if (!pose.source_time_ns) return;
+  const bool is_same_time = told_ && told_->source_time_ns == pose.source_time_ns;
+  const bool is_repeated =
+      is_same_time && told_->frame == pose.frame && told_->world_from_subject == pose.world_from_subject;
+  if (is_repeated) return;
+  told_ = pose;
+  if (++told_poses_ > kStallWindowPoses) told_poses_ = stalled_poses_ = 0;
+  if (is_same_time && ++stalled_poses_ >= kStalledPoses && !std::exchange(has_no_times_, true))
+    notes_.emplace_back("the sender's times stand still while its poses change: times of arrival are used");
+  if (is_same_time || has_no_times_) pose.source_time_ns.reset();
 }
 
 std::vector<LiveHead> LivePolicy::advance(int64_t now_ns) {
   while (!waiting_.empty() && now_ns - waiting_.front().arrival_ns >= kResequenceNs) release_first();
-  rest(now_ns);
   return std::exchange(due_, {});
 }
 
@@ -84,9 +100,11 @@ bool LivePolicy::is_stale(int64_t now_ns) const {
 
 void LivePolicy::begin_another() {
   forget_order();
+  told_.reset();
+  told_poses_ = stalled_poses_ = 0;
+  has_no_times_ = false;
   seen_.reset();
-  held_.reset();
-  doubted_m_.reset();
+  doubted_.reset();
   jumps_ = true;
 }
 
@@ -214,7 +232,8 @@ void LivePolicy::note_order(const LivePose& pose) {
     const bool is_steady = std::abs(gap_ns - period_ns_) <= kSteadyShare * period_ns_;
     // A gap of a steady source says nothing of its period.
     if (is_steady || steady_periods_ < kSteadyCount) period_ns_ = gap_ns;
-    steady_periods_ = is_steady                        ? steady_periods_ + 1
+    // Counted no further than that another rate becomes the habit as fast.
+    steady_periods_ = is_steady                        ? std::min(steady_periods_ + 1, 2 * kSteadyCount)
                       : steady_periods_ < kSteadyCount ? 0
                                                        : steady_periods_ - 1;
   }
@@ -228,7 +247,9 @@ void LivePolicy::note_order(const LivePose& pose) {
 void LivePolicy::release(const LivePose& pose, int64_t arrival_ns) {
   note_order(pose);
   const int64_t time_ns = time_of(pose, arrival_ns);
-  if (!is_believed(pose, arrival_ns)) {
+  const bool is_taken = is_believed(pose, arrival_ns);
+  came_ns_ = arrival_ns;
+  if (!is_taken) {
     ++counters_.gated;
     return;
   }
@@ -246,34 +267,69 @@ void LivePolicy::release(const LivePose& pose, int64_t arrival_ns) {
     before.time_ns = std::max(time_ns - kBetweenJumpsNs, last_->time_ns + kShortestStepNs);
     head.time_ns = std::max(time_ns, before.time_ns + kShortestStepNs);
     due_.push_back(before);
-    velocity_mps_ = turn_rad_per_s_ = glm::dvec3(0.0);
     last_.reset();
+    ease_.reset();
+    has_doubted_ = false;
   }
-  if (last_) head.world_from_head = clamped(head.world_from_head, head.time_ns);
+  // A loss is eased by the hub.
+  if (last_ && std::exchange(has_doubted_, false)) begin_ease(head.world_from_head, head.time_ns);
+  if (last_) head.world_from_head = clamped(eased(head.world_from_head, head.time_ns), head.time_ns);
   jumps_ = false;
   put(std::move(head));
-  held_ = last_->world_from_head;
 }
 
-/// False while a body that is elsewhere at once has not stayed there.
+bool LivePolicy::is_near(const LivePose& pose, const Pose& other, double most_turn_rad) const {
+  const Pose& seen = pose.world_from_subject;
+  const bool has_place = !turns_only_ && pose.has_position;
+  return (!has_place || glm::distance(seen.position_m, other.position_m) <= kGateJumpM) &&
+         angle_between_rad(seen.rotation, other.rotation) <= most_turn_rad;
+}
+
+/// False while a body that is elsewhere at once, or turned elsewhere, has not stayed so.
 bool LivePolicy::is_believed(const LivePose& pose, int64_t arrival_ns) {
-  if (turns_only_ || !pose.has_position) return true;
-  const glm::dvec3 place_m = pose.world_from_subject.position_m;
-  const bool is_near = !seen_ || jumps_ || glm::distance(place_m, seen_->position_m) <= kGateJumpM;
-  if (!is_near && is_stale(arrival_ns)) jumps_ = true;
-  if (is_near || jumps_) {
-    doubted_m_.reset();
+  constexpr double kAnyTurnRad = 4.0;  // there is none beyond half a turn
+  const double passed_s = static_cast<double>(arrival_ns - came_ns_) * kSPerNs;
+  const double most_turn_rad = std::max(kGateTurnRad, kGateTurnRadPerS * passed_s);
+  if (!seen_ || jumps_ || is_near(pose, *seen_, most_turn_rad)) {
+    doubted_.reset();
     return true;
   }
-  if (!doubted_m_ || glm::distance(place_m, *doubted_m_) > kGateJumpM) {
-    doubted_since_ns_ = arrival_ns;
-    doubted_poses_ = 0;
+  const bool is_elsewhere = !is_near(pose, *seen_, kAnyTurnRad);
+  if (!is_stale(arrival_ns)) {
+    if (!doubted_ || !is_near(pose, *doubted_, kGateTurnRad)) {
+      doubted_since_ns_ = arrival_ns;
+      doubted_poses_ = 0;
+    }
+    doubted_ = pose.world_from_subject;
+    if (++doubted_poses_ < kGatePoses || arrival_ns - doubted_since_ns_ < kGateNs) return false;
+    doubted_.reset();
+    has_doubted_ = true;
   }
-  doubted_m_ = place_m;
-  if (++doubted_poses_ < kGatePoses || arrival_ns - doubted_since_ns_ < kGateNs) return false;
-  doubted_m_.reset();
+  if (!is_elsewhere) return true;
   jumps_ = true;
+  notes_.push_back(fmt::format("the head is {:.2f} m from where it was: hair is carried along, as over a cut",
+                               glm::distance(pose.world_from_subject.position_m, seen_->position_m)));
   return true;
+}
+
+/// The head begins to go from where it is to where it is seen.
+void LivePolicy::begin_ease(const Pose& target, int64_t time_ns) {
+  const Pose& from = last_->world_from_head;
+  ease_ = Ease{time_ns, from.position_m - target.position_m,
+               turn_of(from.rotation * glm::conjugate(target.rotation))};
+}
+
+Pose LivePolicy::eased(Pose target, int64_t time_ns) {
+  if (!ease_) return target;
+  const double passed = static_cast<double>(time_ns - ease_->begin_ns) / static_cast<double>(kEaseNs);
+  if (passed >= 1.0) {
+    ease_.reset();
+    return target;
+  }
+  const double left = 1.0 - eased_share(passed);
+  target.position_m += ease_->place_m * left;
+  target.rotation = glm::normalize(rotation_by(ease_->turn_rad * left) * target.rotation);
+  return target;
 }
 
 /// On the server's clock, after what was given out before.
@@ -326,11 +382,11 @@ void LivePolicy::add_joints(const LivePose& pose, LiveHead& head) const {
 
 // ---- what the head does
 
-/// As far towards the target as a head gets by then.
+/// As far towards the target as a head gets by then: after a gap the whole time counts.
 Pose LivePolicy::clamped(const Pose& target, int64_t time_ns) {
   const Pose& from = last_->world_from_head;
-  const double window_s = static_cast<double>(kClampWindowNs) * kSPerNs;
   const double passed_s = static_cast<double>(time_ns - last_->time_ns) * kSPerNs;
+  const double window_s = std::max(static_cast<double>(kClampWindowNs) * kSPerNs, passed_s);
   move_allowance_m_ = std::min(move_allowance_m_ + kMaxLiveSpeedMps * passed_s, kMaxLiveSpeedMps * window_s);
   turn_allowance_rad_ =
       std::min(turn_allowance_rad_ + kMaxLiveTurnRadPerS * passed_s, kMaxLiveTurnRadPerS * window_s);
@@ -349,44 +405,10 @@ Pose LivePolicy::clamped(const Pose& target, int64_t time_ns) {
 }
 
 void LivePolicy::put(LiveHead head) {
-  if (last_) {
-    const double passed_s = static_cast<double>(head.time_ns - last_->time_ns) * kSPerNs;
-    if (glm::dot(head.world_from_head.rotation, last_->world_from_head.rotation) < 0.0)
-      head.world_from_head.rotation = -head.world_from_head.rotation;
-    const Pose& before = last_->world_from_head;
-    const double share = std::min(passed_s / kVelocityMemoryS, 1.0);
-    // Over the memory, not over a step that may be short by jitter.
-    const double over_s = std::max(passed_s, kVelocityMemoryS);
-    const glm::dvec3 moved_m = head.world_from_head.position_m - before.position_m;
-    const glm::dvec3 turned_rad = turn_of(head.world_from_head.rotation * glm::conjugate(before.rotation));
-    velocity_mps_ = velocity_mps_ * (1.0 - share) + moved_m / over_s;
-    turn_rad_per_s_ = turn_rad_per_s_ * (1.0 - share) + turned_rad / over_s;
-  }
+  if (last_ && glm::dot(head.world_from_head.rotation, last_->world_from_head.rotation) < 0.0)
+    head.world_from_head.rotation = -head.world_from_head.rotation;
   last_ = head;
   due_.push_back(std::move(head));
-}
-
-/// Says where the head is while nothing comes.
-void LivePolicy::rest(int64_t now_ns) {
-  if (!held_ || !last_ || is_stale(now_ns)) return;
-  const int64_t age_ns = now_ns - seen_ns_;
-  if (age_ns < kHoldNs || now_ns - last_->time_ns < kRestingPoseNs) return;
-  last_->time_ns = now_ns;
-  last_->world_from_head = resting_pose(age_ns);
-  const double passed_s = static_cast<double>(kRestingPoseNs) * kSPerNs;
-  move_allowance_m_ = kMaxLiveSpeedMps * passed_s;
-  turn_allowance_rad_ = kMaxLiveTurnRadPerS * passed_s;
-  due_.push_back(*last_);
-}
-
-/// Where a head is that was seen last `age_ns` ago.
-Pose LivePolicy::resting_pose(int64_t age_ns) const {
-  const double share = static_cast<double>(age_ns - kHoldNs) / static_cast<double>(kEaseNs);
-  const double on_s = static_cast<double>(kExtrapolateNs) * kSPerNs * eased(share);
-  Pose pose = *held_;
-  pose.position_m += velocity_mps_ * on_s;
-  pose.rotation = glm::normalize(rotation_by(turn_rad_per_s_ * on_s) * pose.rotation);
-  return pose;
 }
 
 }  // namespace strandcast

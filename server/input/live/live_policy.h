@@ -4,15 +4,18 @@
 // * Refused and counted: poses that are not finite, not a rotation, or outside the world.
 // * Order: a pose whose number shows that an earlier one is missing waits for it, at most kResequenceNs and
 //   while at most kResequenceFrames wait. So do poses of a steady source that has times only. Repeated and
-//   later poses are dropped. Poses without number or time are used in order of arrival.
+//   later poses are dropped. Poses without number or time are used in order of arrival. So are those of a
+//   source whose times stand still while its poses change.
 // * A pose that is kGateJumpM away at once is accepted only if it stays there for kGatePoses and kGateNs.
 //   Otherwise it was another body, or markers were confused. Until then it counts as missing. An accepted one
-//   is a jump, through which hair is carried.
+//   is a jump, through which hair is carried. A pose that is turned by kGateTurnRad at once, and by more than
+//   kGateTurnRadPerS, is doubted alike: a tracker that has lost a head sends zeros. When it is accepted, the
+//   head is eased there over kEaseNs.
 // * Speed is limited to kMaxLiveSpeedMps and kMaxLiveTurnRadPerS, except for bursts of kClampWindowNs; the
 //   head then follows later.
-// * Loss: the newest pose is held for kHoldNs. Then the head continues by its motion of kExtrapolateNs, eased
-//   in and out over kEaseNs, and rests there. After kMotionStaleNs (input_hub.h) it is stale, and the next
-//   pose is accepted wherever it is.
+// * Loss: nothing is given out, and the hub eases the head to rest (head_easing.h). After kMotionStaleNs
+//   (input_hub.h) the subject is stale, and the next pose is accepted wherever it is: what is far away is a
+//   jump.
 // * Both signs of a quaternion are the same rotation; the nearer one is used.
 // * Calibration makes the present pose the rest pose at the origin. It removes the tracker's tilt on the head
 //   and the direction that the performer faced.
@@ -23,6 +26,7 @@
 #include <glm/glm.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/math/pose.h"
@@ -35,19 +39,20 @@ inline constexpr double kMaxLiveSpeedMps = 10.0;
 inline constexpr double kMaxLiveTurnRadPerS = 25.0;
 inline constexpr int64_t kClampWindowNs = 25'000'000;
 inline constexpr double kGateJumpM = 0.75;
+inline constexpr double kGateTurnRad = 0.6;
+/// Speed of the fastest turn of a person's head: what is faster at once is doubted.
+inline constexpr double kGateTurnRadPerS = 18.0;
 inline constexpr uint32_t kGatePoses = 5;
 inline constexpr int64_t kGateNs = 100'000'000;
+inline constexpr int64_t kEaseNs = 250'000'000;
 inline constexpr size_t kResequenceFrames = 3;
 inline constexpr int64_t kResequenceNs = 20'000'000;
-inline constexpr int64_t kHoldNs = 100'000'000;
-inline constexpr int64_t kExtrapolateNs = 50'000'000;
-inline constexpr int64_t kEaseNs = 250'000'000;
-/// Interval at which the head's resting pose is repeated after kHoldNs, so that a late pose does not move it
-/// by the whole gap at once.
-inline constexpr int64_t kRestingPoseNs = 10'000'000;
 /// Frame numbers that differ by more than this belong to a new count.
 inline constexpr int64_t kRestartFrames = 1000;
 inline constexpr uint32_t kRestartPoses = 5;  // or as many in a row that are late
+/// Number of poses of a window whose time does not advance, from which times are not used.
+inline constexpr uint32_t kStalledPoses = 5;
+inline constexpr uint32_t kStallWindowPoses = 100;
 
 struct LivePolicyCounters {
   uint64_t impossible = 0;   // no numbers, no rotation, out of the world
@@ -88,6 +93,8 @@ class LivePolicy {
   /// Returns whether no pose came for kMotionStaleNs, or never.
   bool is_stale(int64_t now_ns) const;
   const LivePolicyCounters& counters() const { return counters_; }
+  /// Returns sentences for the log since the last call: what was found of the source, and jumps.
+  std::vector<std::string> take_notes() { return std::exchange(notes_, {}); }
 
  private:
   struct Waiting {
@@ -100,6 +107,14 @@ class LivePolicy {
     glm::dvec3 origin_m;
   };
 
+  /// Offset of the head from where it is seen, which goes to nothing.
+  struct Ease {
+    int64_t begin_ns = 0;
+    glm::dvec3 place_m{0.0};
+    glm::dvec3 turn_rad{0.0};
+  };
+
+  void leave_out_stalled_time(LivePose& pose);
   void order(const LivePose& pose, int64_t arrival_ns);
   std::optional<int64_t> places_ahead(const LivePose& pose) const;
   bool is_late(const LivePose& pose);
@@ -109,14 +124,15 @@ class LivePolicy {
   void release(const LivePose& pose, int64_t arrival_ns);
   void note_order(const LivePose& pose);
   void forget_order();
+  bool is_near(const LivePose& pose, const Pose& other, double most_turn_rad) const;
   bool is_believed(const LivePose& pose, int64_t arrival_ns);
+  void begin_ease(const Pose& target, int64_t time_ns);
+  Pose eased(Pose target, int64_t time_ns);
   int64_t time_of(const LivePose& pose, int64_t arrival_ns);
   Pose head_of(const LivePose& pose) const;
   void add_joints(const LivePose& pose, LiveHead& head) const;
   Pose clamped(const Pose& target, int64_t time_ns);
   void put(LiveHead head);
-  void rest(int64_t now_ns);
-  Pose resting_pose(int64_t age_ns) const;
 
   const bool turns_only_;
   LivePolicyCounters counters_;
@@ -131,25 +147,32 @@ class LivePolicy {
   uint32_t equal_gaps_ = 0;
   uint32_t late_in_a_row_ = 0;
   double period_ns_ = 0.0;       // of a source that has times only
-  uint32_t steady_periods_ = 0;  // in a row
+  uint32_t steady_periods_ = 0;  // in a row, counted up to a few
   ClockMap clock_;
+
+  // Whether times are those of the poses.
+  std::optional<LivePose> told_;  // the newest that came
+  uint32_t told_poses_ = 0;       // of a window, and of them those that stood still
+  uint32_t stalled_poses_ = 0;
+  bool has_no_times_ = false;  // that are any use
 
   // What was believed.
   std::optional<Pose> seen_;  // the newest pose, as it came
   int64_t seen_ns_ = 0;       // its arrival
   bool jumps_ = true;         // the next one does
-  std::optional<glm::dvec3> doubted_m_;
+  int64_t came_ns_ = 0;       // arrival of the newest in order, believed or not
+  std::optional<Pose> doubted_;
   int64_t doubted_since_ns_ = 0;
   uint32_t doubted_poses_ = 0;
 
   // What the head does.
   std::optional<LiveHead> last_;  // given out
-  std::optional<Pose> held_;      // the newest of a pose that came
-  glm::dvec3 velocity_mps_{0.0};
-  glm::dvec3 turn_rad_per_s_{0.0};  // about axes of the world
   double move_allowance_m_ = 0.0;
   double turn_allowance_rad_ = 0.0;
+  std::optional<Ease> ease_;
+  bool has_doubted_ = false;  // the next pose is far from the last one, and is eased to
   std::vector<LiveHead> due_;
+  std::vector<std::string> notes_;
 };
 
 }  // namespace strandcast

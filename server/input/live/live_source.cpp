@@ -1,5 +1,7 @@
 #include "server/input/live/live_source.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -151,7 +153,12 @@ Status LiveSource::take(const std::string& sender, std::span<const std::byte> by
   if (!is_locked_ && (!packet->poses.empty() || packet->wind_mps)) hear(sender, arrival_ns);
   if (is_locked_) measure(arrival_ns);
   use(*packet, arrival_ns);
+  for (const std::string& note : parser_->take_notes()) warn(note);
   return {};
+}
+
+void LiveSource::warn(const std::string& text) {
+  if (notes_.size() < kMaxNotes) notes_.push_back({true, fmt::format("{}: {}", describe(), text)});
 }
 
 void LiveSource::hear(const std::string& sender, int64_t arrival_ns) {
@@ -165,6 +172,7 @@ void LiveSource::hear(const std::string& sender, int64_t arrival_ns) {
     subjects_.clear();
     subject_.reset();
     policy_.begin_another();
+    has_told_impossible_ = has_told_namesakes_ = false;
   }
   sender_ = sender;
   notes_.push_back({false, fmt::format("{}: {} sends", describe(), sender)});
@@ -189,6 +197,22 @@ void LiveSource::measure(int64_t arrival_ns) {
 
 // ---- subjects
 
+/// A body that goes on under another name is the same subject, unless its name was asked for.
+void LiveSource::rename_subject(const LivePose& pose, const std::string& name,
+                                const std::vector<std::string>& names) {
+  if (!pose.body || has_seen(name)) return;
+  const auto found = std::find_if(subjects_.begin(), subjects_.end(), [&](const Subject& subject) {
+    return subject.body == pose.body && subject.name != live_.subject &&
+           std::find(names.begin(), names.end(), subject.name) == names.end();
+  });
+  if (found == subjects_.end()) return;
+  if (notes_.size() < kMaxNotes)
+    notes_.push_back(
+        {false, fmt::format("{}: {} is called {} now", describe(), shown(found->name), shown(name))});
+  if (subject_ == found->name) subject_ = name;
+  found->name = name;
+}
+
 void LiveSource::note_subject(const std::string& name, int64_t arrival_ns) {
   const auto found = std::find_if(subjects_.begin(), subjects_.end(),
                                   [&](const Subject& subject) { return subject.name == name; });
@@ -200,7 +224,7 @@ void LiveSource::note_subject(const std::string& name, int64_t arrival_ns) {
     std::erase_if(subjects_, [&](const Subject& s) { return arrival_ns - s.seen_ns > kMotionStaleNs; });
     if (subjects_.size() >= kMaxLiveSubjects) return;
   }
-  subjects_.push_back({name, arrival_ns});
+  subjects_.push_back({name, arrival_ns, std::nullopt});
   if (!name.empty() && notes_.size() < kMaxNotes)
     notes_.push_back({false, fmt::format("{}: sees {}", describe(), shown(name))});
 }
@@ -241,12 +265,42 @@ void LiveSource::use(const LivePacket& packet, int64_t arrival_ns) {
   std::vector<std::string> names;
   for (const LivePose& pose : packet.poses) {
     names.push_back(printable(pose.subject, kMaxNameChars));
-    note_subject(names.back(), arrival_ns);
+  }
+  for (size_t i = 0; i < names.size(); ++i) {
+    rename_subject(packet.poses[i], names[i], names);
+    note_subject(names[i], arrival_ns);
+    const auto subject = std::find_if(subjects_.begin(), subjects_.end(),
+                                      [&](const Subject& s) { return s.name == names[i]; });
+    if (subject != subjects_.end()) subject->body = packet.poses[i].body;
   }
   follow_subject(arrival_ns);
-  for (size_t i = 0; i < names.size(); ++i)
-    if (subject_ && names[i] == *subject_) policy_.take(scaled(packet.poses[i], live_.scale), arrival_ns);
+  const LivePose* taken = nullptr;
+  for (size_t i = 0; i < names.size(); ++i) {
+    const LivePose& pose = packet.poses[i];
+    if (!subject_ || names[i] != *subject_ || (taken != nullptr && is_namesake(pose, *taken))) continue;
+    move_head(pose, arrival_ns);
+    taken = &pose;
+  }
   if (packet.wind_mps) wind_.push_back({{{arrival_ns, glm::vec3(*packet.wind_mps)}}});
+}
+
+/// True for another body of the same name and moment; the first is used.
+bool LiveSource::is_namesake(const LivePose& pose, const LivePose& taken) {
+  const bool is_of_a_moment = pose.frame || pose.source_time_ns;
+  if (!is_of_a_moment || pose.frame != taken.frame || pose.source_time_ns != taken.source_time_ns ||
+      pose.world_from_subject == taken.world_from_subject)
+    return false;
+  if (!std::exchange(has_told_namesakes_, true))
+    warn(fmt::format("two subjects are called {}: the first of them is used", shown(*subject_)));
+  return true;
+}
+
+void LiveSource::move_head(const LivePose& pose, int64_t arrival_ns) {
+  const uint64_t impossible = policy_.counters().impossible;
+  policy_.take(scaled(pose, live_.scale), arrival_ns);
+  if (policy_.counters().impossible == impossible || std::exchange(has_told_impossible_, true)) return;
+  warn(fmt::format("{} sends what is no head's pose, and is left out: {}", sender_,
+                   one_line(fmt::format("{}", fmt::join(parser_->describe(), ", ")), kMaxNoteChars)));
 }
 
 // ---- what comes of it
@@ -259,6 +313,7 @@ LiveSource::Due LiveSource::advance(int64_t now_ns) {
     samples.joint_names = std::move(head.joint_names);
     due.motion.push_back(std::move(samples));
   }
+  for (const std::string& note : policy_.take_notes()) warn(note);
   due.wind = std::exchange(wind_, {});
   const bool is_stale_now = policy_.is_stale(now_ns);
   if (is_stale_now && !was_stale_) {

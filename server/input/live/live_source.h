@@ -84,6 +84,7 @@ class LiveSource {
   struct Subject {
     std::string name;
     int64_t seen_ns = 0;
+    std::optional<uint64_t> body;
   };
 
   LiveSource(const LiveDesc& live, const LiveProtocol& protocol, LiveParserConfig parser);
@@ -91,10 +92,14 @@ class LiveSource {
   bool take_allowance(size_t bytes, int64_t arrival_ns);
   void hear(const std::string& sender, int64_t arrival_ns);
   void note_silence();
+  void warn(const std::string& text);
   void measure(int64_t arrival_ns);
+  void rename_subject(const LivePose& pose, const std::string& name, const std::vector<std::string>& names);
   void note_subject(const std::string& name, int64_t arrival_ns);
   void follow_subject(int64_t now_ns);
   void use(const LivePacket& packet, int64_t arrival_ns);
+  bool is_namesake(const LivePose& pose, const LivePose& taken);
+  void move_head(const LivePose& pose, int64_t arrival_ns);
 
   LiveDesc live_;
   const LiveProtocol& protocol_;
@@ -110,6 +115,8 @@ class LiveSource {
   bool is_locked_ = false;    // to it
   bool was_heard_ = false;    // when last looked at
   bool was_stale_ = true;
+  bool has_told_impossible_ = false;  // of this sender
+  bool has_told_namesakes_ = false;
   int64_t packet_ns_ = 0;  // arrival of the newest that could be read
   double packet_allowance_ = 0.0, byte_allowance_ = 0.0;
   int64_t allowance_ns_ = 0;

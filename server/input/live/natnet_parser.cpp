@@ -25,15 +25,12 @@ enum Message : uint16_t {
 
 struct Version {
   const char* name;
-  uint8_t major, minor;
-  NatnetLayout layout;
+  NatnetVersion number;
 };
 /// The newest first: what fits is looked for in this order.
 constexpr Version kVersions[] = {
-    {"4.1", 4, 1, NatnetLayout::Sized},
-    {"4.0", 4, 0, NatnetLayout::MarkerNames},
-    {"3.1", 3, 1, NatnetLayout::Plain},
-    {"3.0", 3, 0, NatnetLayout::Plain},
+    {"4.1", {4, 1}}, {"4.0", {4, 0}}, {"3.1", {3, 1}}, {"3.0", {3, 0}}, {"2.11", {2, 11}}, {"2.10", {2, 10}},
+    {"2.9", {2, 9}}, {"2.8", {2, 8}}, {"2.7", {2, 7}}, {"2.6", {2, 6}}, {"2.5", {2, 5}},
 };
 
 std::vector<std::byte> message_of(Message id, std::span<const std::byte> payload) {
@@ -80,8 +77,8 @@ class NatnetParser : public LiveParser {
     constexpr std::string_view kName = "Strandcast";
     std::memcpy(payload.data(), kName.data(), kName.size());
     for (const size_t at : {kNameBytes, kNameBytes + 4, kBitstreamAt}) {
-      payload[at] = std::byte{version.major};
-      payload[at + 1] = std::byte{version.minor};
+      payload[at] = std::byte{version.number.major};
+      payload[at + 1] = std::byte{version.number.minor};
     }
     return message_of(kConnect, payload);
   }
@@ -96,9 +93,11 @@ class NatnetParser : public LiveParser {
   std::vector<std::string> describe() const override {
     MonitorLines lines;
     if (server_)
-      lines.add(fmt::format("server \"{}\", NatNet {}.{}", server_->name, server_->major, server_->minor));
+      lines.add(fmt::format("server \"{}\", NatNet {}.{}", server_->name, server_->version.major,
+                            server_->version.minor));
     if (!last_) return std::move(lines).take();
-    lines.add(fmt::format("frame {} at {:.4f} s", last_->number, last_->time_s));
+    lines.add(last_->time_s ? fmt::format("frame {} at {:.4f} s", last_->number, *last_->time_s)
+                            : fmt::format("frame {}", last_->number));
     for (const NatnetBody& body : last_->bodies) {
       const glm::dvec3& p = body.position_m;
       const glm::dvec4& q = body.rotation_xyzw;
@@ -115,23 +114,23 @@ class NatnetParser : public LiveParser {
  private:
   /// Tries what was set, or what the server says, then what else there is.
   template <class Read>
-  auto read_as_fits(Read read) const -> decltype(read(NatnetLayout::Plain)) {
-    if (version_) return read(version_->layout);
+  auto read_as_fits(Read read) const -> decltype(read(NatnetVersion{})) {
+    if (version_) return read(version_->number);
     if (server_)
-      for (const Version& version : kVersions)
-        if (version.major == server_->major && version.minor == server_->minor)
-          if (auto found = read(version.layout)) return found;
+      if (auto found = read(server_->version)) return found;
     for (const Version& version : kVersions)
-      if (auto found = read(version.layout)) return found;
+      if (auto found = read(version.number)) return found;
     return std::nullopt;
   }
   Error no_fit(const char* what) const {
-    return make_error(ErrorCode::BadInput, "{} of NatNet is cut, or not of version {}", what,
-                      version_ ? version_->name : "3.0, 3.1, 4.0 or 4.1");
+    const std::string server =
+        server_ ? fmt::format("; its server says {}.{}", server_->version.major, server_->version.minor) : "";
+    return make_error(ErrorCode::BadInput, "{} of NatNet is cut, or not of version {}{}", what,
+                      version_ ? version_->name : "2.5 to 4.1", server);
   }
 
   Result<LivePacket> parse_frame(std::span<const std::byte> payload) {
-    auto frame = read_as_fits([&](NatnetLayout layout) { return read_natnet_frame(payload, layout); });
+    auto frame = read_as_fits([&](NatnetVersion version) { return read_natnet_frame(payload, version); });
     if (!frame) return no_fit("a frame");
     LivePacket packet;
     for (const NatnetBody& body : frame->bodies) {
@@ -139,8 +138,9 @@ class NatnetParser : public LiveParser {
       LivePose& pose = packet.poses.emplace_back();
       pose.subject = subject_of(body);
       pose.world_from_subject = pose_from_system(up_, body.position_m, quaternion_of(body.rotation_xyzw));
-      pose.source_time_ns = nanoseconds_of(frame->time_s);
+      if (frame->time_s) pose.source_time_ns = nanoseconds_of(*frame->time_s);
       pose.frame = frame->number;
+      pose.body = (body.skeleton ? *body.skeleton + uint64_t{1} : 0) << 32 | body.id;
     }
     if (frame->has_new_models) has_names_ = false;
     last_ = std::move(*frame);
@@ -148,7 +148,8 @@ class NatnetParser : public LiveParser {
   }
 
   Result<LivePacket> parse_names(std::span<const std::byte> payload) {
-    const auto found = read_as_fits([&](NatnetLayout layout) { return read_natnet_names(payload, layout); });
+    const auto found =
+        read_as_fits([&](NatnetVersion version) { return read_natnet_names(payload, version); });
     if (!found) return no_fit("a list of bodies");
     names_.clear();
     for (const NatnetName& name : found->names) names_[{name.skeleton, name.id}] = name.name;

@@ -33,6 +33,12 @@ inline glm::dquat quaternion_of(const glm::dvec4& xyzw) {
 /// Converts seconds to whole nanoseconds; empty if they are not finite or do not fit.
 std::optional<int64_t> nanoseconds_of(double seconds);
 
+/// A time in larger steps is worse than that of the packet's arrival.
+constexpr double kCoarsestTimeS = 0.002;
+/// Returns the seconds of a time that was sent as a float; empty if its steps are larger than kCoarsestTimeS
+/// there (from 32,768 s on), or it is no number.
+std::optional<double> fine_seconds(float seconds);
+
 /// Collects lines for describe(); lines beyond kMaxMonitorLines are counted in the last.
 class MonitorLines {
  public:

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "common/base/text.h"
 #include "common/scene/body_desc.h"
@@ -195,6 +196,7 @@ class VmcParser : public LiveParser {
   }
 
   uint64_t ignored() const override { return ignored_; }
+  std::vector<std::string> take_notes() override { return std::exchange(notes_, {}); }
 
   std::vector<std::string> describe() const override {
     MonitorLines lines;
@@ -219,12 +221,23 @@ class VmcParser : public LiveParser {
       return apply_device(arguments, packet);
     if (address == "/VMC/Ext/T") {
       const auto time_s = arguments.take_float();
-      if (time_s) body_.time_ns = nanoseconds_of(*time_s);
+      if (time_s) take_time(*time_s);
       return time_s.has_value();
     }
     if (address == "/strandcast/wind") return apply_wind(arguments, packet);
     // Faces, cameras, lights, devices in another scale: known, and of no use here.
     return address.starts_with("/VMC/");
+  }
+
+  /// A time is a float: what has run for long, or tells the time of day, has steps that are too large.
+  void take_time(float time_s) {
+    const auto fine_s = fine_seconds(time_s);
+    body_.time_ns = fine_s ? nanoseconds_of(*fine_s) : std::nullopt;
+    if (fine_s || !std::isfinite(time_s) || std::exchange(has_told_steps_, true)) return;
+    notes_.push_back(
+        fmt::format("the sender's time is {:.0f} s, of which a float tells no steps below {:g} ms: times of "
+                    "arrival are used",
+                    time_s, kCoarsestTimeS * kMsPerS));
   }
 
   bool apply_bone(OscArguments& arguments, LivePacket& packet) {
@@ -254,6 +267,8 @@ class VmcParser : public LiveParser {
 
   uint32_t limit_bytes_;
   VmcBody body_;
+  bool has_told_steps_ = false;
+  std::vector<std::string> notes_;
   std::vector<std::byte> last_;
   uint64_t ignored_ = 0;
 };

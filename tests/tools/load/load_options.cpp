@@ -1,4 +1,4 @@
-#include "tests/tools/load_options.h"
+#include "tests/tools/load/load_options.h"
 
 #include <CLI/CLI.hpp>
 

@@ -1,4 +1,4 @@
-#include "tests/tools/web_socket_reader.h"
+#include "tests/tools/load/web_socket_reader.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "tests/tools/load_socket.h"
+#include "tests/tools/load/load_socket.h"
 
 #include <arpa/inet.h>
 #include <netinet/tcp.h>

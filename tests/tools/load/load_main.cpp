@@ -13,8 +13,8 @@
 #include "common/base/quantile.h"
 #include "common/base/text.h"
 #include "common/client/client_token.h"
-#include "tests/tools/load_options.h"
-#include "tests/tools/load_viewers.h"
+#include "tests/tools/load/load_options.h"
+#include "tests/tools/load/load_viewers.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "tests/tools/load_viewers.h"
+#include "tests/tools/load/load_viewers.h"
 
 #include <poll.h>
 
@@ -12,8 +12,8 @@
 #include "common/base/hash.h"
 #include "common/base/profile.h"
 #include "common/strands/frame_header.h"
-#include "tests/tools/load_socket.h"
-#include "tests/tools/web_socket_reader.h"
+#include "tests/tools/load/load_socket.h"
+#include "tests/tools/load/web_socket_reader.h"
 
 namespace strandcast::load {
 namespace {

@@ -1,5 +1,5 @@
 // Instead of the page, where it is not built.
-#include "server/net/page.h"
+#include "common/page/page_files.h"
 
 namespace strandcast {
 

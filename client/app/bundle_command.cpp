@@ -1,0 +1,234 @@
+#include "client/app/bundle_command.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <iostream>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "client/app/ctl_commands.h"
+#include "common/base/file.h"
+#include "common/base/units.h"
+#include "common/scene/scene_file.h"
+#include "common/wire/messages.h"
+
+namespace strandcast {
+namespace {
+
+constexpr double kMostBundleSeconds = 3'600.0;
+constexpr uint32_t kMostDamagedInARow = 1'000;  // after that nothing more is read
+
+/// Unpacks the parts and starts the page's script. Modules and script become files of this document alone.
+constexpr std::string_view kLoader = R"html(<script>
+addEventListener('DOMContentLoaded', async () => {
+  const bytes = (id) => Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+  const unzipped = async (id, type) => {
+    const stream = new Blob([bytes(id)]).stream().pipeThrough(new DecompressionStream('gzip'));
+    return new Blob([await new Response(stream).arrayBuffer()], { type });
+  };
+  // As an address that workers of a file may fetch, too.
+  const module = async (id) => {
+    if (!document.getElementById(id)) return '';
+    const reader = new FileReader();
+    reader.readAsDataURL(await unzipped(id, 'application/wasm'));
+    await new Promise((done) => (reader.onload = done));
+    return reader.result;
+  };
+  const assets = { core: await module('core'), stepCore: await module('stepCore'), wholeCore: '' };
+  document.querySelector('meta[name=strandcast-assets]').content = JSON.stringify(assets);
+  const script = URL.createObjectURL(await unzipped('script', 'text/javascript'));
+  globalThis.strandcastBundle = { tape: bytes('tape').buffer, codec: document.getElementById('tape').dataset.codec, script };
+  await import(script);
+});
+</script>
+)html";
+
+std::string base64(std::string_view bytes) {
+  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    const size_t count = std::min<size_t>(3, bytes.size() - i);
+    uint32_t group = 0;
+    for (size_t k = 0; k < 3; ++k)
+      group = group << 8 | (k < count ? static_cast<uint8_t>(bytes[i + k]) : uint32_t{0});
+    for (size_t k = 0; k < 4; ++k) text += k <= count ? kDigits[group >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
+
+std::string_view as_text(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+/// What client/web/page/tape.ts reads: the number of messages before the first frame, then of each message
+/// its time in ms and its size, little-endian, and its bytes.
+class Tape {
+ public:
+  explicit Tape(uint32_t first_count) { put(first_count); }
+  void add(uint32_t time_ms, std::span<const std::byte> message) {
+    put(time_ms);
+    put(static_cast<uint32_t>(message.size()));
+    bytes_ += as_text(message);
+  }
+  const std::string& bytes() const { return bytes_; }
+
+ private:
+  void put(uint32_t value) {
+    static_assert(std::endian::native == std::endian::little);
+    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  std::string bytes_;
+};
+
+Welcome welcome_of(const RecordingStart& start, const SceneDesc& scene, const SceneAsset& asset) {
+  Welcome welcome;
+  welcome.session_id = "0000000000000000";
+  welcome.server_version = start.server_version;
+  welcome.scene_name = scene.name;
+  welcome.mode_reason = "a recording is played";
+  welcome.codec = start.codec;
+  welcome.codec_reason = "as recorded";
+  welcome.strand_count = asset.strand_count;
+  welcome.vertex_count = asset.vertex_count;
+  welcome.bound_m = scene.stream.bound_m;
+  welcome.step_rate_hz = scene.step_rate_hz;
+  welcome.look = scene.look;
+  welcome.camera = scene.camera;
+  welcome.frame_width = scene.stream.frame_width;
+  welcome.frame_height = scene.stream.frame_height;
+  return welcome;
+}
+
+std::string script_of(std::string_view id, std::string_view content, std::string_view attributes = {}) {
+  return fmt::format("<script type=\"application/octet-stream\" id=\"{}\"{}>{}</script>\n", id, attributes,
+                     base64(content));
+}
+
+/// Returns the file whose path begins with "/" and this name.
+Result<const PageFile*> part(PageFiles files, std::string_view name) {
+  const auto found = std::find_if(files.begin(), files.end(), [&](const PageFile& file) {
+    return file.path.substr(std::min<size_t>(1, file.path.size())).starts_with(name);
+  });
+  if (found == files.end()) return make_error(ErrorCode::Unsupported, "this build's page has no {}", name);
+  return &*found;
+}
+
+/// Replaces the line of the index that holds `what`.
+Status replace_line(std::string& html, std::string_view what, std::string_view by) {
+  const size_t at = html.find(what);
+  if (at == std::string::npos) return make_error(ErrorCode::Unsupported, "the page has no {}", what);
+  const size_t begin = html.rfind('\n', at) + 1;
+  const size_t end = html.find('\n', at);
+  html.replace(begin, end - begin, by);
+  return {};
+}
+
+Result<std::string> page_with(PageFiles files, const std::string& tape, const std::string& codec,
+                              bool has_all_solvers) {
+  const auto index =
+      std::find_if(files.begin(), files.end(), [](const auto& file) { return file.path == "/"; });
+  if (index == files.end())
+    return make_error(
+        ErrorCode::Unsupported,
+        "this build has no page for browsers (build with -DSTRANDCAST_WEB=ON, as deploy/run.sh does)");
+  std::string html(index->plain);
+  ASSIGN_OR_RETURN(const PageFile* style, part(files, "style."));
+  ASSIGN_OR_RETURN(const PageFile* script, part(files, "main."));
+  ASSIGN_OR_RETURN(const PageFile* core, part(files, "strand_page."));
+  RETURN_IF_ERROR(replace_line(html, "rel=\"stylesheet\"", fmt::format("<style>{}</style>", style->plain)));
+  RETURN_IF_ERROR(replace_line(html, "rel=\"preload\"", ""));
+  std::string parts(kLoader);
+  parts += script_of("script", script->gzip);
+  parts += script_of("core", core->gzip);
+  if (codec != "tangent") {
+    ASSIGN_OR_RETURN(const PageFile* step, part(files, has_all_solvers ? "strand_core." : "strand_step."));
+    parts += script_of("stepCore", step->gzip);
+  }
+  parts += script_of("tape", tape, fmt::format(" data-codec=\"{}\"", codec));
+  RETURN_IF_ERROR(replace_line(html, "<script type=\"module\"", parts));
+  return html;
+}
+
+uint32_t time_ms(int64_t since_ns) {
+  return static_cast<uint32_t>(std::clamp<int64_t>(since_ns, 0, int64_t{3'600} * kSInNs) / kMsInNs);
+}
+
+}  // namespace
+
+void declare_bundle(CLI::App& app, BundleCommand& command) {
+  app.add_option("recording", command.recording, "RECORDING.mcap")->required();
+  app.add_option("page", command.page, "The HTML file to write; it is replaced")->required();
+  app.add_option("--seconds", command.seconds, "Length from the begin of the recording (default: all of it)")
+      ->check(CLI::Range(0.0, kMostBundleSeconds));
+  app.add_flag("--all-solvers", command.has_all_solvers,
+               "Take the module that steps every solver: 0.6 MB more, needed by other solvers than dftl and "
+               "direct_rod");
+}
+
+Result<Bundle> make_bundle(RecordingReader& reader, PageFiles files, const BundleCommand& command) {
+  const RecordingStart& start = reader.start();
+  ASSIGN_OR_RETURN(const SceneAsset asset, reader.asset());
+  ASSIGN_OR_RETURN(const SceneDesc scene, parse_scene(start.scene_text, "the recording's scene", {}));
+  Bundle bundle;
+  bundle.solver = scene.solver.name;
+  constexpr uint32_t kFirstCount = 2;
+  Tape tape(kFirstCount);
+  tape.add(0, encode(ServerMessage(welcome_of(start, scene, asset))));
+  tape.add(0, reader.asset_frame()->message);
+  std::optional<int64_t> first_ns;
+  uint32_t damaged_in_a_row = 0;
+  while (damaged_in_a_row < kMostDamagedInARow) {
+    const auto item = reader.next();
+    if (!item) {
+      ++bundle.damaged;
+      ++damaged_in_a_row;
+      continue;
+    }
+    damaged_in_a_row = 0;
+    if (!*item) break;
+    const auto* frame = std::get_if<RecordedFrame>(&(*item)->what);
+    if (frame == nullptr || (!first_ns && !frame->is_keyframe())) continue;
+    const int64_t now_ns = frame->frame->header.sim_time_ns;
+    if (!first_ns) first_ns = now_ns;
+    bundle.seconds = static_cast<double>(now_ns - *first_ns) / kNsPerS;
+    if (bundle.seconds > command.seconds.value_or(kMostBundleSeconds)) break;
+    tape.add(time_ms(now_ns - *first_ns), frame->frame->message);
+    ++bundle.frame_count;
+    if (tape.bytes().size() > kMaxBundleTapeBytes)
+      return make_error(ErrorCode::LimitExceeded,
+                        "{:.1f} s of this recording take more than {} MiB: --seconds", bundle.seconds,
+                        kMaxBundleTapeBytes >> 20);
+  }
+  if (bundle.frame_count == 0)
+    return make_error(ErrorCode::BadInput, "the recording has no frame to begin with");
+  bundle.tape_bytes = tape.bytes().size();
+  ASSIGN_OR_RETURN(bundle.html, page_with(files, tape.bytes(), start.codec, command.has_all_solvers));
+  return bundle;
+}
+
+int run_bundle(const BundleCommand& command) {
+  const auto reader = RecordingReader::open(command.recording, RecordedPart::Frames);
+  if (!reader) return ctl_failure(reader.error());
+  const auto bundle = make_bundle(**reader, built_in_page(), command);
+  if (!bundle) return ctl_failure(bundle.error());
+  if (const Status saved = save_file(command.page, std::as_bytes(std::span(bundle->html))); !saved)
+    return ctl_failure(saved.error());
+  constexpr double kBytesPerKb = 1e3;
+  std::cout << fmt::format("{}: {} frames, {:.1f} s; {:.0f} kB, {:.0f} kB of them the recording's\n",
+                           command.page.string(), bundle->frame_count, bundle->seconds,
+                           static_cast<double>(bundle->html.size()) / kBytesPerKb,
+                           static_cast<double>(bundle->tape_bytes) * 4.0 / 3.0 / kBytesPerKb);
+  if (bundle->damaged > 0)
+    std::cout << fmt::format("  {} damaged parts of the recording are left out\n", bundle->damaged);
+  const bool is_usual = bundle->solver == "dftl" || bundle->solver == "direct_rod";
+  if (!is_usual && !command.has_all_solvers)
+    std::cout << fmt::format("  {} is not among the solvers of the smaller module: --all-solvers\n",
+                             bundle->solver);
+  return kDoneExit;
+}
+
+}  // namespace strandcast

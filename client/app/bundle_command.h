@@ -1,0 +1,45 @@
+// strandcast-ctl bundle: makes one HTML file of a recording, which browsers play without a server: the page
+// with its modules, the asset and the recorded strands.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "common/base/result.h"
+#include "common/page/page_files.h"
+#include "common/record/recording_reader.h"
+
+namespace CLI {
+class App;
+}
+
+namespace strandcast {
+
+struct BundleCommand {
+  std::filesystem::path recording;
+  std::filesystem::path page;     // the HTML file
+  std::optional<double> seconds;  // of the recording, from its begin; all of it if absent
+  bool has_all_solvers = false;   // with the module that steps every solver, which is larger
+};
+
+/// Largest number of bytes of recorded frames in a bundle.
+inline constexpr size_t kMaxBundleTapeBytes = size_t{128} << 20;
+
+void declare_bundle(CLI::App& app, BundleCommand& command);
+
+struct Bundle {
+  std::string html;
+  uint64_t frame_count = 0;
+  double seconds = 0.0;   // of simulation
+  size_t tape_bytes = 0;  // asset and frames
+  uint64_t damaged = 0;   // parts of the recording that could not be read
+  std::string solver;     // of the recorded scene
+};
+/// Makes the bundle of the frames that the reader gives; it must have been opened for Frames. BadInput
+/// without frames, Unsupported without `files`, LimitExceeded beyond kMaxBundleTapeBytes.
+Result<Bundle> make_bundle(RecordingReader& reader, PageFiles files, const BundleCommand& command);
+
+int run_bundle(const BundleCommand& command);
+
+}  // namespace strandcast

@@ -1,0 +1,167 @@
+// Alembic: one curves object below a transform that does nothing, with its points as samples, in the
+// conventions that Unreal takes for grooms.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/export/abc_file.h"
+#include "client/export/strand_writer.h"
+#include "common/base/version.h"
+
+namespace strandcast {
+namespace {
+
+constexpr int16_t kAbcGroomMajor = 1, kAbcGroomMinor = 5;  // of Unreal's groom conventions
+constexpr uint32_t kMoving = 1;                            // time sampling of what moves
+
+std::string text_bytes(const std::string& text) {
+  return text + '\0';
+}
+
+/// Metadata of a value for each strand or vertex.
+std::string param_metadata(const char* scope, const char* interpretation, uint32_t extent, const char* type) {
+  return fmt::format("arrayExtent=1;geoScope={}{};isGeomParam=true;podExtent={};podName={}", scope,
+                     interpretation, extent, type);
+}
+
+class AbcWriter : public StrandWriter {
+ public:
+  AbcWriter(const ExportOptions& options, const StrandSet& strands, AbcFile file)
+      : options_(options), strands_(strands), file_(std::move(file)) {
+    half_width_ = 0.5 * *std::max_element(strands.widths().begin(), strands.widths().end());
+  }
+
+  Status begin() { return append_frame(strands_.rest_points()); }
+
+  Status write(const ExportFrame& frame) override { return append_frame(frame.points); }
+
+  Result<WrittenBytes> finish() override {
+    AbcItem top;
+    AbcItem& hair = top.items.emplace_back();
+    hair.name = "Hair";
+    hair.metadata = "schema=AbcGeom_Xform_v3;schemaObjTitle=AbcGeom_Xform_v3:.xform";
+    RETURN_IF_ERROR(add_transform(hair));
+    AbcItem& curves = hair.items.emplace_back();
+    curves.name = "Strands";
+    curves.metadata =
+        "schema=AbcGeom_Curve_v2;schemaBaseType=AbcGeom_GeomBase_v1;schemaObjTitle=AbcGeom_Curve_v2:.geom";
+    RETURN_IF_ERROR(add_curves(curves));
+    const AbcEvenTimes moving{0.0, 1.0 / options_.fps};
+    ASSIGN_OR_RETURN(const uint64_t bytes, file_.finish(top, description(), std::span(&moving, 1)));
+    return WrittenBytes{1, bytes, options_.path};
+  }
+
+ private:
+  Status append_frame(std::span<const glm::dvec3> points) {
+    glm::dvec3 low = points.front(), high = low;
+    numbers_.clear();
+    for (const glm::dvec3& point : points) {
+      low = glm::min(low, point);
+      high = glm::max(high, point);
+      for (int axis = 0; axis < 3; ++axis) numbers_.push_back(static_cast<float>(point[axis]));
+    }
+    RETURN_IF_ERROR(file_.append(points_, abc_bytes(numbers_)));
+    low -= half_width_;
+    high += half_width_;
+    return file_.append(bounds_, abc_bytes(std::array{low.x, low.y, low.z, high.x, high.y, high.z}));
+  }
+
+  /// Adds a property that stands still.
+  template <class T>
+  Status add(std::vector<AbcEntry>& entries, const char* name, AbcForm form, AbcType type, uint32_t extent,
+             const std::string& metadata, const T& numbers) {
+    AbcEntry& entry = entries.emplace_back(AbcEntry{name, form, type, extent, 0, metadata, {}, {}});
+    return file_.append(entry.series, abc_bytes(numbers));
+  }
+
+  Status add_transform(AbcItem& hair) {
+    AbcEntry xform{".xform", AbcForm::Compound, AbcType::U8, 1, 0, "schema=AbcGeom_Xform_v3", {}, {}};
+    RETURN_IF_ERROR(
+        add(xform.entries, ".inherits", AbcForm::Scalar, AbcType::Bool, 1, "", std::array{uint8_t{1}}));
+    AbcEntry user{".userProperties", AbcForm::Compound, AbcType::U8, 1, 0, "", {}, {}};
+    RETURN_IF_ERROR(add(user.entries, "groom_version_major", AbcForm::Scalar, AbcType::I16, 1, "",
+                        std::array{kAbcGroomMajor}));
+    RETURN_IF_ERROR(add(user.entries, "groom_version_minor", AbcForm::Scalar, AbcType::I16, 1, "",
+                        std::array{kAbcGroomMinor}));
+    RETURN_IF_ERROR(add(user.entries, "groom_tool", AbcForm::Scalar, AbcType::String, 1, "",
+                        text_bytes(fmt::format("Strandcast {}", version()))));
+    xform.entries.push_back(std::move(user));
+    hair.entries.push_back(std::move(xform));
+    return {};
+  }
+
+  Status add_curves(AbcItem& curves) {
+    const std::string schema = "schema=AbcGeom_Curve_v2;schemaBaseType=AbcGeom_GeomBase_v1";
+    AbcEntry geom{".geom", AbcForm::Compound, AbcType::U8, 1, 0, schema, {}, {}};
+    std::vector<AbcEntry>& own = geom.entries;
+    own.push_back(
+        {".selfBnds", AbcForm::Scalar, AbcType::Double, 6, kMoving, "interpretation=box", bounds_, {}});
+    own.push_back(
+        {"P", AbcForm::Array, AbcType::Float, 3, kMoving, "geoScope=vtx;interpretation=point", points_, {}});
+    const auto strand_count = static_cast<size_t>(strands_.strand_count());
+    RETURN_IF_ERROR(add(own, "nVertices", AbcForm::Array, AbcType::I32, 1, "",
+                        std::vector<int32_t>(strand_count, static_cast<int32_t>(strands_.vertex_count()))));
+    constexpr std::array<uint8_t, 4> kLinearOpen = {1, 0, 0, 0};
+    RETURN_IF_ERROR(
+        add(own, "curveBasisAndType", AbcForm::Scalar, AbcType::U8, kLinearOpen.size(), "", kLinearOpen));
+    std::vector<float> widths;
+    for (size_t strand = 0; strand < strand_count; ++strand)
+      widths.insert(widths.end(), strands_.widths().begin(), strands_.widths().end());
+    RETURN_IF_ERROR(add(own, "width", AbcForm::Array, AbcType::Float, 1,
+                        param_metadata("vtx", "", 1, "float32_t"), widths));
+    AbcEntry free{".arbGeomParams", AbcForm::Compound, AbcType::U8, 1, 0, "", {}, {}};
+    RETURN_IF_ERROR(add_groom(free.entries));
+    own.push_back(std::move(free));
+    curves.entries.push_back(std::move(geom));
+    return {};
+  }
+
+  /// Adds what Unreal asks of each strand.
+  Status add_groom(std::vector<AbcEntry>& entries) {
+    const auto strand_count = static_cast<size_t>(strands_.strand_count());
+    const int16_t is_guide = options_.role == ExportRole::Guides ? 1 : 0;
+    std::vector<int32_t> id;
+    for (size_t strand = 0; strand < strand_count; ++strand) id.push_back(static_cast<int32_t>(strand));
+    RETURN_IF_ERROR(add(entries, "groom_group_id", AbcForm::Array, AbcType::I32, 1,
+                        param_metadata("uni", "", 1, "int32_t"), std::vector<int32_t>(strand_count, 0)));
+    RETURN_IF_ERROR(add(entries, "groom_guide", AbcForm::Array, AbcType::I16, 1,
+                        param_metadata("uni", "", 1, "int16_t"),
+                        std::vector<int16_t>(strand_count, is_guide)));
+    RETURN_IF_ERROR(add(entries, "groom_id", AbcForm::Array, AbcType::I32, 1,
+                        param_metadata("uni", "", 1, "int32_t"), id));
+    return add(entries, "groom_root_uv", AbcForm::Array, AbcType::Float, 2,
+               param_metadata("uni", ";interpretation=vector", 2, "float32_t"), strands_.root_uv());
+  }
+
+  /// Keys in their order. Alembic itself states neither unit nor axes.
+  std::string description() const {
+    return fmt::format(
+        "_ai_Application=Strandcast {};_ai_DCC_FPS={:.6f};_ai_Description={} strands of {} vertices, root "
+        "first, in {}. Sample 0 is the rest shape, the motion begins at sample 1.;unit_m={};up_axis={}",
+        version(), options_.fps, strands_.strand_count(), strands_.vertex_count(),
+        options_.space == ExportSpace::Head ? "the head's own space" : "the world", metres_of(options_.unit),
+        options_.up == ExportUp::Y ? 'Y' : 'Z');
+  }
+
+  const ExportOptions options_;
+  const StrandSet& strands_;
+  AbcFile file_;
+  double half_width_ = 0.0;
+  AbcSeries points_, bounds_;
+  std::vector<float> numbers_;  // of one frame, kept for its memory
+};
+
+}  // namespace
+
+Result<std::unique_ptr<StrandWriter>> make_abc_writer(const ExportOptions& options,
+                                                      const StrandSet& strands) {
+  ASSIGN_OR_RETURN(AbcFile file, AbcFile::create(options.path));
+  auto writer = std::make_unique<AbcWriter>(options, strands, std::move(file));
+  RETURN_IF_ERROR(writer->begin());
+  return std::unique_ptr<StrandWriter>(std::move(writer));
+}
+
+}  // namespace strandcast

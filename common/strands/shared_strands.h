@@ -1,0 +1,43 @@
+// SharedStrands: strands that a simulation steps as the viewers of the codec "step" do, with the same bits,
+// from a state that all of them have. As long as it does, viewers need no corrections.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "common/kernels/step_model.h"
+#include "common/kernels/strand_blocks.h"
+
+namespace strandcast {
+
+/// Largest number of vertices that are shared, since a state is copied whenever viewers were corrected.
+inline constexpr size_t kMostSharedVertices = 400'000;
+
+/// State that all viewers have after a frame. Immutable; any thread.
+class SharedState {
+ public:
+  virtual ~SharedState() = default;
+};
+
+class SharedStrands {
+ public:
+  virtual ~SharedStrands() = default;
+  /// Continues from a state of the same model.
+  virtual void take(const SharedState& state) = 0;
+  /// Simulates the tick, which ends at `end_time_ns` of simulated time.
+  virtual void step(const StepTick& tick, const StepScene& scene, int64_t end_time_ns) = 0;
+  /// Copies positions and velocities out, as SolverBlocks has them. Both have the groom's size.
+  virtual void read(StrandBlocks& position_m, StrandBlocks& velocity_mps) const = 0;
+};
+
+/// What an encoder tells the simulation.
+struct SharedUpdate {
+  uint64_t number = 0;                     // counts the encoder's updates from 1
+  uint64_t tick = 0;                       // of the state
+  std::shared_ptr<const StepModel> model;  // as the snapshot's trail has it
+  std::shared_ptr<const SharedState> state;
+  /// Strands of this model, for the receiver alone; nullptr if they came with an earlier update.
+  std::shared_ptr<SharedStrands> strands = {};
+};
+
+}  // namespace strandcast

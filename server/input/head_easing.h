@@ -1,0 +1,64 @@
+// HeadEasing: what is shown of a head whose source falls silent, and when it speaks again. The head slows
+// from its last speed and rests where it comes to. Once the source speaks, what the head is away from it
+// shrinks to nothing. Pure arithmetic on frames; not thread-safe.
+#pragma once
+
+#include <glm/glm.hpp>
+
+#include "common/math/pose.h"
+#include "common/motion/clip_path.h"
+
+namespace strandcast {
+
+/// Shortest time in which a silent head slows, s.
+inline constexpr double kShortestEasingS = kClipBlendS;
+/// Longest time in which a silent head slows, s. Faster heads than an easy start brings about in it, 2.5 m/s
+/// or 10 rad/s, slow harder: they would be far by then.
+inline constexpr double kLongestSlowingS = 0.5;
+/// Swiftest way back: after kShortestEasingS a tenth is left of what the head was away, 1/s.
+inline constexpr double kSwiftestPerS = 4.0 / kShortestEasingS;
+
+class HeadEasing {
+ public:
+  /// Begins anew with a head that is seen at a pose, at rest.
+  void restart(const Pose& seen);
+
+  /// Returns whether two frames have shown how fast the head moves.
+  bool knows_speed() const { return knows_speed_; }
+
+  /// Returns the pose to show of a head that its source says is at `seen`, `passed_s` after the frame before;
+  /// `since_s` is the source's time since what it said before. It is that very pose, unless the source was
+  /// silent: then the head gets there with no more acceleration than kEasyStart beyond the source's own, as
+  /// far as its speed is known.
+  Pose follow(const Pose& seen, double since_s, double passed_s);
+
+  /// Returns the pose to show while the source says nothing, `passed_s` after the frame before. The head
+  /// slows by no more than kEasyStart, up to kLongestSlowingS; on its way back it goes on with that
+  /// meanwhile.
+  Pose coast(double passed_s);
+
+ private:
+  /// Place (m) or turn (rad, world axes) of the head.
+  struct Part {
+    double easy_per_s2 = 0.0;     // greatest acceleration
+    glm::dvec3 seen_per_s{0.0};   // speed when the source spoke last
+    glm::dvec3 shown_per_s{0.0};  // in the newest frame
+    glm::dvec3 away{0.0};         // shown less where the source is taken to be
+    glm::dvec3 away_per_s{0.0};   // likewise of the speed
+
+    glm::dvec3 slowed(double silent_s) const;
+    void approach(double passed_s);
+  };
+  void hear_again(const Pose& seen, double since_s, double passed_s);
+  Pose show(double passed_s);
+
+  Part place_{.easy_per_s2 = kEasyStart.mps2};
+  Part turn_{.easy_per_s2 = kEasyStart.rad_per_s2};
+  Pose heard_;             // what the source said last
+  Pose reached_;           // where the source is taken to be since
+  Pose shown_;             // in the newest frame
+  double silent_s_ = 0.0;  // since the frame that showed heard_; 0: the source speaks
+  bool knows_speed_ = false;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,133 @@
+// A recording as one HTML file: the page's parts are in it, and all that a server would have sent.
+#include "client/app/bundle_command.h"
+
+#include <gmock/gmock.h>
+
+#include <cstring>
+
+#include "common/wire/messages.h"
+#include "tests/support/sample_recording.h"
+
+namespace strandcast::bundle_test {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+const PageFile kFiles[] = {
+    {.path = "/",
+     .plain =
+         "<meta name=\"strandcast-assets\" content=\"x\">\n<link rel=\"stylesheet\" href=\"style.0.css\">\n"
+         "<script type=\"module\" src=\"main.0.js\"></script>\n<link rel=\"preload\" href=\"a\">\n<main>\n"},
+    {.path = "/style.0.css", .plain = "main { color: red }", .gzip = "-"},
+    {.path = "/main.0.js", .plain = "-", .gzip = "Man"},
+    {.path = "/strand_page.0.wasm", .plain = "-", .gzip = "Ma"},
+    {.path = "/strand_step.0.wasm", .plain = "-", .gzip = "M"},
+    {.path = "/strand_core.0.wasm", .plain = "-", .gzip = "whole"},
+};
+
+std::unique_ptr<RecordingReader> reader_of(mcap::Bytes bytes) {
+  return RecordingReader::open(memory_byte_source(std::move(bytes)), RecordedPart::Frames).value();
+}
+
+std::string decoded(std::string_view base64) {
+  std::string bytes;
+  uint32_t group = 0;
+  int bits = 0;
+  for (const char c : base64) {
+    if (c == '=') break;
+    const int digit = c >= 'a'   ? c - 'a' + 26
+                      : c >= 'A' ? c - 'A'
+                      : c == '+' ? 62
+                      : c == '/' ? 63
+                                 : c - '0' + 52;
+    group = group << 6 | static_cast<uint32_t>(digit);
+    bits += 6;
+    if (bits < 8) continue;
+    bits -= 8;
+    bytes += static_cast<char>(group >> bits & 0xff);
+  }
+  return bytes;
+}
+
+/// The content of a script element of the page.
+std::string part_of(const std::string& html, const std::string& id) {
+  const size_t at = html.find("id=\"" + id + "\"");
+  if (at == std::string::npos) return {};
+  const size_t begin = html.find('>', at) + 1;
+  return decoded(std::string_view(html).substr(begin, html.find('<', begin) - begin));
+}
+
+struct TapeMessage {
+  uint32_t time_ms;
+  std::string bytes;
+};
+std::vector<TapeMessage> tape_of(const std::string& html) {
+  const std::string tape = part_of(html, "tape");
+  std::vector<TapeMessage> messages;
+  for (size_t at = 4; at + 8 <= tape.size();) {
+    uint32_t numbers[2];
+    std::memcpy(numbers, tape.data() + at, sizeof numbers);
+    messages.push_back({numbers[0], tape.substr(at + 8, numbers[1])});
+    at += 8 + numbers[1];
+  }
+  return messages;
+}
+
+TEST(Bundle, HoldsThePageAndAllThatAServerWouldHaveSent) {
+  const auto reader = reader_of(test::moving_recording(25));
+  const auto bundle = make_bundle(*reader, kFiles, {});
+  ASSERT_TRUE(bundle) << bundle.error().to_string();
+  EXPECT_EQ(bundle->frame_count, 25u);
+  EXPECT_NEAR(bundle->seconds, 2.4, 1e-9);
+  EXPECT_THAT(bundle->html, HasSubstr("<style>main { color: red }</style>"));
+  EXPECT_THAT(bundle->html, Not(HasSubstr("rel=\"preload\"")));
+  EXPECT_THAT(bundle->html, Not(HasSubstr("type=\"module\"")));
+  EXPECT_EQ(part_of(bundle->html, "script"), "Man");
+  EXPECT_EQ(part_of(bundle->html, "core"), "Ma");
+  EXPECT_EQ(part_of(bundle->html, "stepCore"), "M");
+
+  const std::vector<TapeMessage> tape = tape_of(bundle->html);
+  ASSERT_EQ(tape.size(), 2u + 25u);
+  const auto welcome = decode_server_message(std::as_bytes(std::span(tape[0].bytes)));
+  ASSERT_TRUE(welcome) << welcome.error().to_string();
+  EXPECT_EQ(std::get<Welcome>(*welcome).codec, "delta");
+  EXPECT_EQ(std::get<Welcome>(*welcome).strand_count, 4u);
+  EXPECT_EQ(static_cast<Opcode>(tape[1].bytes[0]), Opcode::Asset);
+  // What a decoder makes of it is what was recorded.
+  auto decoder = make_strand_decoder("delta", {4, 3}).value();
+  for (size_t i = 0; i < 25; ++i) {
+    EXPECT_EQ(tape[2 + i].time_ms, 100 * i);
+    const auto state = decoder->decode(std::as_bytes(std::span(tape[2 + i].bytes)));
+    ASSERT_TRUE(state) << state.error().to_string();
+    EXPECT_EQ((*state)->tick, i);
+  }
+}
+
+TEST(Bundle, IsAsLongAsAskedFor) {
+  const auto reader = reader_of(test::moving_recording(25));
+  BundleCommand command;
+  command.seconds = 1.0;
+  const auto bundle = make_bundle(*reader, kFiles, command);
+  ASSERT_TRUE(bundle) << bundle.error().to_string();
+  EXPECT_EQ(bundle->frame_count, 11u);
+}
+
+TEST(Bundle, TakesTheLargerModuleIfAskedFor) {
+  const auto reader = reader_of(test::moving_recording(2));
+  BundleCommand command;
+  command.has_all_solvers = true;
+  EXPECT_EQ(part_of(make_bundle(*reader, kFiles, command)->html, "stepCore"), "whole");
+}
+
+TEST(Bundle, SaysWhatItLacks) {
+  const auto without_page = make_bundle(*reader_of(test::moving_recording(2)), {}, {});
+  ASSERT_FALSE(without_page);
+  EXPECT_THAT(without_page.error().message, HasSubstr("-DSTRANDCAST_WEB=ON"));
+  const auto no_frames = make_bundle(*reader_of(test::moving_recording(0)), kFiles, {});
+  ASSERT_FALSE(no_frames);
+  EXPECT_THAT(no_frames.error().message, HasSubstr("no frame"));
+}
+
+}  // namespace
+}  // namespace strandcast::bundle_test

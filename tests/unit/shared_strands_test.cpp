@@ -1,0 +1,211 @@
+// A simulation that goes on from its viewers' strands takes their steps, bit for bit: nothing is corrected.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <numbers>
+#include <span>
+
+#include "common/scene/scene_file.h"
+#include "common/strands/strand_codec.h"
+#include "tests/support/stepped_hair.h"
+
+namespace strandcast {
+namespace {
+
+constexpr int kSettledFrames = 30;  // until the model is told and steps are under way
+
+SceneDesc scene_of(const std::string& quality) {
+  SceneDesc scene = built_in_scene_with({"quality=" + quality}).value();
+  std::get<ProceduralGroomDesc>(scene.groom).strand_count = 400;
+  return scene;
+}
+
+/// A head that walks and shakes, at 60 Hz.
+InputFrame shaken(int frame) {
+  const double t_s = frame / 60.0;
+  InputFrame input;
+  input.has_motion = true;
+  input.world_from_head = walking_head(t_s);
+  input.world_from_head.rotation =
+      glm::angleAxis(0.96 * std::sin(2.0 * std::numbers::pi * 2.2 * t_s), glm::dvec3(0.0, 1.0, 0.0)) *
+      input.world_from_head.rotation;
+  return input;
+}
+
+/// A stream of hair to one viewer, whose strands the simulation takes over where it shares them.
+class Stream {
+ public:
+  /// `delay`: steps that the simulation takes before it hears what viewers have.
+  Stream(const SceneDesc& scene, bool shares, size_t delay = 0)
+      : hair_(scene), shares_(shares), delay_(delay) {
+    hair_.move_bust();
+    encoder_ = make_strand_encoder("step").value();
+    encoder_->set_rest_shape(hair_.rest_in_head_m());
+    viewer_ = new_viewer();
+  }
+
+  SteppedHair& hair() { return hair_; }
+  /// Whether viewers had to be corrected in the frame, or were told a rounded state.
+  bool send(const InputFrame& input, bool joins = false) {
+    state_ = hair_.step(input);
+    if (joins) {
+      const JoinFrames frames = encoder_->encode_for_join(state_.snapshot);
+      take(frames.frame);
+      joiner_ = new_viewer();
+      const auto joined = joiner_->decode(frames.keyframe->message);
+      EXPECT_TRUE(joined) << joined.error().to_string();
+      EXPECT_EQ(state_hash(**joined), state_hash(*seen_));
+    } else {
+      const EncodedFramePtr frame = encoder_->encode(state_.snapshot);
+      take(frame);
+      if (joiner_ != nullptr) {
+        EXPECT_EQ(state_hash(**joiner_->decode(frame->message)), state_hash(*seen_));
+      }
+    }
+    const auto update = encoder_->take_shared();
+    told_.push_back(update);
+    if (told_.size() <= delay_) return update != nullptr;
+    if (told_.front() && shares_) hair_.share(*told_.front());
+    told_.pop_front();
+    return update != nullptr;
+  }
+  /// Frames of `count` that were corrected, from frame `first` on.
+  int corrected(int first, int count) {
+    int result = 0;
+    for (int i = first; i < first + count; ++i) result += send(shaken(i)) ? 1 : 0;
+    return result;
+  }
+  size_t bytes() const { return bytes_; }  // of the last frame
+  /// Farthest that a vertex of the viewer is from the simulation's, m.
+  double worst_error_m() const {
+    const std::vector<glm::vec3> seen_m = positions_in_head(*seen_);
+    double worst_m = 0.0;
+    for (size_t i = 0; i < seen_m.size(); ++i)
+      worst_m =
+          std::max(worst_m, glm::distance(glm::dvec3(seen_m[i]), glm::dvec3(state_.position_in_head_m[i])));
+    return worst_m;
+  }
+
+ private:
+  std::unique_ptr<StrandDecoder> new_viewer() const {
+    auto viewer = make_strand_decoder("step", {hair_.strand_count(), hair_.vertex_count()}).value();
+    viewer->set_rest_shape(hair_.rest_in_head_m());
+    return viewer;
+  }
+  void take(const EncodedFramePtr& frame) {
+    const auto seen = viewer_->decode(frame->message);
+    ASSERT_TRUE(seen) << seen.error().to_string();
+    seen_ = *seen;
+    bytes_ = frame->message.size();
+  }
+
+  SteppedHair hair_;
+  const bool shares_;
+  const size_t delay_;
+  std::deque<std::shared_ptr<SharedUpdate>> told_;
+  std::unique_ptr<StrandEncoder> encoder_;
+  std::unique_ptr<StrandDecoder> viewer_;
+  std::unique_ptr<StrandDecoder> joiner_;
+  SteppedState state_;
+  std::shared_ptr<const Snapshot> seen_;
+  size_t bytes_ = 0;
+};
+
+class SharedStrands : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Qualities, SharedStrands, testing::Values("fast", "full"));
+
+/// What viewers show is then the simulation's own hair, to half of a step of the lattice.
+TEST_P(SharedStrands, LeaveNothingToCorrect) {
+  Stream shared(scene_of(GetParam()), true);
+  shared.corrected(0, kSettledFrames);
+  EXPECT_EQ(shared.corrected(kSettledFrames, 150), 0);
+  const double quantum_m = lattice_step_m("step", SteppedHair::kBoundM).value();
+  EXPECT_LT(shared.worst_error_m(), 0.9 * quantum_m);
+
+  Stream apart(scene_of(GetParam()), false);
+  apart.corrected(0, kSettledFrames);
+  EXPECT_GT(apart.corrected(kSettledFrames, 150), 10);
+  EXPECT_GT(apart.worst_error_m(), 2.0 * quantum_m);
+  EXPECT_LE(shared.bytes(), apart.bytes());
+}
+
+TEST_P(SharedStrands, GoOnFromWhatAJoinerIsTold) {
+  Stream stream(scene_of(GetParam()), true);
+  stream.corrected(0, kSettledFrames);
+  for (int join = 0; join < 5; ++join) {
+    const int first = kSettledFrames + 20 * join;
+    EXPECT_TRUE(stream.send(shaken(first), true));
+    EXPECT_LT(stream.worst_error_m(), SteppedHair::kBoundM);
+    EXPECT_EQ(stream.corrected(first + 1, 19), 0) << join;
+  }
+}
+
+/// An encoder takes its time: the simulation repeats the steps that it took meanwhile.
+TEST_P(SharedStrands, AreFoundWhenTheyAreLate) {
+  for (const size_t delay : {1, 2, 3}) {
+    Stream stream(scene_of(GetParam()), true, delay);
+    stream.corrected(0, kSettledFrames);
+    stream.corrected(kSettledFrames, 60);
+    EXPECT_EQ(stream.corrected(kSettledFrames + 60, 60), 0) << delay;
+    EXPECT_TRUE(stream.send(shaken(kSettledFrames + 120), true));
+    stream.corrected(kSettledFrames + 121, 10);
+    EXPECT_EQ(stream.corrected(kSettledFrames + 131, 30), 0) << delay;
+  }
+}
+
+double rms_m(std::span<const glm::vec3> a_m, std::span<const glm::vec3> b_m) {
+  double sum = 0.0;
+  for (size_t i = 0; i < a_m.size(); ++i) sum += glm::dot(a_m[i] - b_m[i], a_m[i] - b_m[i]);
+  return std::sqrt(sum / static_cast<double>(a_m.size()));
+}
+
+/// Somebody joins twice a second. Each time velocities are rounded, by 1 mm/s at most.
+TEST_P(SharedStrands, RestAsJoinersCome) {
+  SceneDesc scene = scene_of(GetParam());
+  scene.wind = {};
+  InputFrame still;
+  still.has_motion = true;
+  still.world_from_head.position_m = {0.0, 1.6, 0.0};
+  double moved_m[2] = {};
+  for (const bool joins : {false, true}) {
+    Stream stream(scene, true);
+    for (int i = 0; i < 2 * kSettledFrames; ++i) stream.send(still);
+    const std::vector<glm::vec3> before_m = stream.hair().state().position_in_head_m;
+    for (int i = 0; i < 300; ++i) stream.send(still, joins && i % 30 == 0);
+    moved_m[joins] = rms_m(before_m, stream.hair().state().position_in_head_m);
+  }
+  EXPECT_LT(moved_m[1], moved_m[0] + 0.5 * SteppedHair::kBoundM);
+}
+
+/// Strands that were put elsewhere are not taken back by a state from before.
+TEST_P(SharedStrands, ForgetStatesFromBeforeAReset) {
+  Stream stream(scene_of(GetParam()), true, 2);
+  stream.corrected(0, kSettledFrames);
+  EXPECT_TRUE(stream.send(shaken(kSettledFrames), true));  // on its way as the hair is reset
+  stream.hair().reset();
+  stream.corrected(kSettledFrames + 1, 2);
+  Stream alone(scene_of(GetParam()), false);
+  alone.corrected(0, kSettledFrames + 1);
+  alone.hair().reset();
+  alone.corrected(kSettledFrames + 1, 2);
+  EXPECT_LT(rms_m(stream.hair().state().position_in_head_m, alone.hair().state().position_in_head_m), 1e-3);
+}
+
+TEST_P(SharedStrands, GoOnOverOtherScenesAndJumps) {
+  SceneDesc scene = scene_of(GetParam());
+  Stream stream(scene, true);
+  stream.corrected(0, kSettledFrames);
+  scene.gravity_mps2.y *= 0.5;
+  scene.hair.wind = 0.2;
+  stream.hair().change(scene);
+  EXPECT_EQ(stream.corrected(kSettledFrames, 20), 0);
+  InputFrame jump = shaken(200);
+  jump.has_teleported = true;
+  stream.send(jump);
+  EXPECT_EQ(stream.corrected(201, 20), 0);
+}
+
+}  // namespace
+}  // namespace strandcast
