@@ -4,6 +4,7 @@
 #include <array>
 #include <numbers>
 
+#include "common/base/command_line_error.h"
 #include "common/math/polar.h"
 
 namespace strandcast {
@@ -41,17 +42,17 @@ void declare_camera(CLI::App& app, CameraOptions& options) {
       ->check(CLI::IsMember(names));
   app.add_option("--session", options.session, "Of this viewer, as listed by sessions (default: of all)");
   app.add_option("--yaw-deg", options.yaw_deg, "So far round, from the face towards the head's left")
-      ->check(CLI::Range(-360.0, 360.0));
+      ->check(without_nan(CLI::Range(-360.0, 360.0)));
   app.add_option("--pitch-deg", options.pitch_deg, "So high above the horizon")
-      ->check(CLI::Range(-kTopDeg, kTopDeg));
+      ->check(without_nan(CLI::Range(-kTopDeg, kTopDeg)));
   app.add_option("--distance-m", options.distance_m, "So far from what it looks at")
-      ->check(CLI::Range(kMinDistanceM, kMaxReachM));
+      ->check(without_nan(CLI::Range(kMinDistanceM, kMaxReachM)));
   app.add_option("--target-m", options.target_m,
                  "What it looks at: x y z from the head joint, +Y up, +Z ahead")
       ->expected(3)
-      ->check(CLI::Range(-kMaxReachM, kMaxReachM));
+      ->check(without_nan(CLI::Range(-kMaxReachM, kMaxReachM)));
   app.add_option("--fov-deg", options.fov_deg, "Field of view, from its lower to its upper edge")
-      ->check(CLI::Range(kMinFovDeg, kMaxFovDeg));
+      ->check(without_nan(CLI::Range(kMinFovDeg, kMaxFovDeg)));
 }
 
 Result<CameraDesc> camera_of(const CameraOptions& options, const CameraDesc& scene_camera) {

@@ -6,6 +6,7 @@
 #include "client/app/recording_commands.h"
 #include "client/app/script_command.h"
 #include "client/app/step_command.h"
+#include "common/base/command_line_error.h"
 
 namespace strandcast {
 namespace {
@@ -22,7 +23,7 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
   app.add_option("--wind", feed.wind, "CSV file, gusts or none")->capture_default_str();
   app.add_option("--unit", feed.motion_file.unit_m,
                  "Metres per unit of the BVH file, 0 = guessed from the length of the bones")
-      ->check(CLI::Range(0.0, 1e3))
+      ->check(without_nan(CLI::Range(0.0, 1e3)))
       ->capture_default_str();
   app.add_option("--up", feed.motion_file.up, "Up axis of the BVH file (default: guessed from the rest pose)")
       ->check(CLI::IsMember({"y", "z"}));
@@ -39,14 +40,14 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
       "--live", feed.is_live,
       "Go on in real time when the simulation is slower, as a stage does (default: as slowly as it)");
   app.add_option("--speed", feed.speed, "Playing speed")
-      ->check(CLI::Range(1e-3, kMaxSpeed))
+      ->check(without_nan(CLI::Range(1e-3, kMaxSpeed)))
       ->capture_default_str();
   app.add_option(
          "--seconds", feed.seconds,
          "Stop after this long (default: at the end of the motion file; without one, or with --loop, never)")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(without_nan(CLI::Range(0.0, 1e6)));
   app.add_option("--rate", feed.rate_hz, "Samples per second")
-      ->check(CLI::Range(kMinFeedRateHz, kMaxDatagramRateHz))
+      ->check(without_nan(CLI::Range(kMinFeedRateHz, kMaxDatagramRateHz)))
       ->capture_default_str();
   app.add_option_function<std::vector<float>>(
          "--wind-mean",
@@ -55,7 +56,7 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
       ->expected(3);
   app.add_option("--gust-intensity", feed.gust_intensity,
                  "Standard deviation of the gusts over their mean speed")
-      ->check(CLI::Range(0.0f, 2.0f))
+      ->check(without_nan(CLI::Range(0.0f, 2.0f)))
       ->capture_default_str();
   app.add_option("--seed", feed.seed, "Seed of the gusts")->capture_default_str();
   auto* as = app.add_option(
@@ -66,7 +67,7 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
 void declare_latency(CLI::App& app, CtlCommandLine& line) {
   LatencyOptions& latency = line.latency;
   app.add_option("--seconds", latency.seconds, "For so long")
-      ->check(CLI::Range(0.1, 1e6))
+      ->check(without_nan(CLI::Range(0.1, 1e6)))
       ->capture_default_str();
   app.add_option("--mode", latency.mode, "strands or frames")
       ->check(CLI::IsMember({"strands", "frames"}))
@@ -98,7 +99,8 @@ void declare_test(CLI::App& app, CtlCommandLine& line) {
 }
 
 void declare_monitor(CLI::App& app, CtlCommandLine& line) {
-  app.add_option("--seconds", line.monitor_s, "Stop after this long")->check(CLI::Range(0.0, 1e6));
+  app.add_option("--seconds", line.monitor_s, "Stop after this long")
+      ->check(without_nan(CLI::Range(0.0, 1e6)));
 }
 
 void declare_step(CLI::App& app, CtlCommandLine& line) {
@@ -141,7 +143,7 @@ void declare_check(CLI::App& app, CtlCommandLine& line) {
       ->check(CLI::Range(uint64_t{2}, uint64_t{1'000'000}))
       ->capture_default_str();
   app.add_option("--timeout", line.check_timeout_s, "Seconds to wait for them")
-      ->check(CLI::Range(0.1, 1e6))
+      ->check(without_nan(CLI::Range(0.1, 1e6)))
       ->capture_default_str();
 }
 
@@ -153,7 +155,7 @@ void declare_record_start(CLI::App& app, CtlCommandLine& line) {
 void declare_kick(CLI::App& app, CtlCommandLine& line) {
   app.add_option("session", line.session, "Its number, as listed by sessions")->required();
   app.add_option("--ban", line.ban_s, "And let nobody of its address in for so many seconds")
-      ->check(CLI::Range(0.0, kMaxBanS));
+      ->check(without_nan(CLI::Range(0.0, kMaxBanS)));
 }
 
 void declare_info(CLI::App& app, CtlCommandLine& line) {

@@ -10,6 +10,7 @@
 #include "client/app/live_states.h"
 #include "client/app/recorded_states.h"
 #include "client/export/export_strands.h"
+#include "common/base/command_line_error.h"
 
 namespace strandcast {
 namespace {
@@ -70,7 +71,7 @@ void declare_export(CLI::App& app, ExportCommand& command) {
       ->capture_default_str();
   app.add_flag("--guides", command.is_guides,
                "Tell Unreal that these strands guide others, and are not drawn");
-  const auto seconds = CLI::Range(0.0, kMostSeconds);
+  const auto seconds = without_nan(CLI::Range(0.0, kMostSeconds));
   app.add_option("--from", command.from_s, "Begin so many seconds after the first state")->check(seconds);
   app.add_option("--to", command.to_s, "End so many seconds after the first state")->check(seconds);
   app.add_option("--seconds", command.seconds,

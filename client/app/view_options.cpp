@@ -89,7 +89,7 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
   app.add_option("--fps", options.film_fps, "Frames per second of --export, such as 24, 23.976 or 24000/1001")
       ->transform(frame_rates)
       ->capture_default_str();
-  const auto seconds = CLI::Range(0.0, kMostFilmS);
+  const auto seconds = without_nan(CLI::Range(0.0, kMostFilmS));
   app.add_option("--from", options.film_from_s, "Begin --export so many seconds after the first state")
       ->check(seconds);
   app.add_option("--to", options.film_to_s, "End --export so many seconds after the first state")
@@ -133,14 +133,14 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
       ->capture_default_str();
   app.add_option("--clip", options.clip, "Write an animated WebP (headless)");
   app.add_option("--clip-seconds", options.clip_s, "Length of the clip, simulated seconds")
-      ->check(CLI::Range(0.1, kMaxClipS))
+      ->check(without_nan(CLI::Range(0.1, kMaxClipS)))
       ->capture_default_str();
   app.add_option("--clip-fps", options.clip_fps, "Pictures per second of the clip")
       ->transform(frame_rates)
       ->capture_default_str();
   app.add_option("--clip-size", raw.clip_size, "Size of the clip (default: as --size)");
   app.add_option("--seconds", raw.seconds, "Stop receiving after this long; what came is then drawn")
-      ->check(CLI::Range(0.1, 1e6));
+      ->check(without_nan(CLI::Range(0.1, 1e6)));
   app.add_option("--report", options.report, "Write what was measured: .json, else key=value lines");
   app.add_option(
       "--trace", options.trace,

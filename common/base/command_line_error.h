@@ -1,6 +1,9 @@
-// What is wrong with a command line, as one sentence: CLI11's own, but for a value that cannot be read.
+// What is wrong with a command line, as one sentence: CLI11's own, but for a value that cannot be read, and
+// for NaN, which CLI11 takes into every range.
 #pragma once
 
+#include <cmath>
+#include <cstdlib>
 #include <string>
 #include <string_view>
 
@@ -20,6 +23,16 @@ inline std::string command_line_error(std::string_view said) {
 template <class App, class Failure>
 std::string command_line_failure(const App* app, const Failure& failure) {
   return app->get_name() + ": " + command_line_error(failure.what()) + " (--help lists the options)\n";
+}
+
+/// Returns `range`, a CLI::Range, which then refuses NaN too.
+template <class Range>
+Range without_nan(Range range) {
+  range.operation([inner = range](std::string& text) {
+    if (std::isnan(std::strtod(text.c_str(), nullptr))) return "'" + text + "' is no number";
+    return inner(text);
+  });
+  return range;
 }
 
 }  // namespace strandcast

@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 
+#include "common/base/command_line_error.h"
 #include "common/motion/motion_file.h"
 #include "server/report/report_commands.h"
 
@@ -8,7 +9,7 @@ namespace strandcast {
 void add_motion_file_options(CLI::App& command, MotionFileOptions& options) {
   command
       .add_option("--unit", options.unit_m, "metres per unit of the .bvh file; 0 = guessed from the bones")
-      ->check(CLI::Range(0.0, 1e3))
+      ->check(without_nan(CLI::Range(0.0, 1e3)))
       ->capture_default_str();
   command.add_option("--up", options.up, "up axis of the .bvh file; default: guessed from the rest pose")
       ->check(CLI::IsMember({"y", "z"}));

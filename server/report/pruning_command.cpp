@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "common/base/command_line_error.h"
 #include "common/scene/scene_file.h"
 #include "server/report/pruning.h"
 #include "server/report/report_commands.h"
@@ -89,7 +90,7 @@ void declare_pruning(CLI::App& command, PruningOptions& options) {
   command.add_option("--share", options.shares, "of strands that are simulated; repeatable")
       ->expected(1)
       ->take_all()
-      ->check(CLI::Range(0.001, 1.0));
+      ->check(without_nan(CLI::Range(0.001, 1.0)));
   command.add_option("--steps", options.steps, "of each run")
       ->check(CLI::Range(10, 100'000))
       ->capture_default_str();

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 
+#include "common/base/command_line_error.h"
 #include "common/gl/egl_context.h"
 #include "common/scene/scene_file.h"
 #include "server/report/csv_file.h"
@@ -55,10 +56,10 @@ void declare_scalp(CLI::App& command, ScalpOptions& options) {
   command.add_option("--motion", options.motion_path, ".bvh file; default: a built-in walk");
   add_motion_file_options(command, options.motion_file);
   command.add_option("--seconds", options.seconds, "of the motion")
-      ->check(CLI::Range(0.1, 600.0))
+      ->check(without_nan(CLI::Range(0.1, 600.0)))
       ->capture_default_str();
   command.add_option("--every-s", options.every_s, "seconds between two measurements")
-      ->check(CLI::Range(0.01, 60.0))
+      ->check(without_nan(CLI::Range(0.01, 60.0)))
       ->capture_default_str();
   command.add_option("--out", options.out, "folder for the CSV and the pictures")->required();
   add_sim_device_options(command, options.device);

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 
+#include "common/base/command_line_error.h"
 #include "server/report/report_commands.h"
 #include "server/report/report_folder.h"
 #include "server/report/report_options.h"
@@ -55,7 +56,7 @@ void declare_streaming(CLI::App& command, StreamingOptions& options) {
   command
       .add_option("--seconds", options.seconds,
                   "recorded of each part of a motion, the median and the wildest; default: 0.5")
-      ->check(CLI::PositiveNumber);
+      ->check(without_nan(CLI::PositiveNumber));
   add_sim_device_options(command, options.device, {false, "the solver in double precision"});
   command.add_flag("--quick", options.is_quick, "fewer and smaller: a minute or two on two cores");
 }

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 
+#include "common/base/command_line_error.h"
 #include "server/report/report_commands.h"
 #include "server/report/report_folder.h"
 #include "server/report/report_options.h"
@@ -34,7 +35,7 @@ void declare_work_precision(CLI::App& command, WorkPrecisionOptions& options) {
       ->expected(1)
       ->take_all();
   command.add_option("--seconds", options.motion_s, "length of the measured motion")
-      ->check(CLI::PositiveNumber);
+      ->check(without_nan(CLI::PositiveNumber));
   add_sim_device_options(command, options.device, {true, "double-precision references only"});
   command.add_flag("--quick", options.is_quick, "fewer runs: some minutes on two cores");
 }

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "common/base/command_line_error.h"
 #include "common/base/units.h"
 
 namespace strandcast::chaos {
@@ -31,7 +32,7 @@ LinkPlan plan_of(const ChaosOptions& options) {
 }  // namespace
 
 void declare_chaos(CLI::App& app, ChaosOptions& options) {
-  const auto ms = CLI::Range(0.0, kMaxMs);
+  const auto ms = without_nan(CLI::Range(0.0, kMaxMs));
   app.add_option("--listen", options.listen, "HOST:PORT that viewers connect to")->capture_default_str();
   app.add_option("--to", options.to, "HOST:PORT of the server")->capture_default_str();
   app.add_option("--direction", options.direction, "Where the faults apply: up is to the server")
@@ -40,26 +41,26 @@ void declare_chaos(CLI::App& app, ChaosOptions& options) {
   app.add_option("--delay-ms", options.delay_ms, "Delay of each direction")->check(ms);
   app.add_option("--jitter-ms", options.jitter_ms, "Up to this much more, order kept")->check(ms);
   app.add_option("--rate-mbit", options.rate_mbit, "Rate of each direction, 0 = unlimited")
-      ->check(CLI::Range(0.0, 1e5));
+      ->check(without_nan(CLI::Range(0.0, 1e5)));
   app.add_option("--queue-kb", options.queue_kb, "Bytes that may wait for the rate")
-      ->check(CLI::Range(1.5, 8e3));
+      ->check(without_nan(CLI::Range(1.5, 8e3)));
   app.add_option("--freeze-every-ms", options.freeze_every_ms, "Period of freezes, 0 = none")->check(ms);
   app.add_option("--freeze-ms", options.freeze_ms, "Length of a freeze")->check(ms);
   app.add_option("--reset-every", options.reset_every_s,
                  "Reset all connections every so many seconds, 0 = never")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(without_nan(CLI::Range(0.0, 1e6)));
   app.add_option("--reset-after-bytes", options.reset_after_bytes,
                  "Reset a connection after so many bytes, 0 = never");
   app.add_option("--silent-after-bytes", options.silent_after_bytes,
                  "Swallow everything after so many bytes (half-open), 0 = never");
   app.add_option("--corrupt-per-mb", options.corrupt_per_mb, "Wrong bits per million bytes")
-      ->check(CLI::Range(0.0, 5e5));
+      ->check(without_nan(CLI::Range(0.0, 5e5)));
   app.add_option("--writes", options.writes, "How bytes leave")
       ->check(CLI::IsMember({"as-read", "one-byte", "split", "merged"}))
       ->capture_default_str();
   app.add_option("--seed", options.seed, "Seed of corruption, cuts and jitter")->capture_default_str();
   app.add_option("--seconds", options.seconds, "Stop after this long, 0 = until Ctrl-C")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(without_nan(CLI::Range(0.0, 1e6)));
 }
 
 Result<RelayConfig> relay_config(const ChaosOptions& options) {

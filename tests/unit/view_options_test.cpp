@@ -102,6 +102,21 @@ TEST(ViewOptionTable, EveryOptionChangesItsFieldAndNoOther) {
   test::expect_all_options(rows, testing::internal::GetCapturedStdout());
 }
 
+TEST(ViewOptionTable, NumbersEndWhereTheyAreSaidTo) {
+  const test::OptionRange kRanges[] = {{"--fps", "0.9", "1", "60", "61", kFilm},
+                                       {"--from", "-1", "0", "86400", "86401", kFilm},
+                                       {"--to", "-1", "0", "86400", "86401", kFilm},
+                                       {"--after-frames", "0", "1", "1000000", "1000001"},
+                                       {"--clip-seconds", "0.09", "0.1", "60", "61"},
+                                       {"--clip-fps", "0.9", "1", "60", "61"},
+                                       {"--seconds", "0.09", "0.1", "1000000", "1000001"},
+                                       {"--size", "15x16", "16x16", "8192x8192", "8193x8192"}};
+  testing::internal::CaptureStderr();
+  test::expect_ranges(kRanges,
+                      [](const test::Arguments& arguments) { return parse(arguments).options.has_value(); });
+  (void)testing::internal::GetCapturedStderr();
+}
+
 // What a server is told of it: every field of its own, under values that differ from all first ones.
 TEST(ViewOptionTable, AHelloSaysWhatWasAskedFor) {
   const auto line = parse({"--connect", "wss://other:81", "--mode", "frames", "--token", "secret", "--size",

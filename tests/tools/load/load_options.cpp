@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include "client/app/view_options.h"
+#include "common/base/command_line_error.h"
 
 namespace strandcast::load {
 
@@ -20,10 +21,10 @@ void declare_load(CLI::App& app, LoadOptions& options) {
   app.add_option("--stalled-viewers", options.stalled_viewers,
                  "Viewers that join and never read again, besides");
   app.add_option("--seconds", options.seconds, "How long to measure")
-      ->check(CLI::Range(0.1, 1e6))
+      ->check(without_nan(CLI::Range(0.1, 1e6)))
       ->capture_default_str();
   app.add_option("--warm-up", options.warm_up_s, "Seconds before that")
-      ->check(CLI::Range(0.0, 1e3))
+      ->check(without_nan(CLI::Range(0.0, 1e3)))
       ->capture_default_str();
   app.add_option("--churn-ms", options.churn_ms,
                  "The oldest viewer leaves and a new one joins this often, 0 = never")
