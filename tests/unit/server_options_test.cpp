@@ -48,7 +48,7 @@ inline void tell(FieldTexts& told, const std::string& where, const NetConfig& al
 inline void tell(FieldTexts& told, const std::string& where, const ServerConfig& all) {
   OPTION_FIELDS(all, scene, net, sim_device, gl_device, renderer, shader_folder, on_publish, is_lockstep,
                 trace_path, make_painter, is_drawn_by_processors, make_source, fallback_codec, live_allowed,
-                record, record_folder, tap);
+                record, record_folder, tap, shared);
 }
 inline void tell(FieldTexts& told, const std::string& where, const ServerOptions& all) {
   OPTION_FIELDS(all, scene_path, overrides, mocap, token_path, port_path, log_level, has_json_log, run_s,
