@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "client/app/ctl_commands.h"
+#include "common/base/command_line_error.h"
 #include "common/base/file.h"
 #include "common/base/units.h"
 #include "common/scene/scene_file.h"
@@ -163,7 +164,7 @@ void declare_bundle(CLI::App& app, BundleCommand& command) {
   app.add_option("recording", command.recording, "RECORDING.mcap")->required();
   app.add_option("page", command.page, "The HTML file to write; it is replaced")->required();
   app.add_option("--seconds", command.seconds, "Length from the begin of the recording (default: all of it)")
-      ->check(CLI::Range(0.0, kMostBundleSeconds));
+      ->check(without_nan(CLI::Range(0.0, kMostBundleSeconds)));
   app.add_flag("--all-solvers", command.has_all_solvers,
                "Take the module that steps every solver: 0.6 MB more, needed by other solvers than dftl and "
                "direct_rod");

@@ -186,24 +186,26 @@ TEST(CtlOptionTable, EveryOptionOfEveryCommandChangesItsFieldAndNoOther) {
 }
 
 TEST(CtlOptionTable, NumbersEndWhereTheyAreSaidTo) {
-  const test::OptionRange kRanges[] = {{"--unit", "-0.1", "0", "1000", "1001", {"feed"}},
-                                       {"--speed", "0.0009", "0.001", "100", "101", {"feed"}},
-                                       {"--seconds", "-1", "0", "1000000", "1000001", {"feed"}},
-                                       {"--rate", "0.9", "1", "1000", "1001", {"feed"}},
-                                       {"--gust-intensity", "-0.1", "0", "2", "2.1", {"feed"}},
-                                       {"--seconds", "-1", "0", "1000000", "1000001", {"monitor"}},
-                                       {"--yaw-deg", "-361", "-360", "360", "361", {"camera"}},
-                                       {"--pitch-deg", "-86", "-85", "85", "86", {"camera"}},
-                                       {"--distance-m", "0.009", "0.01", "100", "101", {"camera"}},
-                                       {"--fov-deg", "1.9", "2", "160", "161", {"camera"}},
-                                       {"--from", "-1", "0", "86400", "86401", {"export", "o.usda"}},
-                                       {"--to", "-1", "0", "86400", "86401", {"export", "o.usda"}},
-                                       {"--seconds", "-1", "0", "86400", "86401", {"export", "o.usda"}},
-                                       {"--at", "-1", "0", "86400", "86401", {"export", "o.usda"}},
-                                       {"--frames", "1", "2", "1000000", "1000001", {"check"}},
-                                       {"--timeout", "0.09", "0.1", "1000000", "1000001", {"check"}},
-                                       {"--ban", "-1", "0", "604800", "604801", {"kick", "7"}},
-                                       {"--seconds", "0.09", "0.1", "1000000", "1000001", {"latency"}}};
+  const test::OptionRange kRanges[] = {
+      {"--unit", "-0.1", "0", "1000", "1001", {"feed"}},
+      {"--speed", "0.0009", "0.001", "100", "101", {"feed"}},
+      {"--seconds", "-1", "0", "1000000", "1000001", {"feed"}},
+      {"--rate", "0.9", "1", "1000", "1001", {"feed"}},
+      {"--gust-intensity", "-0.1", "0", "2", "2.1", {"feed"}},
+      {"--seconds", "-1", "0", "1000000", "1000001", {"monitor"}},
+      {"--yaw-deg", "-361", "-360", "360", "361", {"camera"}},
+      {"--pitch-deg", "-86", "-85", "85", "86", {"camera"}},
+      {"--distance-m", "0.009", "0.01", "100", "101", {"camera"}},
+      {"--fov-deg", "1.9", "2", "160", "161", {"camera"}},
+      {"--from", "-1", "0", "86400", "86401", {"export", "o.usda"}},
+      {"--to", "-1", "0", "86400", "86401", {"export", "o.usda"}},
+      {"--seconds", "-1", "0", "86400", "86401", {"export", "o.usda"}},
+      {"--at", "-1", "0", "86400", "86401", {"export", "o.usda"}},
+      {"--seconds", "-1", "0", "3600", "3601", {"bundle", "a.mcap", "o.html"}},
+      {"--frames", "1", "2", "1000000", "1000001", {"check"}},
+      {"--timeout", "0.09", "0.1", "1000000", "1000001", {"check"}},
+      {"--ban", "-1", "0", "604800", "604801", {"kick", "7"}},
+      {"--seconds", "0.09", "0.1", "1000000", "1000001", {"latency"}}};
   testing::internal::CaptureStderr();
   test::expect_ranges(kRanges,
                       [](const Arguments& arguments) { return parse(arguments).command != nullptr; });
