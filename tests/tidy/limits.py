@@ -26,12 +26,12 @@ WORDS = {
     "kMaxServedCodecs": "2 codecs", "kMaxPictureViews": "8", "kMaxPictureClasses": "16", "kMaxPictureViewsOfPeer": "4 for one address",
     "kMaxPictureClassesOfPeer": "8 for one address", "kDrawnPixelBytes": "110 bytes", "kClassPixelBytes": "40 for each",
     "kMaxLiveInputs": "4", "kMotionStaleNs": "1 s", "kMaxSampleRateHz": "1,000 a second", "kMaxLiveBytesPerS": "2 million",
-    "kMaxLiveSubjects": "32", "kMaxLiveSpeedMps": "10 m/s", "kMaxLiveTurnRadPerS": "25 rad/s", "kMaxOscBundleDepth": "4",
+    "kMaxLiveSubjects": "32", "kMaxLiveSpeedMps": "10 m/s", "kMaxLiveTurnRadPerS": "25 rad/s", "kGateJumpM": "0.75 m", "kGateTurnRad": "0.6 rad", "kMaxOscBundleDepth": "4",
     "kMaxOscBundleElements": "256", "kMaxWaitingNotices": "64", "kMaxSendQueueMessages": "1,024", "kMaxSendQueueBytes": "1 MiB",
     "kMaxKeptSnapshotBytes": "256 MiB", "kMaxStrandCount": "200,000", "kMaxVertexCount": "64", "kMaxPictureWidth": "3,840",
     "kMaxPictureHeight": "2,160", "kMaxClipBytes": "2 GiB", "kMaxUpgradeAnswerBytes": "16 KiB", "kMaxHttpAnswerHeaderBytes": "16 KiB",
     "kMaxHttpBodyBytes": "1 MiB", "kMaxOutstandingPings": "32", "kClockWindow": "100", "kStageWindow": "512", "kMaxForeignLinesPerS": "20",
-    "connections_per_s": "10 a second", "requests_per_s": "50 a second", "wrong_tokens": "5", "guarded_addresses": "1,024",
+    "kMaxAbcReadBytes": "512 MiB", "kMaxAbcObjects": "100,000", "kMaxAbcDepth": "2,000", "connections_per_s": "10 a second", "requests_per_s": "50 a second", "wrong_tokens": "5", "guarded_addresses": "1,024",
     "handshake_ms": "5 s", "messages_per_s": "1,000 a second", "stalled_ms": "4.5 s", "idle_ms": "15 s",
     "refusal_lines_per_address": "10 of one address", "refusal_lines": "300 of all", "session_lines": "1,200"}
 # Said in words, or of another constant; the value alone stands here.
