@@ -244,7 +244,9 @@ TEST(ComingBack, ALatencyCountsConnections) {
                    },
                    [](FakePeer& peer) { serve(peer, 2); }});
   testing::internal::CaptureStdout();
-  const int code = run_latency(target_of(door.port()), {.seconds = 2.0}, stop);
+  LatencyOptions options;
+  options.seconds = 2.0;
+  const int code = run_latency(target_of(door.port()), options, stop);
   EXPECT_THAT(testing::internal::GetCapturedStdout(), HasSubstr("reconnects 1"));
   EXPECT_EQ(code, kDoneExit);
 }
