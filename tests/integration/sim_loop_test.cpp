@@ -421,6 +421,9 @@ TEST(SimLoopShared, StrandsGoOnFromThoseOfViewersUnlessSomebodyRecords) {
     InputHub hub;
     auto loop = SimLoop::start(std::move(config), hub, sink);
     ASSERT_TRUE(loop.ok()) << loop.error().to_string();
+    SourceDemand demand;
+    demand.facts.strand_viewers = 1;
+    (*loop)->set_demand(demand);
     const auto wait_for = [&](const auto& holds) {
       for (int i = 0; i < 2000 && !holds(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
       return holds();
