@@ -77,8 +77,16 @@ bool SendQueue::put_behind(const EncodedFramePtr& frame) {
     pending_ = frame;
     return true;
   }
-  if (takes_all_ ? behind_.size() >= kMaxRelayFrames : catch_up_room_ == 0) return false;
-  if (!takes_all_) --catch_up_room_;
+  const size_t bytes = frame->message.size();
+  if (takes_all_) {
+    if (behind_.size() >= kMaxRelayFrames) return false;
+  } else if (catch_up_room_ > 0) {
+    --catch_up_room_;
+  } else if (bytes < keyframe_room_) {
+    keyframe_room_ -= bytes;
+  } else {
+    return false;
+  }
   behind_.push_back(frame);
   return true;
 }
@@ -154,7 +162,9 @@ std::optional<SendQueue::Item> SendQueue::take_next(Media media) {
   is_pending_asset_ = false;
   EncodedFramePtr frame = std::exchange(pending_, nullptr);
   if (behind_.empty()) {
+    const bool is_keyframe = frame->header.opcode == Opcode::StrandKeyframe;
     catch_up_room_ = 0;
+    keyframe_room_ = is_keyframe ? frame->message.size() : 0;
   } else {
     pending_ = std::move(behind_.front());
     behind_.pop_front();
@@ -180,7 +190,7 @@ void SendQueue::drop_pending() {
   pending_ = nullptr;
   dropped_frames_ += 1 + behind_.size();
   behind_.clear();
-  catch_up_room_ = 0;
+  catch_up_room_ = keyframe_room_ = 0;
 }
 
 }  // namespace strandcast

@@ -1,7 +1,7 @@
 // SendQueue: what one session sends next. Control messages in a bounded queue ahead of media; one media frame
 // being written and at most one pending strand frame and one picture; a strand session that missed a delta
-// waits for the next keyframe. More wait only behind a chain that a joiner is given, and for a relay, and not
-// for long. Plain logic without I/O or clock, network thread.
+// waits for the next keyframe. More wait only for a relay, after a chain that a joiner is given, and while a
+// keyframe is written; not for long. Plain logic without I/O or clock, network thread.
 #pragma once
 
 #include <cstdint>
@@ -91,6 +91,7 @@ class SendQueue {
   EncodedFramePtr pending_;             // asset or strands
   std::deque<EncodedFramePtr> behind_;  // strands that follow it
   size_t catch_up_room_ = 0;            // new frames that may still go behind a chain
+  size_t keyframe_room_ = 0;            // bytes that may still go behind a keyframe: no more than another one
   bool takes_all_ = false;
   bool is_pending_asset_ = false;
   bool is_writing_media_ = false;

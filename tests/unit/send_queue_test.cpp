@@ -67,6 +67,41 @@ TEST(SendQueue, SecondPendingDeltaLosesTheChainAndIsCounted) {
   EXPECT_FALSE(queue.take_next().has_value()) << "nothing of the broken chain may follow";
 }
 
+EncodedFramePtr sized(const EncodedFramePtr& frame, size_t bytes) {
+  auto result = std::make_shared<EncodedFrame>(*frame);
+  result->message.resize(bytes);
+  return result;
+}
+
+// A thin link takes seconds for a keyframe, and what came meanwhile costs less than another keyframe.
+TEST(SendQueue, DeltasWaitForAKeyframeThatIsWrittenAsLongAsTheyAreSmallerThanIt) {
+  SendQueue queue;
+  queue.start_strands();
+  ASSERT_EQ(queue.offer_strands(sized(keyframe(1), 1'000)), SendQueue::Offer::Queued);
+  EXPECT_EQ(taken_opcode(queue), Opcode::StrandKeyframe);
+  for (uint32_t sequence = 2; sequence < 12; ++sequence)
+    EXPECT_EQ(queue.offer_strands(sized(delta(sequence), 100)), SendQueue::Offer::Queued) << sequence;
+  queue.written();
+  for (uint32_t sequence = 2; sequence < 12; ++sequence) {
+    EXPECT_EQ(taken_opcode(queue), Opcode::StrandDelta) << sequence;
+    queue.written();
+  }
+  EXPECT_FALSE(queue.take_next());
+  // After it one waits at most, as ever.
+  ASSERT_EQ(queue.offer_strands(sized(delta(12), 100)), SendQueue::Offer::Queued);
+  EXPECT_EQ(queue.offer_strands(sized(delta(13), 100)), SendQueue::Offer::LostChain);
+  EXPECT_EQ(queue.dropped_frames(), 2u);
+
+  SendQueue full;
+  full.start_strands();
+  ASSERT_EQ(full.offer_strands(sized(keyframe(1), 1'000)), SendQueue::Offer::Queued);
+  EXPECT_EQ(taken_opcode(full), Opcode::StrandKeyframe);
+  for (uint32_t sequence = 2; sequence < 12; ++sequence)
+    (void)full.offer_strands(sized(delta(sequence), 100));
+  EXPECT_EQ(full.offer_strands(sized(delta(12), 100)), SendQueue::Offer::LostChain)
+      << "a keyframe is cheaper";
+}
+
 TEST(SendQueue, KeyframeForAnotherViewerIsIgnoredByAViewerWithThatState) {
   SendQueue queue;
   queue.start_strands();
