@@ -1,5 +1,5 @@
-// How a request for a file of the page is answered. Pure functions on untrusted text, any thread; nothing here
-// sends.
+// How a request for a file of the page is answered. Pure functions on untrusted text, any thread; nothing
+// here sends.
 #pragma once
 
 #include <string>

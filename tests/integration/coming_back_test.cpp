@@ -72,6 +72,15 @@ void serve(FakePeer& peer, uint64_t tick = 1) {
     if (!peer.send(Pong{ping->client_time_ns, now_ns(), now_ns()})) return;
 }
 
+/// One that goes after its first state.
+void serve_one_state(FakePeer& peer) {
+  peer.welcome(make_welcome(kStrands, kVertices));
+  peer.send(stream_list());
+  peer.send(*asset_frame());
+  peer.send(*keyframe(1));
+  peer.read_until<Ping>();
+}
+
 /// Ways in which a server that hung, or a proxy before it, ends an attempt. None of them says that the next
 /// one will end so, too.
 const std::vector<std::pair<const char*, FakeServer::Script>>& broken_answers() {
@@ -214,14 +223,7 @@ TEST(ComingBack, AWatchOfParametersComesBack) {
 
 TEST(ComingBack, AnExportGoesOnAndSaysHowLongTheServerWasAway) {
   const std::atomic<bool> stop{false};
-  const Door door({[](FakePeer& peer) {
-                     peer.welcome(make_welcome(kStrands, kVertices));
-                     peer.send(stream_list());
-                     peer.send(*asset_frame());
-                     peer.send(*keyframe(1));
-                     peer.read_until<Ping>();
-                   },
-                   [](FakePeer& peer) { serve(peer, 2); }});
+  const Door door({serve_one_state, [](FakePeer& peer) { serve(peer, 2); }});
   const auto states = LiveStates::open(config_for(door.port()), stop);
   ASSERT_TRUE(states) << states.error().to_string();
   for (const uint64_t tick : {1, 2}) {
@@ -234,14 +236,7 @@ TEST(ComingBack, AnExportGoesOnAndSaysHowLongTheServerWasAway) {
 
 TEST(ComingBack, ALatencyCountsConnections) {
   const std::atomic<bool> stop{false};
-  const Door door({[](FakePeer& peer) {
-                     peer.welcome(make_welcome(kStrands, kVertices));
-                     peer.send(stream_list());
-                     peer.send(*asset_frame());
-                     peer.send(*keyframe(1));
-                     peer.read_until<Ping>();
-                   },
-                   [](FakePeer& peer) { serve(peer, 2); }});
+  const Door door({serve_one_state, [](FakePeer& peer) { serve(peer, 2); }});
   testing::internal::CaptureStdout();
   LatencyOptions options;
   options.seconds = 2.0;
