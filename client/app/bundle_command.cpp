@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "client/app/ctl_commands.h"
+#include "common/base/base64.h"
 #include "common/base/command_line_error.h"
 #include "common/base/file.h"
 #include "common/base/units.h"
@@ -46,20 +47,6 @@ addEventListener('DOMContentLoaded', async () => {
 });
 </script>
 )html";
-
-std::string base64(std::string_view bytes) {
-  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    const size_t count = std::min<size_t>(3, bytes.size() - i);
-    uint32_t group = 0;
-    for (size_t k = 0; k < 3; ++k)
-      group = group << 8 | (k < count ? static_cast<uint8_t>(bytes[i + k]) : uint32_t{0});
-    for (size_t k = 0; k < 4; ++k) text += k <= count ? kDigits[group >> (18 - 6 * k) & 63] : '=';
-  }
-  return text;
-}
 
 std::string_view as_text(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -106,7 +93,7 @@ Welcome welcome_of(const RecordingStart& start, const SceneDesc& scene, const Sc
 
 std::string script_of(std::string_view id, std::string_view content, std::string_view attributes = {}) {
   return fmt::format("<script type=\"application/octet-stream\" id=\"{}\"{}>{}</script>\n", id, attributes,
-                     base64(content));
+                     base64_of(std::as_bytes(std::span(content))));
 }
 
 /// Returns the file whose path begins with "/" and this name.
@@ -166,8 +153,7 @@ void declare_bundle(CLI::App& app, BundleCommand& command) {
   app.add_option("--seconds", command.seconds, "Length from the begin of the recording (default: all of it)")
       ->check(without_nan(CLI::Range(0.0, kMostBundleSeconds)));
   app.add_flag("--all-solvers", command.has_all_solvers,
-               "Take the module that steps every solver: 0.6 MB more, needed by other solvers than dftl and "
-               "direct_rod");
+               "Take the larger module that steps every solver; others than dftl and direct_rod need it");
 }
 
 Result<Bundle> make_bundle(RecordingReader& reader, PageFiles files, const BundleCommand& command) {

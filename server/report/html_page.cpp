@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "common/base/base64.h"
 #include "common/base/check.h"
 
 namespace strandcast {
@@ -40,18 +41,6 @@ bool looks_like_number(std::string_view text) {
 }  // namespace
 
 /// RFC 4648.
-std::string base64_of(std::span<const std::byte> bytes) {
-  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    uint32_t group = 0;
-    for (size_t k = 0; k < 3; ++k)
-      group = group << 8 | (i + k < bytes.size() ? std::to_integer<uint32_t>(bytes[i + k]) : 0);
-    for (size_t k = 0; k < 4; ++k) text += i + k <= bytes.size() ? kDigits[group >> (18 - 6 * k) & 63] : '=';
-  }
-  return text;
-}
-
 HtmlPage::HtmlPage(std::string title) : title_(std::move(title)) {}
 
 void HtmlPage::element(std::string_view tag, std::string_view text) {

@@ -12,8 +12,6 @@
 
 namespace strandcast {
 
-std::string base64_of(std::span<const std::byte> bytes);
-
 enum class HtmlMark { None, Good, Bad };
 
 struct HtmlCell {

@@ -89,9 +89,10 @@ bool SimLoop::shares() const {
 /// Before a step: takes over the viewers' strands if the encoder has handed them over.
 void SimLoop::follow_viewers() {
   if (config_.shared == nullptr) return;
-  config_.shared->set_wanted(shares());
+  const bool is_shared = shares();
+  config_.shared->set_wanted(is_shared);
   std::optional<SharedUpdate> update = config_.shared->take();
-  if (!shares()) return leave_viewers();
+  if (!is_shared) return leave_viewers();
   if (!update) return;
   if (const auto trail = step_log_.trail())
     shared_hair_.follow(std::move(*update), *trail, config_.scene.step_rate_hz);

@@ -2,6 +2,7 @@
 
 #include <set>
 
+#include "common/base/base64.h"
 #include "common/scene/shadow_methods.h"
 #include "common/scene/strand_methods.h"
 #include "server/report/html_page.h"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/base/check.h"
 #include "common/base/units.h"
 
 namespace strandcast::step {
@@ -31,22 +30,13 @@ void SharedSteps::step(const StepTick& tick, const StepScene& scene, int64_t end
     scene_ = scene;
     has_scene_ = true;
     std::vector<std::byte> bytes;
-    write_scene(scene, bytes);
-    ByteReader reader(bytes);
-    Result<StepScene> read = read_scene(reader);
-    CHECK(read.ok());
-    told_scene_ = std::move(*read);
+    told_scene_ = told_scene(scene, bytes);
   }
-  // Every number as the frame has it.
   std::vector<std::byte> bytes;
-  TickBase base = now_.base;
-  write_ticks(std::span(&tick, 1), told_scene_, base, bytes);
-  ByteReader reader(bytes);
-  const Result<std::vector<StepTick>> ticks =
-      read_ticks(reader, {tick.tick, tick.world_from_head}, told_scene_, now_.base);
-  CHECK(ticks.ok());
+  const std::vector<StepTick> ticks =
+      told_ticks(std::span(&tick, 1), {tick.tick, tick.world_from_head}, told_scene_, now_.base, bytes);
   predictor_->set_scene(told_scene_);
-  predictor_->advance({now_.lattice, now_.quantum_m}, *ticks, static_cast<double>(end_time_ns) / kNsPerS);
+  predictor_->advance({now_.lattice, now_.quantum_m}, ticks, static_cast<double>(end_time_ns) / kNsPerS);
   predictor_->expect(now_.quantum_m, now_.lattice);
 }
 

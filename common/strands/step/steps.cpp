@@ -105,11 +105,7 @@ void EncoderSteps::set_rest_shape(std::span<const glm::vec3> rest_in_head_m) {
 }
 
 void EncoderSteps::take_scene(const StepScene& scene) {
-  write_scene(scene, bytes_);
-  ByteReader reader(bytes_);
-  Result<StepScene> read = read_scene(reader);
-  CHECK(read.ok());
-  scene_ = std::move(*read);
+  scene_ = told_scene(scene, bytes_);
 }
 
 /// False where this build cannot step it.
@@ -207,13 +203,9 @@ uint8_t EncoderSteps::say(const SnapshotInfo& snapshot, const tangent::Layout& l
   if (vertex_rounds(predictor_->model(), scene_, count) > kMostVertexRounds) return flags;
   std::vector<std::byte> said;
   TickBase base = base_;
-  write_ticks(ticks_since(snapshot), scene_, base, said);
-  ByteReader reader(said);
-  TickBase base_read = base_;
-  const Result<std::vector<StepTick>> ticks =
-      read_ticks(reader, {snapshot.tick, snapshot.world_from_head}, scene_, base_read);
-  CHECK(ticks.ok());
-  step(*ticks, moment_of(snapshot), layout, history);
+  const std::vector<StepTick> ticks =
+      told_ticks(ticks_since(snapshot), {snapshot.tick, snapshot.world_from_head}, scene_, base, said);
+  step(ticks, moment_of(snapshot), layout, history);
   if (count == 0 && !is_near(history.lattice, target)) return flags;
   uint8_t how = judge(layout, history, target);
   if (is_waiting(snapshot) && (trail.shared != 0 || (how & kSparseFlag) != 0)) {
@@ -221,7 +213,7 @@ uint8_t EncoderSteps::say(const SnapshotInfo& snapshot, const tangent::Layout& l
     target = expected_;
   }
   if (how == 0) return flags;
-  base_ = std::move(base_read);
+  base_ = std::move(base);
   bytes_.insert(bytes_.end(), said.begin(), said.end());
   is_stepping_ = (how & kStepFlag) != 0;
   is_following_ = how == kFollowFlag;
@@ -232,9 +224,8 @@ uint8_t EncoderSteps::say(const SnapshotInfo& snapshot, const tangent::Layout& l
 /// Returns whether the simulation has yet to take over the newest update. Its strands are then those that it
 /// is about to forget, so that corrections towards them would be wrong one moment later.
 bool EncoderSteps::is_waiting(const SnapshotInfo& snapshot) const {
-  constexpr uint64_t kMostTicks = 30;  // later ones are not taken over any more
   return shared_number_ != 0 && snapshot.trail->shared != shared_number_ &&
-         snapshot.tick - shared_tick_ <= kMostTicks;
+         snapshot.tick - shared_tick_ <= kMostTrailTicks;  // later it cannot be taken over any more
 }
 
 void EncoderSteps::append_bytes(std::vector<std::byte>& body) const {

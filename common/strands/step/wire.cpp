@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "common/base/check.h"
 #include "common/strands/step/numbers.h"
 #include "common/strands/step/rod_planes.h"
 #include "common/strands/strand_limits.h"
@@ -688,6 +690,26 @@ Result<std::vector<StepTick>> read_ticks(ByteReader& bytes, const FrameTick& las
   }
   RETURN_IF_ERROR(from.status("a tick"));
   return ticks;
+}
+
+StepScene told_scene(const StepScene& scene, std::vector<std::byte>& bytes) {
+  const size_t begin = bytes.size();
+  write_scene(scene, bytes);
+  ByteReader reader(std::span<const std::byte>(bytes).subspan(begin));
+  Result<StepScene> read = read_scene(reader);
+  CHECK(read.ok());
+  return std::move(*read);
+}
+
+std::vector<StepTick> told_ticks(std::span<const StepTick> ticks, const FrameTick& last,
+                                 const StepScene& scene, TickBase& base, std::vector<std::byte>& bytes) {
+  const size_t begin = bytes.size();
+  TickBase written = base;
+  write_ticks(ticks, scene, written, bytes);
+  ByteReader reader(std::span<const std::byte>(bytes).subspan(begin));
+  Result<std::vector<StepTick>> read = read_ticks(reader, last, scene, base);
+  CHECK(read.ok());
+  return std::move(*read);
 }
 
 }  // namespace strandcast::step

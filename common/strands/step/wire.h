@@ -59,4 +59,10 @@ struct FrameTick {
 Result<std::vector<StepTick>> read_ticks(ByteReader& bytes, const FrameTick& last, const StepScene& scene,
                                          TickBase& base);
 
+/// Appends the scene, or the ticks after `base`, and returns them as viewers read them: with every number
+/// rounded.
+StepScene told_scene(const StepScene& scene, std::vector<std::byte>& bytes);
+std::vector<StepTick> told_ticks(std::span<const StepTick> ticks, const FrameTick& last,
+                                 const StepScene& scene, TickBase& base, std::vector<std::byte>& bytes);
+
 }  // namespace strandcast::step

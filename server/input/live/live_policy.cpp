@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/base/units.h"
+#include "common/math/turn.h"
 #include "common/scene/body_desc.h"
 #include "server/input/input_hub.h"
 
@@ -31,21 +32,6 @@ glm::dquat heading_of(const glm::dquat& rotation) {
   const double norm = std::hypot(rotation.w, rotation.y);
   if (norm < kLeastTurn) return {1.0, 0.0, 0.0, 0.0};
   return {rotation.w / norm, 0.0, rotation.y / norm, 0.0};
-}
-
-/// A rotation as an axis times its angle, the short way.
-glm::dvec3 turn_of(glm::dquat rotation) {
-  if (rotation.w < 0.0) rotation = -rotation;
-  const glm::dvec3 part(rotation.x, rotation.y, rotation.z);
-  const double sine = glm::length(part);
-  if (sine < kLeastTurn) return 2.0 * part;
-  return part * (2.0 * std::atan2(sine, rotation.w) / sine);
-}
-
-glm::dquat rotation_by(const glm::dvec3& turn_rad) {
-  const double angle_rad = glm::length(turn_rad);
-  if (angle_rad < kLeastTurn) return {1.0, 0.0, 0.0, 0.0};
-  return glm::angleAxis(angle_rad, turn_rad / angle_rad);
 }
 
 /// From 0 to 1, at rest at both ends.
@@ -315,8 +301,7 @@ bool LivePolicy::is_believed(const LivePose& pose, int64_t arrival_ns) {
 /// The head begins to go from where it is to where it is seen.
 void LivePolicy::begin_ease(const Pose& target, int64_t time_ns) {
   const Pose& from = last_->world_from_head;
-  ease_ = Ease{time_ns, from.position_m - target.position_m,
-               turn_of(from.rotation * glm::conjugate(target.rotation))};
+  ease_ = Ease{time_ns, from.position_m - target.position_m, turn_between(target.rotation, from.rotation)};
 }
 
 Pose LivePolicy::eased(Pose target, int64_t time_ns) {
@@ -328,7 +313,7 @@ Pose LivePolicy::eased(Pose target, int64_t time_ns) {
   }
   const double left = 1.0 - eased_share(passed);
   target.position_m += ease_->place_m * left;
-  target.rotation = glm::normalize(rotation_by(ease_->turn_rad * left) * target.rotation);
+  target.rotation = turned(target.rotation, ease_->turn_rad * left);
   return target;
 }
 
