@@ -87,7 +87,7 @@ class Message:
         fields = read_fields(data)
         self.name = text_of(fields, 1)
         self.comment = comments.get(path, "")
-        self.more = comments.get(path + ("more",), "")  # row of WIRE.md
+        self.more = comments.get(path + ("more",), "")  # further paragraphs
         self.fields = [Field(one, comments.get(path + (2, i), "")) for i, one in enumerate(fields.get(2, []))]
         self.options = fields.get(7, [b""])[0]
 
@@ -661,60 +661,25 @@ def page_ranges(schema):
 
 # ---- documents
 
-def with_commas(text):
-    return re.sub(r"(?<=\d)(?=(\d{3})+$)", ",", text)
+def check_words(schema, message):
+    """Refuses a field that neither its own comment nor that of its message explains."""
+    said = " ".join(part.comment + " " + part.more for part in schema.parts([message.name]))
+    for part in schema.parts([message.name]):
+        for field in part.fields:
+            if part.name not in SCENE_PARTS and not field.comment and not re.search(rf"\b{field.name}\b", said):
+                raise SystemExit(f"schema.py: no comment says what {field.name} of {part.name} means")
 
 
-def limit_text(schema, name):
-    """The number of a constant and its name; the name alone where it is another file's."""
-    value = next((limit["value"] for limit in schema.limits if limit["name"] == name), None)
-    return f"`{name}`" if value is None else f"{with_commas(f'{value:.0f}')} (`{name}`)"
-
-
-def wire_limit(schema, field):
-    """A field with its limit as a row of WIRE.md has it; its name alone where it has none."""
-    rule, name = field.rule, field.name
-    plain = lambda limit: limit_text(schema, limit).split(" (")[0]
-    if field.is_repeated and "count" not in rule:  # its struct is written by hand
-        return name
-    if field.is_repeated:
-        each = f", <= {plain(rule['each'])} bytes each and no two alike" if "each" in rule else ""
-        return f"{name}, at most {limit_text(schema, rule['count'])}{each}"
-    if "text" in rule:
-        return f"{name} <= {plain(rule['text'])} characters"
-    if "exact" in rule:
-        return f"{name} <= {plain(rule['exact'])} bytes of printable text"
-    if "secret" in rule:
-        return f"{name} <= {plain(rule['secret'])} bytes"
-    parts = range_of(rule.get("range", ""))
-    if parts is None:
-        return name
-    constant = re.match(r"k\w+", parts[1])
-    less = parts[1].removeprefix(constant[0]) if constant else ""
-    if not constant:
-        return f"{name} {with_commas(parts[0])}..{with_commas(parts[1])}"
-    value = next(limit["value"] for limit in schema.limits if limit["name"] == constant[0]) + int(less or 0)
-    return f"{name} {parts[0]}..{with_commas(f'{value:.0f}')} (`{constant[0]}`{' - ' + less[1:] if less else ''})"
-
-
-def wire_row(schema, message):
-    """What the comment of a message says below its first paragraph; else its fields with their limits and comments."""
-    if not message.more:
-        fields = [wire_limit(schema, field) + (f": {field.comment}" if field.comment else "") for field in message.fields]
-        return f"| {message.name} | {'; '.join([message.comment] * bool(message.comment) + fields) or 'nothing'} |"
-    fields = {part.name: part for one in reversed(schema.parts([message.name])) for part in one.fields}
-    fields.update({field.name: field for field in message.fields})
-    def limit(match):
-        if match[1] not in fields:
-            raise SystemExit(f"schema.py: {message.name} has no field {match[1]}")
-        return wire_limit(schema, fields[match[1]])
-    row = re.sub(r"\{(\w+)\}", limit, message.more)
-    return f"| {message.name} | {row} |"
-
-
-def wire_table(side, envelope):
-    return lambda schema: [f"| {side} | fields and what is checked |", "|---|---|"] + \
-        [wire_row(schema, message) for _, message in schema.kinds(envelope)]
+def wire_table(envelope, has_sender):
+    """Number, name, sender and purpose of each kind of message; what a field means stands beside it in its .proto file."""
+    def rows(schema):
+        yield "| | message | " + ("from | " if has_sender else "") + "purpose |"
+        yield "|---|---|---|" + "---|" * has_sender
+        for field, message in schema.kinds(envelope):
+            check_words(schema, message)
+            sender = f"{field.rule.get('from')} | " if has_sender else ""
+            yield f"| {field.number} | {message.name} | {sender}{message.comment.rstrip('.')} |"
+    return lambda schema: list(rows(schema))
 
 
 # Name of a part to what makes it.
@@ -723,7 +688,7 @@ PARTS = {
     "names": enum_names, "page tables": page_tables,
     "look": lambda schema: structs_of(schema, ["Look"]), "camera": lambda schema: structs_of(schema, ["Camera"]),
     "look fields": look_fields, "look form": shown_table, "page ranges": page_ranges, "main only": main_only,
-    "to server": wire_table("to server", "ClientMessage"), "to client": wire_table("to client", "ServerMessage"),
+    "to server": wire_table("ClientMessage", True), "to client": wire_table("ServerMessage", False),
     "look block": block_struct, "look block reader": block_reader, "look block writer": block_writer,
     "shader look": glsl_look, "shader block": glsl_block, "shader block reader": glsl_frame_look,
     "shading numbers": cpp_shading_numbers, "shading block": cpp_shading_block, "set shading": cpp_set_shading,

@@ -19,7 +19,7 @@ MESSAGE = {
     "proto/strandcast/v1/session.proto": [
         ("message ClientMessage {",
          "// Asks for toys.\nmessage ToyRequest {\n  string what = 1 [(is).text = \"kMaxNameChars\"];  // by name\n"
-         "  uint32 toy_count = 2 [(is).range = \"1..9 toys\", (is).init = \"2\"];\n}\n\nmessage ClientMessage {"),
+         "  uint32 toy_count = 2 [(is).range = \"1..9 toys\", (is).init = \"2\"];  // at once\n}\n\nmessage ClientMessage {"),
         ("    RecordCommand record_command", "    ToyRequest toy_request = 60 [(is).from = \"steers\"];\n    RecordCommand record_command"),
     ],
     "server/app/session_desk.cpp": [
@@ -30,12 +30,12 @@ MESSAGE = {
     "tests/support/sample_messages.h": [("          RecordCommand{true, \"take 5\"}", "          ToyRequest{\"bear\", 3}, RecordCommand{true, \"take 5\"}")],
 }
 MESSAGE_SHOWS = {
-    "common/wire/messages.h": ["struct ToyRequest {", "std::string what = {};  // by name", "uint32_t toy_count = 2;"],
+    "common/wire/messages.h": ["struct ToyRequest {", "std::string what = {};  // by name", "uint32_t toy_count = 2;  // at once"],
     "common/wire/message_fields_private.h": ['kKind<ToyRequest> = "toy_request"', 'v.text("what", m.what, kMaxNameChars);',
                                              'v.number("toy_count", m.toy_count, Range{1, 9, "toys"});'],
     "server/net/roles.cpp": ['{"ToyRequest", Sender::Steers},'],
     "client/web/page/wire.ts": ["ToyRequest = { what: [1, 'string'], toy_count: [2, 'uint32'] }", "toy_request: [60, ToyRequest]"],
-    "proto/WIRE.md": ["| ToyRequest | Asks for toys.; what <= 64 characters: by name; toy_count 1..9 |"],
+    "proto/WIRE.md": ["| 60 | ToyRequest | steers | Asks for toys |"],
 }
 MESSAGE_COMPILES = ["server/app/session_desk.cpp", "toy.cpp"]
 # That the fields are walked as declared: a writer that knows two kinds of call.
@@ -82,6 +82,7 @@ LOOK_TOY = '#include "tests/support/sample_look.h"\nint main() { return strandca
 # Edits of session.proto that the generator must refuse, and what it must say.
 REFUSED = [
     (" [(is).from = \"steers\"];\n    RecordCommand", ";\n    RecordCommand", "who may send"),
+    ("  // at once", "", "no comment says what toy_count of ToyRequest means"),
     ("string what = 1 [(is).text = \"kMaxNameChars\"];", "string what = 1;", "text without a limit"),
 ]
 

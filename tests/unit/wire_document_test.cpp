@@ -1,4 +1,5 @@
 // proto/WIRE.md is a promise to people who write other clients: its numbers must be those of the code.
+#include <regex>
 #include <set>
 
 #include "common/base/file.h"
@@ -6,6 +7,7 @@
 #include "common/pictures/jpeg_tiles.h"
 #include "common/pictures/picture.h"
 #include "common/replay/clock_offset.h"
+#include "common/scene/scene_fields.h"
 #include "common/strands/scene_asset.h"
 #include "common/strands/strand_payload.h"
 #include "common/strands/strand_predictor.h"
@@ -40,22 +42,8 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kWebSocketProtocol", kWebSocketProtocol},
       {"kMaxControlBytes", with_commas(kMaxControlBytes)},
       {"kClockWindow", with_commas(kClockWindow)},
-      {"kMaxListedSessions", with_commas(kMaxListedSessions)},
-      {"kMaxSceneTextBytes", with_commas(kMaxSceneTextBytes)},
-      {"kMaxReportedMs", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxReportedMs)))},
-      {"kMaxReportedHz", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxReportedHz)))},
-      {"kMaxStepNs", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxStepNs)))},
-      {"kMaxStepCount", fmt::format("0..{}", with_commas(kMaxStepCount))},
-      {"kMaxBanS", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxBanS)))},
-      {"kMaxListedParameters", with_commas(kMaxListedParameters)},
-      {"kMaxStateTimes", fmt::format("at most {} (", kMaxStateTimes)},
-      {"kMaxParameterPathBytes", with_commas(kMaxParameterPathBytes)},
-      {"kMaxParameterTextBytes", with_commas(kMaxParameterTextBytes)},
       {"kStreamsPerCodec", fmt::format("from {} (", kStreamsPerCodec)},
-      {"kMaxHeads", fmt::format("at most {} (", kMaxHeads)},
-      {"kMaxLiveInputs", fmt::format("at most {} (", kMaxLiveInputs)},
-      {"kMaxLiveValues", fmt::format("at most {} (", kMaxLiveValues)},
-      {"kMaxRateDivisor", fmt::format("1..{}", kMaxRateDivisor)},
+      {"kMaxRateDivisor", fmt::format("every {}th step", kMaxRateDivisor)},
       {"kFrameHeaderBytes", with_commas(kFrameHeaderBytes)},
       {"kMaxMediaPayloadBytes", with_commas(kMaxMediaPayloadBytes)},
       {"kMaxStrandCount", with_commas(kMaxStrandCount)},
@@ -106,13 +94,6 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
     }
     EXPECT_TRUE(is_named) << "no line of WIRE.md names " << name << " with " << value;
   }
-  EXPECT_THAT(text, HasSubstr(fmt::format("at most {} samples of time (source", kMaxSamplesPerMessage)));
-  EXPECT_THAT(text, HasSubstr(fmt::format("name <= {} printable", kMaxNameChars)));
-  EXPECT_THAT(text, HasSubstr(fmt::format("token <= {} bytes", kMaxTokenBytes)));
-  EXPECT_THAT(text, HasSubstr(fmt::format("name <= {} characters, address <= {} characters",
-                                          kMaxListedNameChars, kMaxAddressChars)));
-  EXPECT_THAT(text, HasSubstr(fmt::format("<= {} bytes of printable", with_commas(kMaxAssignmentBytes))));
-  EXPECT_THAT(text, HasSubstr(fmt::format("at most {} characters", with_commas(kMaxTextChars))));
   EXPECT_THAT(text, HasSubstr(fmt::format("{} x {} weights of i16", kRowClassCount, kFeatureCount)));
   EXPECT_THAT(text, HasSubstr(fmt::format("classes x {} weights, in units of 1/{}", kMotionFeatureCount,
                                           with_commas(static_cast<uint64_t>(1.0f / kMotionWeight)))));
@@ -121,6 +102,30 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
   EXPECT_THAT(text, HasSubstr(fmt::format("symbols 0 to {} themselves", kFirstTail - 1)));
   EXPECT_THAT(text, HasSubstr(fmt::format("({} + sum of weight x feature) >> {}", 1 << (kWeightShift - 1),
                                           kWeightShift)));
+}
+
+// Ranges that session.proto only names; those that it declares are made into constants.
+TEST(WireDocument, GivesTheRangesThatMessagesName) {
+  namespace fields = scene_fields;
+  const std::vector<std::pair<std::string, fields::Range>> ranges = {
+      {"kStrandCount", fields::kStrandCount}, {"kVertexCount", fields::kVertexCount},
+      {"kStreamBound", fields::kStreamBound}, {"kStepRate", fields::kStepRate},
+      {"kSubsteps", fields::kSubsteps},       {"kFrameRate", fields::kFrameRate},
+      {"kJpegQuality", fields::kJpegQuality}};
+  const auto text_of = [](double value) {
+    if (value >= 1000.0) return with_commas(static_cast<uint64_t>(value));
+    return std::regex_replace(fmt::format("{:.5f}", value), std::regex("\\.?0+$"), "");
+  };
+  const std::string text = document();
+  for (const auto& [name, range] : ranges)
+    EXPECT_THAT(text, HasSubstr(fmt::format("`{}` {}..{}{}", name, text_of(range.minimum),
+                                            text_of(range.maximum), *range.unit ? " " : "") +
+                                range.unit))
+        << name;
+  EXPECT_EQ(fields::kFrameWidth.maximum, kMaxPictureWidth) << "section 7 gives it";
+  EXPECT_EQ(fields::kFrameHeight.maximum, kMaxPictureHeight) << "section 7 gives it";
+  EXPECT_THAT(text, HasSubstr(fmt::format("`kMaxHeads` {}, `kMaxLiveInputs` {}, `kMaxPictureMotions` {}",
+                                          kMaxHeads, kMaxLiveInputs, kMaxPictureMotions)));
 }
 
 TEST(WireDocument, ListsEveryOpcode) {
