@@ -30,6 +30,7 @@ install(FILES README.md ARCHITECTURE.md CONTRIBUTING.md STYLE.md SECURITY.md CHA
 install(DIRECTORY docs DESTINATION ${documents} COMPONENT doc)
 install(FILES shaders/README.md DESTINATION ${documents}/shaders COMPONENT doc)
 install(FILES proto/WIRE.md proto/RECORDING.md DESTINATION ${documents}/proto COMPONENT doc)
+install(DIRECTORY proto/strandcast DESTINATION ${documents}/proto COMPONENT doc)
 install(FILES deploy/eight_seconds.png deploy/hair.png deploy/page.png deploy/streaming.png deploy/work_precision.png
   DESTINATION ${documents}/deploy COMPONENT doc)
 install(DIRECTORY examples DESTINATION ${documents} COMPONENT doc)

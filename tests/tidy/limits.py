@@ -15,13 +15,13 @@ PAGES = ("SECURITY.md", "docs/internals/limits.md", "docs/internals/more_limits.
 WORDS = {
     "kMaxSessions": "256", "kMaxSessionsPerAddress": "64", "kSpareConnections": "64", "kSpareConnectionsPerAddress": "16 of one address",
     "kMaxProxyBytes": "2,048 bytes", "kMaxForwardedHops": "16", "kMaxHttpHeaderBytes": "8 KiB", "kMaxControlBytes": "64 KiB",
-    "kMaxChainFrames": "240 frames", "kMaxChainBytes": "16 MiB", "kMaxWaitingMessages": "256 messages", "kMaxRelays": "8",
+    "kMaxChainFrames": "240 frames", "kMaxChainBytes": "16 MiB", "kMaxWaitingMessages": "256 messages",
     "kMaxBytesOfMessage": "1 MiB", "kControlsPerS": "60 a second", "kControlBurst": "120 at once", "kMaxPendingJobs": "32",
-    "kStreamChangeNs": "500 ms", "kLookChangeNs": "100 ms", "kMaxListedParameters": "64 in an answer", "kMaxStepCount": "100,000",
-    "kLongestStepsNs": "60 s", "kMaxHeldSamples": "65,536", "kMaxStateTimes": "512", "kMaxInFlightBytes": "4 MiB",
+    "kStreamChangeNs": "500 ms", "kLookChangeNs": "100 ms",
+    "kLongestStepsNs": "60 s", "kMaxHeldSamples": "65,536", "kMaxInFlightBytes": "4 MiB",
     "kMaxInFlightFrames": "512 frames", "kMaxQueuedControl": "64", "kMaxSessionMemoryBytes": "8 MiB", "kMaxSessionReadBytes": "68 KiB",
     "kLeastProgressBytes": "4 KiB", "kMaxRequestsOfConnection": "100", "kMaxLogMessageChars": "2,000 characters",
-    "kMaxLogLineBytes": "4,096 bytes", "kMinTokenCharacters": "16 characters", "kMaxMotionJoints": "12", "kMaxJointNameBytes": "32",
+    "kMaxLogLineBytes": "4,096 bytes", "kMinTokenCharacters": "16 characters",
     "kMaxJointDistanceM": "10 m", "kMaxScenarioFileBytes": "256 KiB", "kMaxScenarioActions": "1,000 actions",
     "kMaxServedCodecs": "2 codecs", "kMaxPictureViews": "8", "kMaxPictureClasses": "16", "kMaxPictureViewsOfPeer": "4 for one address",
     "kMaxPictureClassesOfPeer": "8 for one address", "kDrawnPixelBytes": "110 bytes", "kClassPixelBytes": "40 for each",
@@ -36,7 +36,7 @@ WORDS = {
     "refusal_lines_per_address": "10 of one address", "refusal_lines": "300 of all", "session_lines": "1,200"}
 # Said in words, or of another constant; the value alone stands here.
 VALUES = {
-    "kMaxHttpReadBytes": 8 * 1024 + 1, "kCatchUpShare": 0.125, "kJobShare": 0.25, "kBlockingShare": 0.25, "kToldStateNs": 2e9,
+    "kMaxHttpReadBytes": 8 * 1024 + 1, "kCatchUpShare": 0.125, "kJobShare": 0.25, "kBlockingShare": 0.25,
     "wrong_token_window_ms": 60e3, "wrong_token_block_ms": 60e3}
 # A row names these by their header.
 OF_HEADER = {"server/relay/voices.h": {

@@ -124,8 +124,10 @@ TEST(WireDocument, GivesTheRangesThatMessagesName) {
         << name;
   EXPECT_EQ(fields::kFrameWidth.maximum, kMaxPictureWidth) << "section 7 gives it";
   EXPECT_EQ(fields::kFrameHeight.maximum, kMaxPictureHeight) << "section 7 gives it";
-  EXPECT_THAT(text, HasSubstr(fmt::format("`kMaxHeads` {}, `kMaxLiveInputs` {}, `kMaxPictureMotions` {}",
-                                          kMaxHeads, kMaxLiveInputs, kMaxPictureMotions)));
+  EXPECT_THAT(text, HasSubstr(fmt::format("`kMaxHeads` {}, `kMaxLiveInputs` {}, `kMaxPictureMotions` {}, "
+                                          "`kMaxMotionJoints` {}, `kMaxJointNameBytes` {}",
+                                          kMaxHeads, kMaxLiveInputs, kMaxPictureMotions, kMaxMotionJoints,
+                                          kMaxJointNameBytes)));
 }
 
 TEST(WireDocument, ListsEveryOpcode) {
