@@ -670,16 +670,16 @@ def check_words(schema, message):
                 raise SystemExit(f"schema.py: no comment says what {field.name} of {part.name} means")
 
 
-def wire_table(envelope, has_sender):
-    """Number, name, sender and purpose of each kind of message; what a field means stands beside it in its .proto file."""
-    def rows(schema):
-        yield "| | message | " + ("from | " if has_sender else "") + "purpose |"
-        yield "|---|---|---|" + "---|" * has_sender
+def wire_list(schema):
+    """Number and name of each kind of message by who sends it; what a field means stands beside it in its .proto file."""
+    senders = {}
+    for envelope in ("ClientMessage", "ServerMessage"):
         for field, message in schema.kinds(envelope):
             check_words(schema, message)
-            sender = f"{field.rule.get('from')} | " if has_sender else ""
-            yield f"| {field.number} | {message.name} | {sender}{message.comment.rstrip('.')} |"
-    return lambda schema: list(rows(schema))
+            sender = field.rule.get("from", "") if envelope == "ClientMessage" else "the server"
+            senders.setdefault(sender, []).append(f"{field.number} {message.name}")
+    return ["| from | messages, with their numbers in the envelope |", "|---|---|"] + \
+        [f"| {sender} | {', '.join(kinds)} |" for sender, kinds in senders.items()]
 
 
 # Name of a part to what makes it.
@@ -688,7 +688,7 @@ PARTS = {
     "names": enum_names, "page tables": page_tables,
     "look": lambda schema: structs_of(schema, ["Look"]), "camera": lambda schema: structs_of(schema, ["Camera"]),
     "look fields": look_fields, "look form": shown_table, "page ranges": page_ranges, "main only": main_only,
-    "to server": wire_table("ClientMessage", True), "to client": wire_table("ServerMessage", False),
+    "messages by sender": wire_list,
     "look block": block_struct, "look block reader": block_reader, "look block writer": block_writer,
     "shader look": glsl_look, "shader block": glsl_block, "shader block reader": glsl_frame_look,
     "shading numbers": cpp_shading_numbers, "shading block": cpp_shading_block, "set shading": cpp_set_shading,

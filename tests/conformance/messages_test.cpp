@@ -89,8 +89,10 @@ TEST(WireDocument, ListsEveryMessageWithItsNumber) {
   for (const auto* envelope : {v1::ClientMessage::descriptor(), v1::ServerMessage::descriptor()}) {
     for (int i = 0; i < envelope->field_count(); ++i) {
       const auto& kind = *envelope->field(i);
-      const std::string row = fmt::format("\n| {} | {} |", kind.number(), kind.message_type()->name());
-      EXPECT_NE(text->find(row), std::string::npos) << "section 3 of WIRE.md has not:" << row;
+      const std::string entry = fmt::format(" {} {}", kind.number(), kind.message_type()->name());
+      EXPECT_TRUE(text->find(entry + ",") != std::string::npos ||
+                  text->find(entry + " |") != std::string::npos)
+          << "section 3 of WIRE.md has not:" << entry;
     }
   }
 }

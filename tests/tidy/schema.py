@@ -35,7 +35,7 @@ MESSAGE_SHOWS = {
                                              'v.number("toy_count", m.toy_count, Range{1, 9, "toys"});'],
     "server/net/roles.cpp": ['{"ToyRequest", Sender::Steers},'],
     "client/web/page/wire.ts": ["ToyRequest = { what: [1, 'string'], toy_count: [2, 'uint32'] }", "toy_request: [60, ToyRequest]"],
-    "proto/WIRE.md": ["| 60 | ToyRequest | steers | Asks for toys |"],
+    "proto/WIRE.md": [", 60 ToyRequest, 28 RecordCommand |"],
 }
 MESSAGE_COMPILES = ["server/app/session_desk.cpp", "toy.cpp"]
 # That the fields are walked as declared: a writer that knows two kinds of call.
