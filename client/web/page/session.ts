@@ -53,6 +53,7 @@ export class Net {
   private connection?: Connection;
   private readonly policy = new ReconnectPolicy();
   private retry = 0;
+  private patience = 0; // with a server that lets nobody in
   private reports = 0;
   private openedMs = 0;
   private wasIn = false; // somebody said Welcome
@@ -138,6 +139,7 @@ export class Net {
   }
   private leave(): void {
     clearTimeout(this.retry);
+    clearTimeout(this.patience);
     if (!this.socket) return;
     this.socket.onclose = undefined;
     this.socket.drop(1000, '');
@@ -150,7 +152,8 @@ export class Net {
     const socket = this.around.openSocket(this.asked.url, PROTOCOL);
     this.socket = socket;
     let wasOpen = false;
-    const patience = setTimeout(() => {
+    clearTimeout(this.patience);
+    this.patience = setTimeout(() => {
       if (!this.connection?.hasWelcome) socket.drop(GIVEN_UP_CODE, 'the server does not answer');
     }, WELCOME_MS);
     socket.onopen = () => {
@@ -161,7 +164,7 @@ export class Net {
     };
     socket.onmessage = (data, receivedNs) => this.connection?.receive(data, receivedNs);
     socket.onclose = (code, said) => {
-      clearTimeout(patience);
+      clearTimeout(this.patience);
       const reason = this.connection?.goodbye || said || wordsFor(code, wasOpen);
       const hadWelcome = this.connection?.hasWelcome ?? false;
       this.connection?.end();
@@ -247,7 +250,7 @@ class Connection {
   private hasState = false;
   private isStateFresh = false;
   private stateHash = 0n;
-  private readonly pictures = new PictureDecoder();
+  private pictures?: PictureDecoder; // with the first of them: Node has none
   private pictureQueue: Promise<void> = Promise.resolve();
   private waitingPicture?: Decoded;
   private pictureSize = { width: 0, height: 0 };
@@ -309,7 +312,7 @@ class Connection {
     this.now?.delete();
     this.next?.delete();
     this.now = this.next = undefined;
-    this.pictures.close();
+    this.pictures?.close();
     this.waitingPicture?.close();
     this.waitingPicture = undefined;
   }
@@ -521,7 +524,7 @@ class Connection {
     const begin = performance.now();
     let picture: Decoded;
     try {
-      picture = await this.pictures.decode(header, message);
+      picture = await (this.pictures ??= new PictureDecoder()).decode(header, message);
     } catch (error) {
       return this.reject(error as Error);
     }
