@@ -11,6 +11,7 @@ import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import zlib from 'node:zlib';
 import { Browser, sleep, whyNoBrowser } from './browser.mjs';
+import { Server, SMALL } from './server.mjs';
 
 const [program, shots] = process.argv.slice(2);
 if (!program) {
@@ -24,33 +25,6 @@ if (missing) {
 }
 const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-page-'));
 const SLIDERS = ['Quality', 'Length', 'Curl', 'Stiffness', 'Friction', 'Wind'];
-const SMALL = ['--set', 'groom.procedural.strand_count=400', '--set', 'groom.procedural.vertex_count=12'];
-
-class Server {
-  static async start(options = [], port = 0) {
-    const server = new Server();
-    server.log = '';
-    const portFile = path.join(work, `port${Math.random()}`);
-    server.child = spawn(program, ['--port', String(port), '--port-file', portFile, ...options], { stdio: ['ignore', 'ignore', 'pipe'] });
-    server.child.stderr.setEncoding('utf8').on('data', (text) => (server.log += text));
-    for (let i = 0; i < 600 && !(fs.existsSync(portFile) && fs.readFileSync(portFile, 'utf8').trim()); ++i) {
-      if (server.child.exitCode !== null) throw new Error(server.log);
-      await sleep(50);
-    }
-    if (!fs.existsSync(portFile)) {
-      server.child.kill('SIGKILL');
-      throw new Error(`the server did not start in time: ${server.log}`);
-    }
-    server.port = Number(fs.readFileSync(portFile, 'utf8'));
-    server.url = `http://127.0.0.1:${server.port}/`;
-    return server;
-  }
-  async end() {
-    if (this.child.exitCode !== null || this.child.signalCode !== null) return;
-    this.child.kill('SIGTERM');
-    await new Promise((done) => this.child.once('exit', done));
-  }
-}
 
 function get(url, headers = {}) {
   return new Promise((done, fail) => {
@@ -131,7 +105,7 @@ const all = {
   },
   async 'of two heads the chosen one is drawn'() {
     const scene = path.join(path.dirname(fileURLToPath(import.meta.url)), '../../deploy/scenes/two_heads.textproto');
-    const two = await Server.start(['--scene', scene, ...SMALL]);
+    const two = await Server.start(program, ['--scene', scene, ...SMALL]);
     const tab = await browser.open(`${two.url}#mode=strands`);
     await tab.until((now) => now.mode === 'strands' && now.states > 3, 'strands');
     const words = () => tab.evaluate('document.getElementById("hud-line").textContent');
@@ -145,7 +119,7 @@ const all = {
     await two.end();
   },
   async 'a stream of another solver brings its kernel'() {
-    const other = await Server.start([...SMALL, '--set', 'solver.name=direct_rod']);
+    const other = await Server.start(program, [...SMALL, '--set', 'solver.name=direct_rod']);
     const tab = await browser.open(`${other.url}#mode=strands&codec=step`);
     // The module that the page begins with cannot step these.
     const state = await tab.until((now) => now.states > 10 && now.codec === 'step', 'states');
@@ -157,7 +131,7 @@ const all = {
     // Fast on a head that is a field, as a server in full quality comes to run that was too slow; and a model for which
     // the page fetches the whole core.
     for (const [options, takesWhole] of [[['quality=fast', 'head.collider=field'], false], [['solver.name=xpbd'], true]]) {
-      const other = await Server.start([...SMALL, ...options.flatMap((one) => ['--set', one])]);
+      const other = await Server.start(program, [...SMALL, ...options.flatMap((one) => ['--set', one])]);
       const tab = await browser.open(`${other.url}#mode=strands`, { seesWorkers: true });
       await tab.until((now) => now.states !== undefined, 'the page');
       await tab.evaluate(`(() => {
@@ -188,12 +162,12 @@ const all = {
     await second.close();
   },
   async 'comes back after a restart of the server'() {
-    const mortal = await Server.start(SMALL);
+    const mortal = await Server.start(program, SMALL);
     const tab = await browser.open(`${mortal.url}#mode=strands`);
     await tab.until((now) => now.states > 3, 'states');
     await mortal.end();
     await tab.until((now) => !now.isConnected, 'the loss is noticed');
-    const again = await Server.start(SMALL, mortal.port);
+    const again = await Server.start(program, SMALL, mortal.port);
     await tab.until((now) => now.isConnected && now.states > 3, 'states of the new server');
     await tab.close();
     await again.end();
@@ -218,7 +192,7 @@ const all = {
   async 'a bundle plays a recording from a file, over and over'() {
     const run = path.join(work, 'bundled.mcap');
     const page = path.join(work, 'bundled.html');
-    const recorded = await Server.start([...SMALL, '--record', run, '--seconds', '3']);
+    const recorded = await Server.start(program, [...SMALL, '--record', run, '--seconds', '3']);
     await new Promise((done) => recorded.child.once('exit', done));
     const made = spawnSync(path.join(path.dirname(program), 'strandcast-ctl'), ['bundle', run, page], { encoding: 'utf8' });
     assert.equal(made.status, 0, made.stderr);
@@ -251,7 +225,7 @@ const all = {
     const wrong = 'wrong-0123456789abcdef';
     const file = path.join(work, 'tokens');
     fs.writeFileSync(file, `viewer ${right}\n`, { mode: 0o600 });
-    const strict = await Server.start([...SMALL, '--token-file', file, '--distrust-loopback']);
+    const strict = await Server.start(program, [...SMALL, '--token-file', file, '--distrust-loopback']);
     const bad = await browser.open(`${strict.url}#token=${wrong}`);
     await bad.until((now) => /token/i.test(now.error ?? ''), 'the reason');
     await bad.close();
@@ -338,7 +312,7 @@ let failed = 0;
 try {
   if (shots) fs.mkdirSync(shots, { recursive: true });
   browser = await Browser.start();
-  server = await Server.start(SMALL);
+  server = await Server.start(program, SMALL);
   for (const [name, test] of Object.entries(tests)) {
     const begin = Date.now();
     try {

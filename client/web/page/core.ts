@@ -1,5 +1,6 @@
 // The strand core in WebAssembly (client/web/strand_core.h, strand_picture.h), typed.
 import { loadStrandCore } from '../strand_core.mjs';
+import type { StrandState } from './messages';
 
 export interface CoreFunctions {
   memory: WebAssembly.Memory;
@@ -84,21 +85,24 @@ export class StrandDecoder {
     if (!this.core.lend(message, (at, size) => this.core.call.strand_core_decode(this.decoder, at, size)))
       throw new Error(this.core.error());
   }
-  motionTimeNs(): number {
-    return Number(this.core.view().getBigInt64(this.core.call.strand_core_state(this.decoder) + 16, true));
+  private time(at: number): number {
+    return Number(this.core.view().getBigInt64(this.core.call.strand_core_state(this.decoder) + at, true));
   }
-  /** Copies of what is drawn: positions of all strands in head space, how the head is turned, and the bust against it. */
-  state(): { positions: Float32Array; rotation: [number, number, number, number]; bust: [number, number, number] } {
+  motionTimeNs(): number {
+    return this.time(16);
+  }
+  /** Copies. */
+  state(): StrandState {
     const positionsAt = this.core.call.strand_core_all_positions(this.decoder);
     const state = this.core.call.strand_core_state(this.decoder);
     const view = this.core.view();
-    const rotation = [48, 56, 64, 72].map((offset) => view.getFloat64(state + offset, true));
-    const bust = [96, 104, 112].map((offset) => view.getFloat64(state + offset, true));
+    const doubles = <T>(first: number, count: number): T =>
+      Array.from({ length: count }, (_, i) => view.getFloat64(state + first + 8 * i, true)) as T;
     const floats = this.core.call.strand_core_position_floats(this.decoder);
     return {
       positions: new Float32Array(this.core.call.memory.buffer, positionsAt, floats).slice(),
-      rotation: rotation as [number, number, number, number],
-      bust: bust as [number, number, number],
+      place: doubles(24, 3), rotation: doubles(48, 4), bust: doubles(96, 3),
+      tick: this.time(0), simTimeNs: this.time(8), motionTimeNs: this.time(16),
     };
   }
 }

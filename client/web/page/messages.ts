@@ -24,6 +24,7 @@ export interface Asked {
   width: number; // of pictures that the server draws
   height: number;
   drawsStrands: boolean;
+  name?: string; // as the server lists it
 }
 
 export type ToNet =
@@ -78,7 +79,21 @@ export type FromNet =
 /** From the connection to the drawing, by their own port; the drawing asks for each with 'next'. */
 export type State =
   | { kind: 'asset'; payload: ArrayBuffer }
-  | { kind: 'strands'; positions: Float32Array; rotation: [number, number, number, number]; bust: [number, number, number] };
+  | ({ kind: 'strands'; hash: bigint } & StrandState);
+export interface StrandState {
+  positions: Float32Array; // of all strands, m, head space: (vertices x strands x 3)
+  rotation: [number, number, number, number]; // world from head: w x y z
+  bust: [number, number, number]; // against the head: x y z of a quaternion
+  place: Vec3; // of the head, m, world
+  tick: number;
+  simTimeNs: number;
+  motionTimeNs: number;
+}
+/** Where states go; who gets them asks for each by a message. */
+export interface StatePort {
+  onmessage: ((event: MessageEvent) => void) | null;
+  postMessage(state: State, transfer: Transferable[]): void;
+}
 
 export type ToDraw =
   | { kind: 'start'; canvas: OffscreenCanvas; wish: string; samples: number }

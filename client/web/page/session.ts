@@ -2,13 +2,13 @@
 // whoever draws: the newest state waits for it, and the one before is dropped.
 import { ClockOffset, nowNs, Recent } from './clock';
 import { compileCore, Core, StrandDecoder } from './core';
-import type { Asked, Camera, FromNet, NetFigures, State, ToNet } from './messages';
+import type { Asked, Camera, FromNet, NetFigures, State, StatePort, ToNet } from './messages';
 import { decodablePictures, PictureDecoder, type Decoded } from './pictures';
 import { GIVEN_UP_CODE, IDLE_MS, mayComeBack, ReconnectPolicy, SILENT_MS, WELCOME_MS, wordsFor } from './reconnect';
-import { DistantSocket } from './socket';
+import { DistantSocket, type ServerSocket } from './socket';
 import {
   ClientMessage, decodeServerMessage, encodeClientMessage, FrameHeader, kControl, kFrameHeaderBytes, Mode, Opcode,
-  PictureCodec, Partly, readFrameHeader, Role, type WelcomeMessage,
+  PictureCodec, Partly, readFrameHeader, readStateHash, Role, type WelcomeMessage,
 } from './wire';
 
 const PROTOCOL = 'strandcast.v1';
@@ -26,14 +26,19 @@ const PICTURE_NAMES: { [codec: number]: string } = {
   [PictureCodec.jpeg]: 'JPEG', [PictureCodec.jpegTiles]: 'JPEG tiles', [PictureCodec.vp8]: 'VP8', [PictureCodec.h264]: 'H.264',
 };
 
-const post = (message: FromNet, transfer: Transferable[] = []): void =>
-  (self as unknown as WorkerScope).postMessage(message, transfer);
-
 /** Clocks of browsers are coarse: what is quicker than they can tell is still something. */
 const LEAST_STEP_NS = 5;
 
+/** Where a session runs: whom it tells, what its socket is, and where modules of the core come from. */
+export interface Surroundings {
+  post(message: FromNet, transfer?: Transferable[]): void;
+  openSocket(url: string, protocol: string): ServerSocket;
+  loadCore(file: string): Promise<WebAssembly.Module>;
+  states: StatePort;
+}
+
 /** What lasts over reconnections. */
-class Net {
+export class Net {
   private core?: Core;
   private coreAnswered!: () => void;
   private readonly coreAnswer = new Promise<void>((done) => (this.coreAnswered = done)); // it is there, or never comes
@@ -43,13 +48,13 @@ class Net {
   private isLoading = false;
   stepNs = 0; // of one vertex in a solver's step here; 0 until something here takes steps
   private asked!: Asked;
-  private states!: MessagePort;
   private pictureCodecs!: Promise<number>;
-  private sockets!: MessagePort;
-  private socket?: DistantSocket;
+  private socket?: ServerSocket;
   private connection?: Connection;
   private readonly policy = new ReconnectPolicy();
   private retry = 0;
+  private patience = 0; // with a server that lets nobody in
+  private reports = 0;
   private openedMs = 0;
   private wasIn = false; // somebody said Welcome
   drawn = { drawMs: 0, shownHz: 0, device: 0 };
@@ -57,11 +62,13 @@ class Net {
   private waitingAsset?: ArrayBuffer;
   isPictureFree = true;
 
-  async start(message: Extract<ToNet, { kind: 'start' }>): Promise<void> {
+  constructor(private readonly around: Surroundings) {}
+  post(message: FromNet, transfer: Transferable[] = []): void {
+    this.around.post(message, transfer);
+  }
+  async start(message: Pick<Extract<ToNet, { kind: 'start' }>, 'asked' | 'stepCore' | 'wholeCore'>): Promise<void> {
     this.asked = message.asked;
-    this.states = message.states;
-    this.sockets = message.sockets;
-    this.states.onmessage = () => {
+    this.around.states.onmessage = () => {
       this.wantsState = true;
       this.offerState();
     };
@@ -72,7 +79,11 @@ class Net {
     if (this.asked.drawsStrands && this.asked.mode !== Mode.frames) await this.coreAnswer;
     if (this.asked.codec && this.asked.codec !== 'tangent') await this.learnSteps();
     this.connect();
-    setInterval(() => this.connection?.report(), 500);
+    this.reports = setInterval(() => this.connection?.report(), 500);
+  }
+  end(): void {
+    clearInterval(this.reports);
+    this.leave();
   }
   async setCore(module: WebAssembly.Module): Promise<void> {
     this.use(await Core.load(module));
@@ -88,10 +99,10 @@ class Net {
     this.noCore = reason;
     this.asked = { ...this.asked, drawsStrands: false };
     this.coreAnswered();
-    post({ kind: 'notice', isError: true, text: `Strands cannot be drawn here: ${reason}. The server’s pictures are shown.` });
+    this.post({ kind: 'notice', isError: true, text: `Strands cannot be drawn here: ${reason}. The server’s pictures are shown.` });
   }
   private load(file: string): Promise<void> {
-    return compileCore(new URL(file, self.location.href).href).then(Core.load).then((core) => this.use(core), () => undefined);
+    return this.around.loadCore(file).then(Core.load).then((core) => this.use(core), () => undefined);
   }
   /** With hair on the screen: streams of steps take a fraction of the link. */
   private async learnSteps(): Promise<void> {
@@ -123,22 +134,26 @@ class Net {
   }
   reconnect(asked: Asked): void {
     this.asked = asked;
-    clearTimeout(this.retry);
-    if (this.socket) {
-      this.socket.onclose = undefined;
-      this.socket.drop(1000, '');
-      this.connection?.end();
-      this.connection = undefined; // whoever asks it for a state meanwhile gets none
-    }
+    this.leave();
     this.connect();
+  }
+  private leave(): void {
+    clearTimeout(this.retry);
+    clearTimeout(this.patience);
+    if (!this.socket) return;
+    this.socket.onclose = undefined;
+    this.socket.drop(1000, '');
+    this.connection?.end();
+    this.connection = undefined; // whoever asks it for a state meanwhile gets none
   }
 
   private connect(): void {
-    post({ kind: 'state', state: 'connecting', reason: '', retryMs: 0 });
-    const socket = new DistantSocket(this.sockets, this.asked.url, PROTOCOL);
+    this.post({ kind: 'state', state: 'connecting', reason: '', retryMs: 0 });
+    const socket = this.around.openSocket(this.asked.url, PROTOCOL);
     this.socket = socket;
     let wasOpen = false;
-    const patience = self.setTimeout(() => {
+    clearTimeout(this.patience);
+    this.patience = setTimeout(() => {
       if (!this.connection?.hasWelcome) socket.drop(GIVEN_UP_CODE, 'the server does not answer');
     }, WELCOME_MS);
     socket.onopen = () => {
@@ -149,7 +164,7 @@ class Net {
     };
     socket.onmessage = (data, receivedNs) => this.connection?.receive(data, receivedNs);
     socket.onclose = (code, said) => {
-      clearTimeout(patience);
+      clearTimeout(this.patience);
       const reason = this.connection?.goodbye || said || wordsFor(code, wasOpen);
       const hadWelcome = this.connection?.hasWelcome ?? false;
       this.connection?.end();
@@ -160,10 +175,10 @@ class Net {
         this.asked = { ...this.asked, role: Role.viewer };
         return this.connect();
       }
-      if (!mayComeBack(code, this.wasIn)) return post({ kind: 'state', state: 'ended', reason, retryMs: 0 });
+      if (!mayComeBack(code, this.wasIn)) return this.post({ kind: 'state', state: 'ended', reason, retryMs: 0 });
       const retryMs = this.policy.nextDelayMs(wasOpen ? performance.now() - this.openedMs : 0);
-      post({ kind: 'state', state: 'waiting', reason, retryMs });
-      this.retry = self.setTimeout(() => this.connect(), retryMs);
+      this.post({ kind: 'state', state: 'waiting', reason, retryMs });
+      this.retry = setTimeout(() => this.connect(), retryMs);
     };
   }
 
@@ -172,7 +187,7 @@ class Net {
     switch (message.kind) {
       case 'mode':
         if (this.noCore && message.mode !== Mode.frames)
-          return post({ kind: 'notice', isError: true, text: `Strands cannot be drawn here: ${this.noCore}.` });
+          return this.post({ kind: 'notice', isError: true, text: `Strands cannot be drawn here: ${this.noCore}.` });
         this.asked.mode = message.mode;
         // A relay has one mode for all of a session.
         if (connection?.needsAnother(message.mode)) return this.reconnect(this.asked);
@@ -208,9 +223,9 @@ class Net {
     if (this.waitingAsset) {
       state = { kind: 'asset', payload: this.waitingAsset };
       this.waitingAsset = undefined;
-      this.states.postMessage(state, [state.payload]);
+      this.around.states.postMessage(state, [state.payload]);
     } else if ((state = this.connection?.takeState())) {
-      this.states.postMessage(state, [state.positions.buffer]);
+      this.around.states.postMessage(state, [state.positions.buffer]);
     }
     if (state) this.wantsState = false;
   }
@@ -234,7 +249,8 @@ class Connection {
   private lastSequence = 0;
   private hasState = false;
   private isStateFresh = false;
-  private readonly pictures = new PictureDecoder();
+  private stateHash = 0n;
+  private pictures?: PictureDecoder; // with the first of them: Node has none
   private pictureQueue: Promise<void> = Promise.resolve();
   private waitingPicture?: Decoded;
   private pictureSize = { width: 0, height: 0 };
@@ -258,7 +274,7 @@ class Connection {
 
   private waitingForCore: (() => void)[] = [];
 
-  constructor(private readonly net: Net, private readonly socket: DistantSocket, private readonly asked: Asked, private core?: Core) {}
+  constructor(private readonly net: Net, private readonly socket: ServerSocket, private readonly asked: Asked, private core?: Core) {}
 
   /** For the next decoders. What came before the first one is looked at now. */
   setCore(core: Core): void {
@@ -284,7 +300,7 @@ class Connection {
   hello(pictureCodecs: number): void {
     this.send({
       hello: {
-        role: this.asked.role, mode: this.asked.drawsStrands ? this.asked.mode : Mode.frames, name: 'browser', token: this.asked.token,
+        role: this.asked.role, mode: this.asked.drawsStrands ? this.asked.mode : Mode.frames, name: this.asked.name ?? 'browser', token: this.asked.token,
         frame_width: this.asked.width, frame_height: this.asked.height, acknowledges: true,
         picture_codecs: pictureCodecs & (PICTURE_BITS[this.asked.pictures] ?? ~0), codec_wish: this.asked.codec, head: this.asked.head, step_ns: this.net.stepNs,
       },
@@ -296,7 +312,7 @@ class Connection {
     this.now?.delete();
     this.next?.delete();
     this.now = this.next = undefined;
-    this.pictures.close();
+    this.pictures?.close();
     this.waitingPicture?.close();
     this.waitingPicture = undefined;
   }
@@ -326,31 +342,31 @@ class Connection {
     const message = decodeServerMessage(bytes);
     if (message.welcome) this.begin(message.welcome);
     else if (message.goodbye) this.goodbye = message.goodbye.reason;
-    else if (message.notice && !this.welcome) post({ kind: 'notice', isError: message.notice.is_error, text: message.notice.text });
+    else if (message.notice && !this.welcome) this.net.post({ kind: 'notice', isError: message.notice.is_error, text: message.notice.text });
     else if (!this.welcome) throw new Error('the server sent something else before its Welcome');
     if (message.pong) this.pong(message.pong, received);
     if (message.status) {
       for (const motion of message.status.picture_motions) this.motions.set(motion.sim_time_ns, motion.motion_time_ns);
-      post({ kind: 'status', status: message.status });
+      this.net.post({ kind: 'status', status: message.status });
     }
-    if (message.notice && this.welcome) post({ kind: 'notice', isError: message.notice.is_error, text: message.notice.text });
+    if (message.notice && this.welcome) this.net.post({ kind: 'notice', isError: message.notice.is_error, text: message.notice.text });
     if (message.quality) {
       const { codec, reason } = message.quality;
       this.withCore(() => this.followCodec(codec, reason));
-      post({ kind: 'quality', quality: message.quality });
+      this.net.post({ kind: 'quality', quality: message.quality });
     }
     if (message.frame_quality) {
       this.pictureCodec = PICTURE_NAMES[message.frame_quality.codec] ?? '';
-      post({ kind: 'frameQuality', quality: message.frame_quality });
+      this.net.post({ kind: 'frameQuality', quality: message.frame_quality });
     }
     if (message.mode_change) {
       this.reason = message.mode_change.reason;
-      post({ kind: 'modeReason', reason: this.reason });
+      this.net.post({ kind: 'modeReason', reason: this.reason });
     }
-    if (message.look_change) post({ kind: 'look', look: message.look_change.look, camera: message.look_change.camera });
-    if (message.camera) post({ kind: 'moved', camera: message.camera.camera });
-    if (message.parameter_list) post({ kind: 'parameters', parameters: message.parameter_list.parameters });
-    if (message.scene_text) post({ kind: 'sceneText', text: message.scene_text.text });
+    if (message.look_change) this.net.post({ kind: 'look', look: message.look_change.look, camera: message.look_change.camera });
+    if (message.camera) this.net.post({ kind: 'moved', camera: message.camera.camera });
+    if (message.parameter_list) this.net.post({ kind: 'parameters', parameters: message.parameter_list.parameters });
+    if (message.scene_text) this.net.post({ kind: 'sceneText', text: message.scene_text.text });
   }
 
   private begin(welcome: WelcomeMessage): void {
@@ -361,10 +377,10 @@ class Connection {
     this.reason = welcome.mode_reason;
     this.codec = welcome.codec;
     this.codecReason = welcome.codec_reason;
-    post({ kind: 'welcome', welcome });
-    post({ kind: 'state', state: 'open', reason: '', retryMs: 0 });
+    this.net.post({ kind: 'welcome', welcome });
+    this.net.post({ kind: 'state', state: 'open', reason: '', retryMs: 0 });
     this.ping();
-    this.timers.push(self.setInterval(() => this.listen(), 500));
+    this.timers.push(setInterval(() => this.listen(), 500));
   }
 
   /** A silent server is shown as away, and after IDLE_MS it is looked for anew. */
@@ -377,7 +393,7 @@ class Connection {
     const isSilent = silentMs > SILENT_MS;
     if (isSilent === this.isSilent) return;
     this.isSilent = isSilent;
-    post({ kind: 'state', state: isSilent ? 'silent' : 'open', reason: isSilent ? `nothing has come for ${SILENT_MS / 1000} s` : '', retryMs: 0 });
+    this.net.post({ kind: 'state', state: isSilent ? 'silent' : 'open', reason: isSilent ? `nothing has come for ${SILENT_MS / 1000} s` : '', retryMs: 0 });
   }
 
   // ---- clock
@@ -387,7 +403,7 @@ class Connection {
     this.pings.push(time);
     if (this.pings.length > 100) this.pings.shift();
     this.send({ ping: { client_time_ns: time } });
-    this.timers[0] = self.setTimeout(() => this.ping(), ++this.pingCount < QUICK_PINGS ? QUICK_PING_MS : PING_MS);
+    this.timers[0] = setTimeout(() => this.ping(), ++this.pingCount < QUICK_PINGS ? QUICK_PING_MS : PING_MS);
   }
   private pong(pong: { client_time_ns: number; server_receive_ns: number; server_send_ns: number }, received: number): void {
     const at = this.pings.indexOf(pong.client_time_ns);
@@ -439,7 +455,7 @@ class Connection {
     this.assetPayload = payload;
     this.acknowledge(header, received);
     this.net.setAsset(payload);
-    post({ kind: 'asset' });
+    this.net.post({ kind: 'asset' });
   }
 
   private followCodec(codec: string, reason: string): void {
@@ -483,6 +499,7 @@ class Connection {
     this.strandMs.add(performance.now() - begin);
     ++this.figures.decodedFrames;
     this.strandStream = header.streamId;
+    this.stateHash = readStateHash(message);
     this.noteMotion(this.now!.motionTimeNs(), header);
     if (this.isStateFresh) ++this.figures.replacedStates;
     this.hasState = this.isStateFresh = true;
@@ -493,7 +510,7 @@ class Connection {
   takeState(): Extract<State, { kind: 'strands' }> | undefined {
     if (!this.isStateFresh || !this.assetPayload) return undefined;
     this.isStateFresh = false;
-    return { kind: 'strands', ...this.now!.state() };
+    return { kind: 'strands', hash: this.stateHash, ...this.now!.state() };
   }
   private noteMotion(motionNs: number, header: FrameHeader): void {
     this.newestSentNs = header.sendTimeNs;
@@ -507,7 +524,7 @@ class Connection {
     const begin = performance.now();
     let picture: Decoded;
     try {
-      picture = await this.pictures.decode(header, message);
+      picture = await (this.pictures ??= new PictureDecoder()).decode(header, message);
     } catch (error) {
       return this.reject(error as Error);
     }
@@ -538,7 +555,7 @@ class Connection {
     this.net.isPictureFree = false;
     const picture = this.waitingPicture;
     this.waitingPicture = undefined;
-    post({ kind: 'picture', picture, ...this.pictureSize }, [picture as unknown as Transferable]);
+    this.net.post({ kind: 'picture', picture, ...this.pictureSize }, [picture as unknown as Transferable]);
   }
 
   needsAnother(mode: number): boolean {
@@ -555,13 +572,13 @@ class Connection {
     this.lastPicture = { stream: -1, sequence: 0 };
     this.motionMs.clear();
     this.lastMotionNs = 0;
-    post({ kind: 'shown', mode, reason: this.reason });
+    this.net.post({ kind: 'shown', mode, reason: this.reason });
   }
 
   lookFrom(camera: Camera): void {
     this.camera = camera;
     if (this.cameraTimer) return;
-    this.cameraTimer = self.setTimeout(() => {
+    this.cameraTimer = setTimeout(() => {
       this.cameraTimer = 0;
       const { offset, target, fov } = this.camera!;
       const vec = (v: number[]): { x: number; y: number; z: number } => ({ x: v[0]!, y: v[1]!, z: v[2]! });
@@ -579,7 +596,7 @@ class Connection {
       motionMs: this.motionMs.median, roundTripMs: this.clock.roundTripMs, codec: this.codec,
       codecReason: this.codecReason, pictureCodec: this.pictureCodec,
     };
-    post({ kind: 'figures', figures });
+    this.net.post({ kind: 'figures', figures });
     if (performance.now() - this.lastReportMs < REPORT_MS) return;
     this.lastReportMs = performance.now();
     const { drawMs, shownHz, device } = this.net.drawn;
@@ -594,12 +611,18 @@ class Connection {
 }
 
 export function runNet(): void {
-  const net = new Net();
+  const post = (message: FromNet, transfer: Transferable[] = []): void =>
+    (self as unknown as WorkerScope).postMessage(message, transfer);
+  let net: Net;
   self.onmessage = (event: MessageEvent<ToNet>) => {
     const message = event.data;
     if (message.kind === 'start') {
+      net = new Net({
+        post, states: message.states, openSocket: (url, protocol) => new DistantSocket(message.sockets, url, protocol),
+        loadCore: (file) => compileCore(new URL(file, self.location.href).href),
+      });
       net.start(message).catch((error: Error) =>
-        post({ kind: 'state', state: 'ended', reason: error.message, retryMs: 0 }));
+        net.post({ kind: 'state', state: 'ended', reason: error.message, retryMs: 0 }));
     } else if (message.kind === 'core') {
       net.setCore(message.core).catch((error: Error) => net.withoutCore(error.message));
     } else if (message.kind === 'noCore') net.withoutCore(message.reason);

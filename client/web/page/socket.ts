@@ -56,9 +56,19 @@ export function runSocket(): void {
   };
 }
 
+/** A socket as a session has it. */
+export interface ServerSocket {
+  readonly isOpen: boolean;
+  onopen?: () => void;
+  onmessage?: (data: unknown, receivedNs: number) => void;
+  onclose?: (code: number, reason: string) => void;
+  send(bytes: Uint8Array): void;
+  drop(code: number, reason: string): void;
+}
+
 let lastNumber = 0;
 
-export class DistantSocket {
+export class DistantSocket implements ServerSocket {
   isOpen = false;
   private isDropped = false;
   onopen?: () => void;

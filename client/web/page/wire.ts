@@ -415,3 +415,9 @@ export function readFrameHeader(message: Uint8Array): FrameHeader {
     sendTimeNs: Number(view.getBigInt64(24, true)),
   };
 }
+
+const STATE_HASH_AT = kFrameHeaderBytes + 88;
+/** Of a strand frame that was decoded, and thereby compared with its state. */
+export function readStateHash(message: Uint8Array): bigint {
+  return new DataView(message.buffer, message.byteOffset, message.length).getBigUint64(STATE_HASH_AT, true);
+}

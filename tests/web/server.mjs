@@ -1,0 +1,39 @@
+// A server for tests: its port, its log, and its end.
+//   const server = await Server.start('build/ci/bin/strandcast-server', ['--set', '...']); server.url; await server.end();
+import { spawn } from 'node:child_process';
+import fs from 'node:fs';
+import os from 'node:os';
+import path from 'node:path';
+
+const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
+/** Few short strands. */
+export const SMALL = ['--set', 'groom.procedural.strand_count=400', '--set', 'groom.procedural.vertex_count=12'];
+
+export class Server {
+  static async start(program, options = [], port = 0) {
+    const server = new Server();
+    server.log = '';
+    const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-server-'));
+    const portFile = path.join(work, 'port');
+    server.child = spawn(program, ['--port', String(port), '--port-file', portFile, ...options], { stdio: ['ignore', 'ignore', 'pipe'] });
+    server.child.stderr.setEncoding('utf8').on('data', (text) => (server.log += text));
+    const isThere = () => fs.existsSync(portFile) && fs.readFileSync(portFile, 'utf8').trim();
+    for (let i = 0; i < 600 && !isThere(); ++i) {
+      if (server.child.exitCode !== null) throw new Error(server.log);
+      await sleep(50);
+    }
+    if (!isThere()) {
+      server.child.kill('SIGKILL');
+      throw new Error(`the server did not start in time: ${server.log}`);
+    }
+    server.port = Number(fs.readFileSync(portFile, 'utf8'));
+    fs.rmSync(work, { recursive: true, force: true });
+    server.url = `http://127.0.0.1:${server.port}/`;
+    return server;
+  }
+  async end() {
+    if (this.child.exitCode !== null || this.child.signalCode !== null) return;
+    this.child.kill('SIGTERM');
+    await new Promise((done) => this.child.once('exit', done));
+  }
+}
