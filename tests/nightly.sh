@@ -6,7 +6,8 @@
 # Parts: fuzz, grids (property, comparing, OpenGL and unit tests), dev (address and undefined behaviour, all tests), tsan (threads, all
 # tests but those of grids), lto (do all files agree on every type, and does each include what it uses), arm (do the strand
 # kernels compile for NEON), packages (as root: do the Debian packages install, run and go in a clean Debian 12, and does the
-# container), fleet (sessions, relays and viewers with a Slurm and an HAProxy of their own: deploy/fleet/try.sh), wasm (does the strand core in WebAssembly decode what this one does, bit for bit, and does the page work in a browser). A part that fails
+# container), fleet (sessions, relays and viewers with a Slurm and an HAProxy of their own: deploy/fleet/try.sh), wasm (does the strand core in WebAssembly decode what this one does, bit for bit, and does the page work in a browser),
+# mutants (300 faults planted at random, by the date's seed: which of them does no test notice?). A part that fails
 # does not keep the others from running; a table of all stands at the end. A finding of a fuzzer stays under
 # build/fuzz/findings.
 set -euo pipefail
@@ -18,11 +19,11 @@ parts=()
 while [ $# -gt 0 ]; do
   case "$1" in
     --seconds) seconds="${2:?--seconds needs a number}"; shift 2 ;;
-    fuzz | grids | dev | tsan | lto | arm | packages | fleet | wasm) parts+=("$1"); shift ;;
-    *) echo "unknown argument '$1' (known: --seconds N, fuzz, grids, dev, tsan, lto, arm, packages, fleet, wasm)" >&2; exit 2 ;;
+    fuzz | grids | dev | tsan | lto | arm | packages | fleet | wasm | mutants) parts+=("$1"); shift ;;
+    *) echo "unknown argument '$1' (known: --seconds N, fuzz, grids, dev, tsan, lto, arm, packages, fleet, wasm, mutants)" >&2; exit 2 ;;
   esac
 done
-[ ${#parts[@]} -gt 0 ] || parts=(fuzz grids dev tsan lto arm packages fleet wasm)
+[ ${#parts[@]} -gt 0 ] || parts=(fuzz grids dev tsan lto arm packages fleet wasm mutants)
 
 bash deploy/install_deps.sh clang libclang-rt-14-dev xvfb xauth glslang-tools glslc spirv-tools
 log="$(mktemp)"
@@ -58,6 +59,7 @@ run_part() {
       build ci -DSTRANDCAST_WEB=ON && STRANDCAST_SOAK_S=600 STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci 1 -R '^web\.' &&
         cmake --preset ci -DSTRANDCAST_WEB=OFF >/dev/null
       ;;
+    mutants) bash tests/mutants.sh --random 300 --seed "$(date +%Y%m%d)" --most 10 ;;
   esac
 }
 
