@@ -1,4 +1,6 @@
 // Recordings: the bytes of the file, its reader in a whole, a cut and a damaged one, and the file on disk.
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/descriptor.pb.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 
@@ -12,6 +14,7 @@
 #include "common/record/record_file.h"
 #include "common/record/recording_check.h"
 #include "common/record/recording_reader.h"
+#include "common/wire/session_path.h"
 #include "tests/support/sample_recording.h"
 #include "tests/support/temporary_folder.h"
 
@@ -146,6 +149,89 @@ TEST(RecordBatch, GivesBackItemsWithTheirOrderAndTheTimesOfTheFirstAndTheLast) {
   const auto refused = read_batch(crowd.encode(), {});
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
+}
+
+TEST(RecordBatch, TakesNoMoreBytesForAnOrderFarFromZero) {
+  const auto bytes_from = [](uint32_t order) {
+    RecordBatch batch;
+    batch.add(bytes_of("a"), order, 0);
+    return batch.encode().size();
+  };
+  EXPECT_EQ(bytes_from(0xfffffff0u), bytes_from(0));
+}
+
+TEST(RecordBatch, RefusesANumberThatIsLongerThanNumbersAre) {
+  RecordBatch batch;
+  batch.add({}, 0, 0);
+  std::vector<std::byte> bytes = batch.encode();
+  ASSERT_EQ(bytes[1], std::byte{0});  // how many bytes the item has
+  const auto with_zeros = [&](size_t count) {
+    std::vector<std::byte> longer(count, std::byte{0x80});
+    longer.insert(longer.begin(), bytes[0]);
+    longer.insert(longer.end(), bytes.begin() + 1, bytes.end());
+    return longer;
+  };
+  EXPECT_TRUE(read_batch(with_zeros(8), {}));  // nine bytes, 63 bits
+  EXPECT_FALSE(read_batch(with_zeros(9), {}));
+}
+
+TEST(SessionPath, NamesAreOfLettersDigitsAndThreeSigns) {
+  for (int c = 1; c < 128; ++c) {
+    const bool is_plain = std::isalnum(c) != 0;
+    const std::string first(1, static_cast<char>(c));
+    EXPECT_EQ(is_session_name(first), is_plain) << c;
+    EXPECT_EQ(is_session_name("a" + first), is_plain || c == '.' || c == '_' || c == '-') << c;
+  }
+  EXPECT_FALSE(is_session_name(""));
+  EXPECT_TRUE(is_session_name(std::string(kMaxSessionNameChars, 'a')));
+  EXPECT_FALSE(is_session_name(std::string(kMaxSessionNameChars + 1, 'a')));
+  EXPECT_EQ(without_session("/s/anna/v1"), "/v1");
+  EXPECT_EQ(without_session("/s/anna"), "");
+  EXPECT_EQ(without_session("/s//v1"), "/s//v1");
+  EXPECT_EQ(without_session("/v1"), "/v1");
+}
+
+TEST(RecordedMessages, HaveALimitOfBytes) {
+  const std::vector<std::byte> most(kMaxRecordedMessageBytes, std::byte{0xff});
+  const std::vector<std::byte> more(kMaxRecordedMessageBytes + 1, std::byte{0xff});
+  EXPECT_EQ(decode_recorded(0, most).error().code, ErrorCode::BadInput) << "no protobuf";
+  EXPECT_EQ(decode_recorded(0, more).error().code, ErrorCode::LimitExceeded);
+}
+
+/// What stands in a type, without its options; types within it too.
+std::string plain_text(google::protobuf::DescriptorProto type) {
+  type.clear_options();
+  for (auto& field : *type.mutable_field()) field.clear_options();
+  for (auto& choice : *type.mutable_enum_type()) choice.clear_options();
+  for (int i = 0; i < type.nested_type_size(); ++i)
+    if (!type.nested_type(i).options().map_entry()) type.mutable_nested_type(i)->clear_options();
+  return type.DebugString();
+}
+
+TEST(RecordingSchemas, AreWholeForWhoeverReadsThemAlone) {
+  for (const mcap::Schema& schema : recording_schemas()) {
+    google::protobuf::FileDescriptorSet set;
+    ASSERT_TRUE(set.ParseFromArray(schema.data.data(), static_cast<int>(schema.data.size())));
+    // Each file stands after those that it needs, and is taken by who never saw ours.
+    google::protobuf::DescriptorPool alone;
+    for (const auto& file : set.file()) {
+      EXPECT_FALSE(file.has_options());
+      for (const auto& type : file.message_type()) {
+        EXPECT_FALSE(type.has_options());
+        for (const auto& field : type.field()) EXPECT_FALSE(field.has_options()) << field.name();
+      }
+      for (const auto& choice : file.enum_type()) EXPECT_FALSE(choice.has_options());
+      ASSERT_NE(alone.BuildFile(file), nullptr) << schema.name << ": " << file.name();
+    }
+    const auto* type = alone.FindMessageTypeByName(schema.name);
+    ASSERT_NE(type, nullptr) << schema.name;
+    const auto* ours = google::protobuf::DescriptorPool::generated_pool()->FindMessageTypeByName(schema.name);
+    ASSERT_NE(ours, nullptr) << schema.name;
+    google::protobuf::DescriptorProto told, expected;
+    type->CopyTo(&told);
+    ours->CopyTo(&expected);
+    EXPECT_EQ(plain_text(told), plain_text(expected));
+  }
 }
 
 TEST(RecordingSchemas, HoldWhatTheirMessageNeedsAndNoMore) {
