@@ -28,8 +28,8 @@ WORDS = {
     "kMaxLiveInputs": "4", "kMotionStaleNs": "1 s", "kMaxSampleRateHz": "1,000 a second", "kMaxLiveBytesPerS": "2 million",
     "kMaxLiveSubjects": "32", "kMaxLiveSpeedMps": "10 m/s", "kMaxLiveTurnRadPerS": "25 rad/s", "kGateJumpM": "0.75 m", "kGateTurnRad": "0.6 rad", "kMaxOscBundleDepth": "4",
     "kMaxOscBundleElements": "256", "kMaxWaitingNotices": "64", "kMaxSendQueueMessages": "1,024", "kMaxSendQueueBytes": "1 MiB",
-    "kMaxKeptSnapshotBytes": "256 MiB", "kMaxStrandCount": "200,000", "kMaxVertexCount": "64", "kMaxPictureWidth": "3,840",
-    "kMaxPictureHeight": "2,160", "kMaxClipBytes": "2 GiB", "kMaxUpgradeAnswerBytes": "16 KiB", "kMaxHttpAnswerHeaderBytes": "16 KiB",
+    "kMaxKeptSnapshotBytes": "256 MiB",
+    "kMaxClipBytes": "2 GiB", "kMaxUpgradeAnswerBytes": "16 KiB", "kMaxHttpAnswerHeaderBytes": "16 KiB",
     "kMaxHttpBodyBytes": "1 MiB", "kMaxOutstandingPings": "32", "kClockWindow": "100", "kStageWindow": "512", "kMaxForeignLinesPerS": "20",
     "kMaxAbcReadBytes": "512 MiB", "kMaxAbcObjects": "100,000", "kMaxAbcDepth": "2,000", "connections_per_s": "10 a second", "requests_per_s": "50 a second", "wrong_tokens": "5", "guarded_addresses": "1,024",
     "handshake_ms": "5 s", "messages_per_s": "1,000 a second", "stalled_ms": "4.5 s", "idle_ms": "15 s",
@@ -44,7 +44,7 @@ OF_HEADER = {"server/relay/voices.h": {
     "kIdleVoiceNs": "90 s"}}
 # Structs, or of two values in two places: their tests have them (PictureViews, LiveMocap, SnapshotTimeline, ClientHostile and the like).
 ELSEWHERE = {"kHardwareBudget", "kSoftwareBudget", "kReservedPictureClasses", "kLiveLines", "kMaxDatagramBytes", "kMaxMessageBytes", "kKeptSnapshots",
-             "kMaxShownChars", "kStopGrace", "kFarewellTimeout", "kSilentServer", "kUnheardTime"}
+             "kMaxShownChars", "kStopGrace", "kFarewellTimeout"}
 MULTIPLES = {"KiB": 1 << 10, "MiB": 1 << 20, "GiB": 1 << 30, "million": 10**6}
 # Units by the end of a name: what a second, or a millisecond, is of them.
 TIMES = {"Ns": {"s": 1e9, "ms": 1e6}, "_ms": {"s": 1e3, "ms": 1}}

@@ -1,4 +1,5 @@
-// FreeD, message D1, of cameras and heads in virtual production: Vinten's manual, appendix A.3.2 and B.
+// FreeD, message D1, of cameras and heads in virtual production: Vinten's manual, appendix A.3.2 and B. A
+// subject is a camera's number. Angles are `pan-tilt-roll` or `tilt-pan-roll`.
 #include <array>
 
 #include "common/strands/byte_io.h"

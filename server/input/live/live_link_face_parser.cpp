@@ -1,6 +1,6 @@
 // Live Link Face, the app that sends what ARKit sees of a face: version 6 of its packets. The layout is not
 // published; it is as several independent readers have it. Of its 61 values only the turns of the head matter
-// here.
+// here, in `half-turns` or `radians`. The subject has the phone's name.
 #include <array>
 
 #include "common/base/text.h"

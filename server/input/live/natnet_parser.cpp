@@ -1,4 +1,6 @@
-// OptiTrack's NatNet: rigid bodies and bones by their names, from multicast or from a server that was asked.
+// OptiTrack's NatNet: rigid bodies and bones (`Actor/Head`) by their names, from multicast or from a server
+// that was asked; the layout for direct depacketisation. Axes are `y-up` or `z-up`. The version is as set,
+// else the server's, else what fits to the last byte.
 #include <algorithm>
 #include <array>
 #include <cstring>

@@ -1,6 +1,7 @@
-// opentrack's "UDP over network": six doubles in one datagram. Its source writes places first (the array
-// headpose of proto-udp), a page of its documentation says angles first: a setting. They are in the order of
-// bytes of the sender's machine, little-endian unless packets show otherwise.
+// opentrack's "UDP over network": six doubles in one datagram, of one subject. Its source writes places first
+// (the array headpose of proto-udp; `xyz-ypr`), a page of its documentation says angles first (`ypr-xyz`): a
+// setting. They are in the order of bytes of the sender's machine, little-endian unless five packets show
+// otherwise.
 #include <algorithm>
 #include <array>
 #include <bit>

@@ -1,5 +1,8 @@
-// VMC, version 3.1, of a performer: the bones of an avatar, trackers and time as OSC; and wind as OSC of our
-// own.
+// VMC, version 3.1, of a performer: the bones of an avatar, trackers and time as OSC 1.0; and wind in m/s as
+// OSC of our own (`/strandcast/wind fff`). The head is root * hips * spine * chest * upper chest * neck *
+// head, a subject without a name; trackers go by serial number. A zero position is that of a usual body,
+// unless `ignores_zero_positions` is off. VMC has no frames: one ends with the last bone that frames had so
+// far, or before a bone that comes again. A time whose float has steps above 2 ms is not used.
 #include <array>
 #include <bit>
 #include <cmath>

@@ -1,5 +1,6 @@
 // VRPN over one TCP connection: a cookie, then framed messages, of which names (types -1 and -2) and the
 // poses of trackers matter. By R. Pavlik's description of the protocol (CC BY 4.0). Chunks may end anywhere.
+// A subject is a tracker, `Name/2` its sensor 2. Axes are `y-up` or `z-up`.
 #include <array>
 #include <cstring>
 #include <map>
