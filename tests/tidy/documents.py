@@ -370,15 +370,8 @@ def check_options_in_prose(tree):
                     yield f"{name}: no program has {option} (in `{span}`)"
 
 
-def check_runs(tree):
-    """Each page of docs/use has commands that tests/tidy/run_commands.py runs."""
-    for name in tree.matching(["docs/use/*.md"]):
-        if name != "docs/use/README.md" and not re.search(r"<!-- run -->\n\n    strandcast-", tree.documents[name]):
-            yield f"{name}: no commands are run"
-
-
 CHECKS = [check_sizes, check_means, check_long_sentences, check_words, check_links, check_references, check_paths, check_recipes, check_tests,
-          check_code_map, check_commands, check_options_in_prose, check_runs]
+          check_code_map, check_commands, check_options_in_prose]
 
 # A fault for each check: document, text that is there, and what a careless hand makes of it.
 PLANTED = [
@@ -403,7 +396,6 @@ PLANTED = [
     (check_commands, "docs/use/try-it.md", "    strandcast-view  ", "    strandcast-viewer  "),
     (check_commands, "CONTRIBUTING.md", "cmake --preset release", "cmake --preset fast"),
     (check_options_in_prose, "docs/use/try-it.md", "`--mode auto`", "`--mood auto`"),
-    (check_runs, "docs/use/look.md", "<!-- run -->", ""),
 ]
 
 
