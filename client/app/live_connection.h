@@ -49,7 +49,7 @@ class LiveConnection {
   std::string help() const;
   /// What is being done about it; empty while connected and when trying again cannot help.
   std::string doing() const;
-  /// The reason, when trying again cannot help.
+  /// Returns why trying again cannot help; nullopt while it can.
   const std::optional<Error>& final_error() const { return attempts_.final_error(); }
 
  private:

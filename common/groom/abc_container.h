@@ -19,7 +19,7 @@ namespace strandcast {
 inline constexpr uint64_t kMaxAbcReadBytes = kMaxGroomFileBytes;
 inline constexpr uint64_t kLeastAbcReadBytes = 128;
 
-/// A child of a group as the file states it: an offset, with the top bit set where it is a block.
+/// Entry of a group: an offset in the file; the top bit says that a block of data lies there, not a group.
 using AbcChild = uint64_t;
 
 struct AbcGroup {

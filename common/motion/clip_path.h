@@ -61,8 +61,8 @@ class ClipPath {
   /// Returns the duration of the head's way from the clip's end to its start, s; 0 if it is not looped or not
   /// blended.
   double way_back_s() const { return way_back_s_; }
-  /// Returns the time in which the head gets under way, s: the shortest with the accelerations of an easy
-  /// start, at most kLongestStartS; 0 if it is not blended.
+  /// Returns how long the motion is blended in from rest, s: as short as an easy start's accelerations allow,
+  /// at most kLongestStartS; 0 without blending.
   double start_s() const { return start_s_; }
   const MotionClip& clip() const { return clip_; }
 

@@ -147,7 +147,7 @@ Result<Chunk> read_chunk(std::span<const std::byte> content, uint64_t content_by
 Result<ChunkIndex> read_chunk_index(std::span<const std::byte> content);
 Result<Statistics> read_statistics(std::span<const std::byte> content);
 Result<Footer> read_footer(std::span<const std::byte> content);
-/// More than a chunk's head takes, with names of any compression that is known.
+/// Upper bound of the bytes of a chunk's head, by any known compression.
 inline constexpr size_t kMostChunkHeadBytes = 64;
 
 }  // namespace strandcast::mcap

@@ -50,7 +50,7 @@ inline constexpr uint32_t kMaxListedParameters = 64;  // a full ParameterList st
 inline constexpr size_t kMaxParameterPathBytes = 96;
 inline constexpr size_t kMaxParameterTextBytes = 160;
 inline constexpr uint32_t kMaxStateTimes = 512;  // full StateTimes stay below kMaxControlBytes
-inline constexpr size_t kMaxRelays = 8;  // one behind another
+inline constexpr size_t kMaxRelays = 8;  // in a row
 inline constexpr uint32_t kMaxListedClasses = 64;
 inline constexpr size_t kMaxListedCodecs = 4;
 inline constexpr double kMaxSolverCost = 1000.0;
@@ -131,23 +131,23 @@ struct Ping {
   int64_t client_time_ns = 0;
   bool operator==(const Ping&) const = default;
 };
-/// From a Controller.
+/// Pauses, resumes, steps or resets the simulation; answered by a Notice.
 struct ControlCommand {
   Command command = Command::Pause;
-  // of COMMAND_STEP_ONCE: so many, answered when done and published; 0 = one, answered at once
+  // steps of COMMAND_STEP_ONCE, answered when done and published; 0 = one, answered at once
   uint32_t step_count = 0;
   bool operator==(const ControlCommand&) const = default;
 };
-/// From a Controller: scene field path, value as text ("solver.name=dftl").
+/// Changes a field of the scene by its path ("solver.name=dftl"); answered by a Notice.
 struct SetParameter {
   std::string assignment = {};
   bool operator==(const SetParameter&) const = default;
 };
-/// From an Admin; answered by a SessionList or a Notice.
+/// Lists sessions, ends one, or shuts the server down; answered by a SessionList or a Notice.
 struct AdminCommand {
   AdminAction action = AdminAction::ListSessions;
   uint64_t session = 0;  // of a kick
-  double ban_s = 0.0;  // and how long nobody of its address is let in again
+  double ban_s = 0.0;  // of a kick: how long its address stays out
   bool operator==(const AdminCommand&) const = default;
 };
 /// About once a second: what this machine makes of what it gets; 0 = not measured.
@@ -161,41 +161,41 @@ struct ViewerReport {
   double step_ns = 0.0;  // as in Hello, of who could not predict then; 0 = as in Hello
   bool operator==(const ViewerReport&) const = default;
 };
-/// Answered by a ModeChange.
+/// Asks for strands, pictures or the server's choice; answered by a ModeChange.
 struct ModeRequest {
   StreamMode mode = StreamMode::Auto;
   bool operator==(const ModeRequest&) const = default;
 };
-/// From a Controller; answered by a SceneText or a Notice.
+/// Asks for the scene as it runs; answered by a SceneText or a Notice.
 struct SceneRequest {
   bool operator==(const SceneRequest&) const = default;
 };
-/// From a Controller, about live motion capture; answered by a Notice.
+/// Chooses or calibrates the subject of live motion capture; answered by a Notice.
 struct LiveCommand {
   LiveAction action = LiveAction::ChooseSubject;
   // that drives the head from now on; empty = one named head, else the first one seen
   std::string subject = {};
   bool operator==(const LiveCommand&) const = default;
 };
-/// From who watches; answered by a ParameterList.
+/// Asks for parameters of the scene; answered by a ParameterList.
 struct ParameterRequest {
   std::string prefix = {};  // of the paths to list: "look.", "solver"; empty = all
-  uint32_t first = 0;  // so many of them are left out
+  uint32_t first = 0;  // number of them that are left out
   bool is_watching = false;  // and again, with what is other, whenever something changes
   bool operator==(const ParameterRequest&) const = default;
 };
-/// Where viewers look from. Who controls may say it of others.
+/// Sets where other viewers look from; answered by a Notice.
 struct CameraCommand {
-  uint64_t session = 0;  // whose; 0 = of all that view, but of who says it
+  uint64_t session = 0;  // whose camera; 0 = of all viewers but the sender
   CameraDesc camera;
   bool operator==(const CameraCommand&) const = default;
 };
-/// From who watches: StateTimes with every status from now on, or no more.
+/// Asks for StateTimes with every status, or for no more of them.
 struct StateTimesRequest {
   bool is_wanted = true;  // from now on StateTimes come with every status, or no more
   bool operator==(const StateTimesRequest&) const = default;
 };
-/// From a Controller; answered by a Notice.
+/// Begins or ends a recording; answered by a Notice.
 struct RecordCommand {
   bool is_wanted = true;  // to begin; false: to end the recording
   std::string name = {};  // of the file; empty = the server's choice
@@ -304,7 +304,7 @@ struct Notice {
 /// How strands are coded for this viewer from the next keyframe on.
 struct StreamQuality {
   uint16_t stream_id = 0;  // of the frames it is about
-  uint32_t rate_divisor = 1;  // every so many simulation steps
+  uint32_t rate_divisor = 1;  // at most one frame in that number of steps
   float strand_share = 1.0f;  // in (0, 1]
   float bound_m = 0.0f;  // Euclidean error
   std::string reason = {};  // for a person
@@ -386,7 +386,7 @@ struct StateTime {
   int64_t encoded_ns = 0;  // its first frame of strands
   bool operator==(const StateTime&) const = default;
 };
-/// States that were not told yet.
+/// When each new state was where on its way.
 struct StateTimes {
   std::vector<StateTime> states = {};  // at most kMaxStateTimes, oldest first
   bool operator==(const StateTimes&) const = default;
@@ -394,8 +394,8 @@ struct StateTimes {
 /// Streams for a relay, after its Welcome and when they change: all there are.
 struct StreamList {
   struct Class {
-    uint32_t rate_divisor = 1;  // every so many simulation steps
-    float strand_share = 1.0f;  // in (0, 1]: the first so many strands
+    uint32_t rate_divisor = 1;  // at most one frame in that number of steps
+    float strand_share = 1.0f;  // in (0, 1]: of the strands, the first ones
     uint32_t coarsening = 1;  // lattice steps per step of the published lattice
     float bound_m = 1e-4f;  // announced Euclidean error
     double frame_rate_hz = 60.0;

@@ -73,7 +73,7 @@ class FrameStages {
   uint64_t trace_lines_ = 0;
 };
 
-/// Notes states on their way from a source to the hub.
+/// Passes a source's states on to the hub, and notes when each came by.
 class StageSink : public StateSink {
  public:
   StageSink(StateSink& next, FrameStages& stages) : next_(next), stages_(stages) {}

@@ -20,7 +20,7 @@ inline constexpr double kSwiftestPerS = 4.0 / kShortestEasingS;
 
 class HeadEasing {
  public:
-  /// Begins anew with a head that is seen at a pose, at rest.
+  /// Starts again from a head at rest in this pose.
   void restart(const Pose& seen);
 
   /// Returns whether two frames have shown how fast the head moves.

@@ -43,12 +43,12 @@ bool is_token_equal(std::string_view expected, std::string_view given);
 std::optional<Grant> find_grant(const std::vector<AccessToken>& tokens, std::string_view given,
                                 int64_t unix_s = unix_time_s());
 
-/// Checks the role that a client asks for. Unauthorized for a wrong or expired token, BadInput for a role
-/// that it does not permit. Without tokens every role except Admin is free.
+/// Checks the role that a client asks for. Unauthorized for a wrong or expired token,
+/// Unsupported for a role that it does not permit. Without tokens every role except Admin is free.
 Status check_role(const std::vector<AccessToken>& tokens, const Hello& hello, int64_t unix_s = unix_time_s());
 
 /// Checks whether a session with this Hello may stay under the present tokens. Unauthorized if its token was
-/// revoked or has expired, BadInput if it no longer permits the role.
+/// revoked or has expired, Unsupported if it no longer permits the role.
 Status check_stay(const std::vector<AccessToken>& tokens, const Hello& hello, int64_t unix_s = unix_time_s());
 
 /// Returns when this token expires, as in AccessToken; 0 also for an unknown token.

@@ -23,7 +23,7 @@ class Relay {
   /// Opens the port and begins to connect: until that is done viewers are told to try later. Every error is
   /// one sentence for a person.
   static Result<std::unique_ptr<Relay>> start(const RelayConfig& config);
-  /// stop(), if it was not called.
+  /// Calls stop() unless somebody has.
   ~Relay() { stop(); }
   Relay(const Relay&) = delete;
   Relay& operator=(const Relay&) = delete;

@@ -19,7 +19,7 @@ std::string coherence_csv(const CoherenceStudy& study);
 std::string coherence_bars(const CoherenceStudy& study);
 /// Returns a plot of the incoherent share against processor time, a dot per row.
 std::string coherence_cost_plot(const CoherenceStudy& study);
-/// Returns a plot of the incoherent share of the main rows over the time of the shake.
+/// Returns a plot of the incoherent share over the time of the shake, a line per main row of the study.
 std::string coherence_time_plot(const CoherenceStudy& study);
 std::string coherence_page(const CoherenceStudy& study);
 

@@ -32,7 +32,7 @@ Groom make_tuft(uint32_t strand_count, uint32_t vertex_count, float length_m, ui
 /// Returns the pose of a shaken head: 3 g to and fro at 2 Hz while it turns and nods.
 Pose shaken_head(double time_s);
 
-/// The scene's solver under that head, with the scene's own wind and the given colliders.
+/// Runs the scene's solver on a moving head, with the scene's wind and colliders.
 class HairRun {
  public:
   /// Makes a run; errors as SolverRow::make() and Solver::load(). `executor` must outlive it.

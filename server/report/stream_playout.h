@@ -19,7 +19,7 @@ struct StreamPlayoutDesc {
   double distance_m = 0.66;
 };
 
-/// One interpolation on one recording: means over the compared pictures.
+/// How well one interpolation shows one recording; numbers are means over the compared pictures.
 struct PlayoutRow {
   std::string motion;
   std::string solver;

@@ -182,7 +182,7 @@ void place_shape(simd::InstructionSet set, const SliceWork& work);
 
 /// Makes the frame part of the history.
 void remember(History& history, Frame& frame);
-/// Does so for a frame of quantise_step() or place_step(), where only the corrections are kept as motion.
+/// Makes a frame of quantise_step() or place_step() part of the history; only corrections count as motion.
 void remember_step(History& history, Frame& frame);
 
 }  // namespace strandcast::tangent

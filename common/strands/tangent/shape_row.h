@@ -88,7 +88,7 @@ struct Edges {
 
 class ShapeRow {
  public:
-  /// Makes the row v; `position` is known for earlier rows and for earlier blocks of this one.
+  /// Makes the row of vertex v. Reads `position` of earlier rows, and of earlier blocks of this row.
   ShapeRow(const Layout& layout, float quantum_m, const Planes<int32_t>& position, uint32_t v)
       : layout_(layout), quantum_m_(quantum_m), position_(position), v_(v) {}
 
