@@ -1,5 +1,4 @@
-// ExportDrawing: strands of an export as pictures show them. Whoever can draw makes it, since exports cannot.
-// One thread.
+// ExportDrawing: strands of an export as pictures show them, by a client that can draw. One thread.
 #pragma once
 
 #include <cstdint>
