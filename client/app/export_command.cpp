@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "client/app/ctl_commands.h"
+#include "client/app/drawn_states.h"
 #include "client/app/frame_rate.h"
 #include "client/app/live_states.h"
 #include "client/app/recorded_states.h"
@@ -41,10 +42,14 @@ Result<std::unique_ptr<ExportSource>> open_source(const CtlTarget& target, const
                                                   const std::atomic<bool>& stop) {
   if (command.paths.size() > 1) {
     ASSIGN_OR_RETURN(auto recorded, RecordedStates::open(command.paths.front()));
+    const LookDesc look = recorded->look().look;
+    if (command.is_drawn) return as_drawn(std::move(recorded), look);
     return std::unique_ptr<ExportSource>(std::move(recorded));
   }
   ASSIGN_OR_RETURN(const ClientConfig config, client_config_for(target, Role::Viewer));
   ASSIGN_OR_RETURN(auto live, LiveStates::open(config, stop));
+  const LookDesc look = live->look();
+  if (command.is_drawn) return as_drawn(std::move(live), look);
   return std::unique_ptr<ExportSource>(std::move(live));
 }
 
@@ -71,6 +76,10 @@ void declare_export(CLI::App& app, ExportCommand& command) {
       ->capture_default_str();
   app.add_flag("--guides", command.is_guides,
                "Tell Unreal that these strands guide others, and are not drawn");
+  app.add_flag(
+      "--drawn", command.is_drawn,
+      "Strands as viewers draw them, with followers, style and taper, instead of the simulated ones");
+  app.add_flag("--head", command.has_head, "The head, too, as a mesh (.usda, .abc, .ply)");
   const auto seconds = without_nan(CLI::Range(0.0, kMostSeconds));
   app.add_option("--from", command.from_s, "Begin so many seconds after the first state")->check(seconds);
   app.add_option("--to", command.to_s, "End so many seconds after the first state")->check(seconds);
@@ -90,6 +99,7 @@ Result<ExportOptions> export_options(const ExportCommand& command) {
   options.up = command.up == "z" ? ExportUp::Z : ExportUp::Y;
   options.space = command.space == "world" ? ExportSpace::World : ExportSpace::Head;
   options.role = command.is_guides ? ExportRole::Guides : ExportRole::Strands;
+  options.has_head = command.has_head;
   const bool is_range = command.from_s || command.to_s || command.seconds || command.fps;
   if (command.at_s && is_range)
     return make_error(ErrorCode::BadInput,

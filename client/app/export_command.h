@@ -22,6 +22,8 @@ struct ExportCommand {
   std::string up = "y";
   std::string space = "head";
   bool is_guides = false;
+  bool is_drawn = false;
+  bool has_head = false;
   std::optional<double> from_s, to_s, seconds, at_s;
 };
 

@@ -24,6 +24,8 @@ class LiveStates : public ExportSource {
   /// Waits for a state, also for a server that is away. Returns null once stopped, Timeout if none comes.
   Result<std::shared_ptr<const Snapshot>> next() override;
   std::vector<std::string> remarks() const override;
+  /// Returns the newest look.
+  const LookDesc& look() const { return live_->session().look().look; }
 
  private:
   LiveStates(std::unique_ptr<LiveConnection> live, const std::atomic<bool>& stop);

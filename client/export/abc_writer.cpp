@@ -34,9 +34,15 @@ class AbcWriter : public StrandWriter {
     half_width_ = 0.5 * *std::max_element(strands.widths().begin(), strands.widths().end());
   }
 
-  Status begin() { return append_frame(strands_.rest_points()); }
+  Status begin() {
+    RETURN_IF_ERROR(append_frame(strands_.rest_points(), points_, bounds_, half_width_));
+    return append_head(strands_.rest_head_points());
+  }
 
-  Status write(const ExportFrame& frame) override { return append_frame(frame.points); }
+  Status write(const ExportFrame& frame) override {
+    RETURN_IF_ERROR(append_frame(frame.points, points_, bounds_, half_width_));
+    return append_head(strands_.head_points(frame.world_from_head));
+  }
 
   Result<WrittenBytes> finish() override {
     AbcItem top;
@@ -49,13 +55,15 @@ class AbcWriter : public StrandWriter {
     curves.metadata =
         "schema=AbcGeom_Curve_v2;schemaBaseType=AbcGeom_GeomBase_v1;schemaObjTitle=AbcGeom_Curve_v2:.geom";
     RETURN_IF_ERROR(add_curves(curves));
+    if (!strands_.head_triangles().empty()) RETURN_IF_ERROR(add_head(hair.items.emplace_back()));
     const AbcEvenTimes moving{0.0, 1.0 / options_.fps};
     ASSIGN_OR_RETURN(const uint64_t bytes, file_.finish(top, description(), std::span(&moving, 1)));
     return WrittenBytes{1, bytes, options_.path};
   }
 
  private:
-  Status append_frame(std::span<const glm::dvec3> points) {
+  /// Adds a sample of points, and the box that is `room` larger than theirs.
+  Status append_frame(std::span<const glm::dvec3> points, AbcSeries& series, AbcSeries& bounds, double room) {
     glm::dvec3 low = points.front(), high = low;
     numbers_.clear();
     for (const glm::dvec3& point : points) {
@@ -63,10 +71,44 @@ class AbcWriter : public StrandWriter {
       high = glm::max(high, point);
       for (int axis = 0; axis < 3; ++axis) numbers_.push_back(static_cast<float>(point[axis]));
     }
-    RETURN_IF_ERROR(file_.append(points_, abc_bytes(numbers_)));
-    low -= half_width_;
-    high += half_width_;
-    return file_.append(bounds_, abc_bytes(std::array{low.x, low.y, low.z, high.x, high.y, high.z}));
+    RETURN_IF_ERROR(file_.append(series, abc_bytes(numbers_)));
+    low -= room;
+    high += room;
+    return file_.append(bounds, abc_bytes(std::array{low.x, low.y, low.z, high.x, high.y, high.z}));
+  }
+
+  Status append_head(const std::vector<glm::dvec3>& points) {
+    return points.empty() ? Status() : append_frame(points, head_points_, head_bounds_, 0.0);
+  }
+
+  /// Faces of Alembic go round clockwise.
+  Status add_head(AbcItem& head) {
+    head.name = "Head";
+    head.metadata =
+        "schema=AbcGeom_PolyMesh_v1;schemaBaseType=AbcGeom_GeomBase_v1;schemaObjTitle=AbcGeom_PolyMesh_v1:."
+        "geom";
+    const std::string schema = "schema=AbcGeom_PolyMesh_v1;schemaBaseType=AbcGeom_GeomBase_v1";
+    AbcEntry geom{".geom", AbcForm::Compound, AbcType::U8, 1, 0, schema, {}, {}};
+    std::vector<AbcEntry>& own = geom.entries;
+    own.push_back(
+        {".selfBnds", AbcForm::Scalar, AbcType::Double, 6, kMoving, "interpretation=box", head_bounds_, {}});
+    own.push_back({"P",
+                   AbcForm::Array,
+                   AbcType::Float,
+                   3,
+                   kMoving,
+                   "geoScope=vtx;interpretation=point",
+                   head_points_,
+                   {}});
+    std::vector<int32_t> corners;
+    for (const glm::uvec3& triangle : strands_.head_triangles())
+      for (const uint32_t vertex : {triangle.z, triangle.y, triangle.x})
+        corners.push_back(static_cast<int32_t>(vertex));
+    RETURN_IF_ERROR(add(own, ".faceIndices", AbcForm::Array, AbcType::I32, 1, "", corners));
+    RETURN_IF_ERROR(add(own, ".faceCounts", AbcForm::Array, AbcType::I32, 1, "",
+                        std::vector<int32_t>(corners.size() / 3, 3)));
+    head.entries.push_back(std::move(geom));
+    return {};
   }
 
   /// Adds a property that stands still.
@@ -101,17 +143,12 @@ class AbcWriter : public StrandWriter {
         {".selfBnds", AbcForm::Scalar, AbcType::Double, 6, kMoving, "interpretation=box", bounds_, {}});
     own.push_back(
         {"P", AbcForm::Array, AbcType::Float, 3, kMoving, "geoScope=vtx;interpretation=point", points_, {}});
-    const auto strand_count = static_cast<size_t>(strands_.strand_count());
-    RETURN_IF_ERROR(add(own, "nVertices", AbcForm::Array, AbcType::I32, 1, "",
-                        std::vector<int32_t>(strand_count, static_cast<int32_t>(strands_.vertex_count()))));
+    RETURN_IF_ERROR(add(own, "nVertices", AbcForm::Array, AbcType::I32, 1, "", strands_.vertex_counts()));
     constexpr std::array<uint8_t, 4> kLinearOpen = {1, 0, 0, 0};
     RETURN_IF_ERROR(
         add(own, "curveBasisAndType", AbcForm::Scalar, AbcType::U8, kLinearOpen.size(), "", kLinearOpen));
-    std::vector<float> widths;
-    for (size_t strand = 0; strand < strand_count; ++strand)
-      widths.insert(widths.end(), strands_.widths().begin(), strands_.widths().end());
     RETURN_IF_ERROR(add(own, "width", AbcForm::Array, AbcType::Float, 1,
-                        param_metadata("vtx", "", 1, "float32_t"), widths));
+                        param_metadata("vtx", "", 1, "float32_t"), strands_.widths()));
     AbcEntry free{".arbGeomParams", AbcForm::Compound, AbcType::U8, 1, 0, "", {}, {}};
     RETURN_IF_ERROR(add_groom(free.entries));
     own.push_back(std::move(free));
@@ -151,6 +188,7 @@ class AbcWriter : public StrandWriter {
   AbcFile file_;
   double half_width_ = 0.0;
   AbcSeries points_, bounds_;
+  AbcSeries head_points_, head_bounds_;
   std::vector<float> numbers_;  // of one frame, kept for its memory
 };
 

@@ -44,25 +44,24 @@ class CsvWriter : public StrandWriter {
 
  private:
   Status append_rows(const std::string& begin, std::span<const glm::dvec3> points) {
-    const uint32_t vertex_count = strands_.vertex_count();
-    std::vector<std::string> widths(vertex_count);
-    for (uint32_t vertex = 0; vertex < vertex_count; ++vertex)
-      widths[vertex] = fmt::format("{:.6g}", strands_.widths()[vertex]);
     rows_.resize(points.size() * (begin.size() + kMostRowChars));
     char* out = rows_.data();
     const auto put = [&out](std::string_view text) { out = std::copy(text.begin(), text.end(), out); };
-    for (size_t i = 0; i < points.size(); ++i) {
-      put(begin);
-      out = std::to_chars(out, out + kMostDecimalChars, i / vertex_count).ptr;
-      *out++ = ',';
-      out = std::to_chars(out, out + kMostDecimalChars, i % vertex_count).ptr;
-      for (int axis = 0; axis < 3; ++axis) {
+    size_t i = 0;
+    for (size_t strand = 0; strand < strands_.strand_count(); ++strand) {
+      for (uint32_t vertex = 0; vertex < strands_.vertex_counts()[strand]; ++vertex, ++i) {
+        put(begin);
+        out = std::to_chars(out, out + kMostDecimalChars, strand).ptr;
         *out++ = ',';
-        out = put_decimal(out, points[i][axis], decimals_);
+        out = std::to_chars(out, out + kMostDecimalChars, vertex).ptr;
+        for (int axis = 0; axis < 3; ++axis) {
+          *out++ = ',';
+          out = put_decimal(out, points[i][axis], decimals_);
+        }
+        *out++ = ',';
+        out = fmt::format_to(out, "{:.6g}", strands_.widths()[i]);
+        *out++ = '\n';
       }
-      *out++ = ',';
-      put(widths[i % vertex_count]);
-      *out++ = '\n';
     }
     return file_.append({rows_.data(), static_cast<size_t>(out - rows_.data())});
   }

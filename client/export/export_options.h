@@ -24,6 +24,7 @@ struct ExportOptions {
   ExportRole role = ExportRole::Strands;
   double from_s = 0.0;         // after the first state
   std::optional<double> to_s;  // likewise; empty: to the last state
+  bool has_head = false;       // the head as a mesh, too; not for .csv
   bool is_one_frame = false;   // the one at from_s, without the rest shape (.ply)
   bool is_quiet = false;       // no progress on standard error
 };

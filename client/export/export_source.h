@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "client/export/export_drawing.h"
 #include "common/base/result.h"
 #include "common/strands/scene_asset.h"
 #include "common/strands/snapshot.h"
@@ -16,8 +17,9 @@ namespace strandcast {
 /// Data that is the same for all states.
 struct ExportScene {
   std::shared_ptr<const SceneAsset> asset;
-  float strand_radius_m = 0.0f;  // as drawn, at the root
-  float tip_scale = 1.0f;        // radius at the tip over radius at the root
+  float strand_radius_m = 0.0f;                 // as drawn, at the root
+  float tip_scale = 1.0f;                       // radius at the tip over radius at the root
+  std::shared_ptr<ExportDrawing> drawing = {};  // of what is exported; null: the simulated strands
 };
 
 class ExportSource {

@@ -94,11 +94,13 @@ class Export {
         return make_error(ErrorCode::BadInput, "none of {} strands has a length", strands_->left_out_count());
       ASSIGN_OR_RETURN(writer_, writer_for(extension_of(options_.path))(options_, *strands_));
       report_.first_s = frame.time_s;
+      if (options_.has_head && strands_->head_triangles().empty())
+        report_.remarks.emplace_back("the scene shows no head: there is none in the file");
     }
     progress_.begin_run(options_.path.string());
-    if (strands_->collapsed_count(frame.strands) > 0) ++collapsed_frames_;
     const std::vector<glm::dvec3> points = strands_->points(frame.strands);
-    RETURN_IF_ERROR(writer_->write({frame.index + 1, frame.time_s, points}));
+    if (strands_->collapsed_count(points) > 0) ++collapsed_frames_;
+    RETURN_IF_ERROR(writer_->write({frame.index + 1, frame.time_s, points, frame.strands.world_from_head}));
     progress_.end_run(1.0);
     ++report_.frame_count;
     return {};
@@ -144,6 +146,8 @@ Status check_export(const ExportOptions& options) {
                 "USD is written as text: export .usda ('usdcat out.usda -o out.usdc' makes it binary)");
   if (writer_for(extension) == nullptr)
     return fail(ErrorCode::BadInput, "the extension says the format; known are .usda, .abc, .ply and .csv");
+  if (options.has_head && extension == ".csv")
+    return fail(ErrorCode::BadInput, "a table has no head: leave --head out, or export .usda, .abc or .ply");
   if (!std::isfinite(options.from_s) || options.from_s < 0.0)
     return make_error(ErrorCode::BadInput, "the beginning is {} s, it has to be 0 or later", options.from_s);
   if (options.to_s && !(*options.to_s >= options.from_s))

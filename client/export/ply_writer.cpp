@@ -19,11 +19,14 @@ class PlyWriter : public StrandWriter {
   PlyWriter(const ExportOptions& options, const StrandSet& strands) : options_(options), strands_(strands) {}
 
   Status begin() {
-    return options_.is_one_frame ? Status() : write_file(0, "the rest shape", strands_.rest_points());
+    return options_.is_one_frame
+               ? Status()
+               : write_file(0, "the rest shape", strands_.rest_points(), strands_.rest_head_points());
   }
 
   Status write(const ExportFrame& frame) override {
-    return write_file(frame.number, fmt::format("at {:.6g} s of the simulation", frame.time_s), frame.points);
+    return write_file(frame.number, fmt::format("at {:.6g} s of the simulation", frame.time_s), frame.points,
+                      strands_.head_points(frame.world_from_head));
   }
 
   Result<WrittenBytes> finish() override { return written_; }
@@ -36,32 +39,46 @@ class PlyWriter : public StrandWriter {
                                                      options_.path.extension().string());
   }
 
-  std::string header(const std::string& moment) const {
-    const uint64_t points = uint64_t{strands_.strand_count()} * strands_.vertex_count();
-    return fmt::format(
+  std::string header(const std::string& moment, size_t head_vertices) const {
+    const size_t points = strands_.widths().size() + head_vertices;
+    std::string text = fmt::format(
         "ply\nformat binary_little_endian 1.0\n"
         "comment {} strands of {} vertices, root first, {}, in {}\n"
-        "comment unit_m {}\ncomment up_axis {}\ncomment strand_vertex_count {}\n"
-        "element vertex {}\nproperty float x\nproperty float y\nproperty float z\nproperty float width\n"
-        "element strand {}\nproperty ushort nsegs\nend_header\n",
+        "comment unit_m {}\ncomment up_axis {}\n",
         strands_.strand_count(), strands_.vertex_count(), moment,
         options_.space == ExportSpace::Head ? "the head's own space" : "the world", metres_of(options_.unit),
-        options_.up == ExportUp::Y ? 'Y' : 'Z', strands_.vertex_count(), points, strands_.strand_count());
+        options_.up == ExportUp::Y ? 'Y' : 'Z');
+    if (points == size_t{strands_.strand_count()} * strands_.vertex_count())
+      text += fmt::format("comment strand_vertex_count {}\n", strands_.vertex_count());
+    text += fmt::format(
+        "element vertex {}\nproperty float x\nproperty float y\nproperty float z\nproperty float width\n"
+        "element strand {}\nproperty ushort nsegs\n",
+        points, strands_.strand_count());
+    if (head_vertices > 0)
+      text += fmt::format("element face {}\nproperty list uchar uint vertex_indices\n",
+                          strands_.head_triangles().size());
+    return text + "end_header\n";
   }
 
-  Status write_file(uint64_t number, const std::string& moment, std::span<const glm::dvec3> points) {
-    std::string bytes = header(moment);
+  Status write_file(uint64_t number, const std::string& moment, std::span<const glm::dvec3> points,
+                    const std::vector<glm::dvec3>& head) {
+    std::string bytes = header(moment, head.size());
     const auto put = [&bytes](auto value) {
       char raw[sizeof(value)];
       std::memcpy(raw, &value, sizeof(value));
       bytes.append(raw, sizeof(value));
     };
-    for (size_t i = 0; i < points.size(); ++i) {
-      for (int axis = 0; axis < 3; ++axis) put(static_cast<float>(points[i][axis]));
-      put(strands_.widths()[i % strands_.vertex_count()]);
+    const auto put_point = [&](const glm::dvec3& point, float width) {
+      for (int axis = 0; axis < 3; ++axis) put(static_cast<float>(point[axis]));
+      put(width);
+    };
+    for (size_t i = 0; i < points.size(); ++i) put_point(points[i], strands_.widths()[i]);
+    for (const glm::dvec3& point : head) put_point(point, 0.0f);
+    for (const uint32_t count : strands_.vertex_counts()) put(static_cast<uint16_t>(count - 1));
+    for (const glm::uvec3& triangle : strands_.head_triangles()) {
+      put(uint8_t{3});
+      for (int corner = 0; corner < 3; ++corner) put(static_cast<uint32_t>(points.size() + triangle[corner]));
     }
-    for (uint32_t strand = 0; strand < strands_.strand_count(); ++strand)
-      put(static_cast<uint16_t>(strands_.vertex_count() - 1));
     written_.last_path = path_of(number);
     ASSIGN_OR_RETURN(OutputFile file, OutputFile::create(written_.last_path));
     RETURN_IF_ERROR(file.append(bytes));

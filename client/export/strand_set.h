@@ -1,9 +1,10 @@
-// StrandSet: selects the strands of an export and converts them to the file's order, unit, axes, space and
-// widths. The same for all frames. Pure; one thread.
+// StrandSet: selects the strands of an export, simulated or drawn ones, and converts them and the head to the
+// file's order, unit, axes, space and widths. The same for all frames. One thread.
 #pragma once
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <span>
 #include <vector>
 
 #include "client/export/export_options.h"
@@ -24,26 +25,40 @@ class StrandSet {
   StrandSet(const ExportScene& scene, const ExportOptions& options, const PosedStrands& first);
 
   uint32_t strand_count() const { return static_cast<uint32_t>(strand_.size()); }
+  /// Returns the vertices of each strand; drawn ones differ.
+  const std::vector<uint32_t>& vertex_counts() const { return vertex_counts_; }
+  /// Returns the most vertices of a strand.
   uint32_t vertex_count() const { return vertex_count_; }
   uint32_t left_out_count() const { return left_out_count_; }
 
   /// Returns the points of a frame in the file's units and axes, strand after strand, root first.
   std::vector<glm::dvec3> points(const PosedStrands& strands) const;
   /// Returns the rest shape as points() does, placed in the world on the head of the first frame.
-  std::vector<glm::dvec3> rest_points() const { return points(rest_); }
-  /// Returns the diameters of one strand's vertices from root to tip, in file units.
+  std::vector<glm::dvec3> rest_points() const { return points({first_pose_, scene_.asset->rest_position_m}); }
+  /// Returns the diameters of all points, in file units.
   const std::vector<float>& widths() const { return width_; }
   /// Returns longitude and latitude of each root about the centre of all roots, 0..1.
   std::vector<glm::vec2> root_uv() const;
-  /// Counts the exported strands that have no length in `strands`, having lost it since the first frame.
-  uint32_t collapsed_count(const PosedStrands& strands) const;
+  /// Counts the strands that have no length in points of a frame, having lost it since the first one.
+  uint32_t collapsed_count(std::span<const glm::dvec3> points) const;
+
+  /// Returns the vertices of the head on its pose, in the file's units and axes; none if it is not exported.
+  std::vector<glm::dvec3> head_points(const Pose& world_from_head) const;
+  std::vector<glm::dvec3> rest_head_points() const { return head_points(first_pose_); }
+  /// Returns the head's triangles, counter-clockwise seen from outside.
+  std::span<const glm::uvec3> head_triangles() const;
 
  private:
-  uint32_t all_strand_count_;
-  uint32_t vertex_count_;
+  std::vector<glm::vec3> in_head(const std::vector<glm::vec3>& position_m) const;
+  glm::dvec3 in_file(const glm::vec3& point_in_head, const Pose& world_from_head) const;
+
+  ExportScene scene_;
   ExportOptions options_;
-  PosedStrands rest_;
-  std::vector<uint32_t> strand_;  // of the asset, those that are not left out
+  Pose first_pose_;
+  ExportShape shape_;             // of all strands
+  std::vector<uint32_t> strand_;  // those that are not left out
+  std::vector<uint32_t> vertex_counts_;
+  uint32_t vertex_count_ = 0;
   uint32_t left_out_count_ = 0;
   std::vector<float> width_;
 };

@@ -18,7 +18,8 @@ namespace strandcast {
 struct ExportFrame {
   uint64_t number = 0;                 // from 1
   double time_s = 0.0;                 // simulated
-  std::span<const glm::dvec3> points;  // (strand_count x vertex_count) strand after strand, root first
+  std::span<const glm::dvec3> points;  // strand after strand, root first
+  Pose world_from_head = {};
 };
 
 struct WrittenBytes {

@@ -1,5 +1,6 @@
 // USD text: one BasisCurves with its points as time samples, in the conventions that Unreal takes for grooms.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <string>
@@ -46,6 +47,7 @@ class UsdaWriter : public StrandWriter {
 
   Status write(const ExportFrame& frame) override {
     last_frame_ = frame.number;
+    if (has_moving_head()) head_poses_.push_back(frame.world_from_head);
     return append_sample(frame.number, frame.points);
   }
 
@@ -56,7 +58,9 @@ class UsdaWriter : public StrandWriter {
     for (size_t frame = 0; frame < extents_.size(); ++frame)
       RETURN_IF_ERROR(
           file_.append(fmt::format("            {}: {},\n", frame, extent_text(extents_[frame]))));
-    RETURN_IF_ERROR(file_.append("        }\n    }\n}\n"));
+    RETURN_IF_ERROR(file_.append("        }\n    }\n"));
+    RETURN_IF_ERROR(append_head());
+    RETURN_IF_ERROR(file_.append("}\n"));
     RETURN_IF_ERROR(file_.patch(end_time_at_, fmt::format("{}", last_frame_)));
     const uint64_t bytes = file_.size_bytes();
     RETURN_IF_ERROR(file_.finish());
@@ -91,8 +95,8 @@ class UsdaWriter : public StrandWriter {
         "    def BasisCurves \"Strands\" (\n        prepend apiSchemas = [\"GroomAPI\"]\n    )\n    {\n";
     text += "        uniform token type = \"linear\"\n        uniform token wrap = \"nonperiodic\"\n";
     text +=
-        "        int[] curveVertexCounts = " + repeated(fmt::format("{}", strands_.vertex_count())) + "\n";
-    text += "        float[] widths = " + widths_text() +
+        fmt::format("        int[] curveVertexCounts = [{}]\n", fmt::join(strands_.vertex_counts(), ", "));
+    text += fmt::format("        float[] widths = [{:.6g}]", fmt::join(strands_.widths(), ", ")) +
             " (\n            interpolation = \"vertex\"\n        )\n";
     text += fmt::format("        custom int userProperties:groom_version_major = {}\n", kGroomVersionMajor);
     text += fmt::format("        custom int userProperties:groom_version_minor = {}\n", kGroomVersionMinor);
@@ -111,13 +115,6 @@ class UsdaWriter : public StrandWriter {
     return text + "]";
   }
 
-  std::string widths_text() const {
-    std::string one;
-    for (const float width : strands_.widths())
-      one += fmt::format("{}{:.6g}", one.empty() ? "" : ", ", width);
-    return repeated(one);
-  }
-
   std::string root_uv_text() const {
     std::string text = "[";
     for (const glm::vec2& uv : strands_.root_uv())
@@ -129,6 +126,33 @@ class UsdaWriter : public StrandWriter {
     const glm::dvec3 low = extent.low - half_width_, high = extent.high + half_width_;
     return fmt::format("[({:.7g}, {:.7g}, {:.7g}), ({:.7g}, {:.7g}, {:.7g})]", low.x, low.y, low.z, high.x,
                        high.y, high.z);
+  }
+
+  bool has_moving_head() const { return options_.has_head && options_.space == ExportSpace::World; }
+
+  /// Adds the head as a mesh, with samples where it moves.
+  Status append_head() {
+    const std::vector<glm::dvec3> rest = strands_.rest_head_points();
+    if (rest.empty()) return {};
+    std::string text = "    def Mesh \"Head\"\n    {\n        uniform token subdivisionScheme = \"none\"\n";
+    std::vector<uint32_t> corners;
+    for (const glm::uvec3& triangle : strands_.head_triangles())
+      corners.insert(corners.end(), {triangle.x, triangle.y, triangle.z});
+    const std::vector<int> counts(corners.size() / 3, 3);
+    text += fmt::format("        int[] faceVertexCounts = [{}]\n", fmt::join(counts, ", "));
+    text += fmt::format("        int[] faceVertexIndices = [{}]\n", fmt::join(corners, ", "));
+    RETURN_IF_ERROR(file_.append(text + "        point3f[] points = "));
+    RETURN_IF_ERROR(append_points(rest));
+    if (!head_poses_.empty()) {
+      RETURN_IF_ERROR(file_.append("\n        point3f[] points.timeSamples = {\n            0: "));
+      RETURN_IF_ERROR(append_points(rest));
+      for (size_t i = 0; i < head_poses_.size(); ++i) {
+        RETURN_IF_ERROR(file_.append(fmt::format(",\n            {}: ", i + 1)));
+        RETURN_IF_ERROR(append_points(strands_.head_points(head_poses_[i])));
+      }
+      RETURN_IF_ERROR(file_.append(",\n        }"));
+    }
+    return file_.append("\n    }\n");
   }
 
   Status append_sample(uint64_t time_code, std::span<const glm::dvec3> points) {
@@ -177,6 +201,7 @@ class UsdaWriter : public StrandWriter {
   uint64_t end_time_at_ = 0;
   uint64_t last_frame_ = 1;
   std::vector<std::string> pieces_;  // of points, kept for their memory
+  std::vector<Pose> head_poses_;     // of all frames, where the head moves
   std::vector<Extent> extents_;      // of all frames: 48 bytes for each
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "common/base/file.h"
@@ -265,7 +266,13 @@ Result<Groom> strands_of(PlyRowsRead read, uint32_t asked_count, uint32_t said_c
                          std::vector<std::string>& notes) {
   if (asked_count != 0) return strands_of_points(std::move(read.points), asked_count);
   if (!read.strand_vertices.empty()) return strands_of_lists(read.points, read.strand_vertices);
-  if (!read.strand_counts.empty()) return strands_of_counts(std::move(read.points), read.strand_counts);
+  if (!read.strand_counts.empty()) {
+    // Where there are faces too, points behind the strands are theirs.
+    const auto on_strands =
+        std::accumulate(read.strand_counts.begin(), read.strand_counts.end(), uint64_t{0});
+    if (read.face_count > 0 && on_strands < read.points.size()) read.points.resize(on_strands);
+    return strands_of_counts(std::move(read.points), read.strand_counts);
+  }
   if (!read.edges.empty()) return strands_of_edges(read.points, read.edges, notes);
   if (said_count != 0) return strands_of_points(std::move(read.points), said_count);
   if (read.face_count > 0)

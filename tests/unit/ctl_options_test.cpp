@@ -21,7 +21,7 @@ inline void tell(FieldTexts& told, const std::string& where, const FeedOptions& 
                 wind_mps, gust_intensity, seed, as, to);
 }
 inline void tell(FieldTexts& told, const std::string& where, const ExportCommand& all) {
-  OPTION_FIELDS(all, paths, fps, unit, up, space, is_guides, from_s, to_s, seconds, at_s);
+  OPTION_FIELDS(all, paths, fps, unit, up, space, is_guides, is_drawn, has_head, from_s, to_s, seconds, at_s);
 }
 inline void tell(FieldTexts& told, const std::string& where, const BundleCommand& all) {
   OPTION_FIELDS(all, recording, page, seconds, has_all_solvers);
@@ -118,6 +118,8 @@ const OptionRow kCommandRows[] = {
     {"--up", {"z"}, {{"exported.up", "z"}}, kOut, "export"},
     {"--space", {"world"}, {{"exported.space", "world"}}, kOut, "export"},
     {"--guides", {}, {{"exported.is_guides", "true"}}, kOut, "export"},
+    {"--drawn", {}, {{"exported.is_drawn", "true"}}, kOut, "export"},
+    {"--head", {}, {{"exported.has_head", "true"}}, kOut, "export"},
     {"--from", {"2"}, {{"exported.from_s", "2"}}, kOut, "export"},
     {"--to", {"2"}, {{"exported.to_s", "2"}}, kOut, "export"},
     {"--seconds", {"2"}, {{"exported.seconds", "2"}}, kOut, "export"},

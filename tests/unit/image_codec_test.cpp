@@ -7,6 +7,7 @@
 #include <random>
 
 #include "common/base/file.h"
+#include "common/pictures/linear_png.h"
 
 namespace strandcast::image_codec_test {
 namespace {
@@ -149,6 +150,23 @@ TEST(ClipWriter, RefusesNonsense) {
   auto empty = ClipWriter::make(folder / "x.webp", 10.0);
   EXPECT_EQ(empty->finish().error().code, ErrorCode::BadInput);
   EXPECT_FALSE(std::filesystem::exists(folder / "x.webp"));
+}
+
+TEST(LinearPng, KeepsEveryStepOfLight) {
+  const Folder folder;
+  LinearImage image{5, 3, {}};
+  for (uint32_t i = 0; i < 45; ++i) image.rgb.push_back(static_cast<uint16_t>(i * 1489));
+  ASSERT_TRUE(save_linear_png(folder / "x.png", image));
+  EXPECT_EQ(load_linear_png(folder / "x.png").value(), image);
+}
+
+TEST(LinearPng, RefusesNonsense) {
+  const Folder folder;
+  EXPECT_EQ(save_linear_png(folder / "x.png", {2, 2, {1, 2, 3}}).error().code, ErrorCode::BadInput);
+  EXPECT_EQ(load_linear_png(folder / "x.png").error().code, ErrorCode::NotFound);
+  // A picture of 8 bits is none of linear light.
+  ASSERT_TRUE(save_png(folder / "x.png", {1, 1, {1, 2, 3, 255}}));
+  EXPECT_EQ(load_linear_png(folder / "x.png").error().code, ErrorCode::BadInput);
 }
 
 }  // namespace
