@@ -26,8 +26,6 @@ namespace {
 
 // Points of all drawn strands at most: fewer strands are drawn instead of more.
 constexpr uint64_t kMaxPoints = uint64_t{2} << 20;
-// Above the skin, in LatticeFrame::soft_m.
-constexpr float kShadowLift = 1.5f;
 
 uint32_t offset_of(const void* data) {
   return static_cast<uint32_t>(reinterpret_cast<uintptr_t>(data));
@@ -320,7 +318,7 @@ void begin_here(StrandPicture& p, const Turn& turn) {
   p.expanded_state = 0;
   p.bins.bin_segments(p.points, p.grid, turn.view.near_m, p.workers);
   if (p.drawn_head.mesh != nullptr) {
-    p.drawn_head.shadow_lift_m = kShadowLift * p.lattice.view().soft_m;
+    p.drawn_head.shadow_lift_m = kSkinLift * p.lattice.view().soft_m;
     place_head(turn.view, p.workers, p.drawn_head);
   }
   p.bins.bin_boxes(p.drawn_head.box, p.grid);
@@ -376,8 +374,8 @@ STRAND_CORE_EXPORT const StrandPictureParts* strand_picture_prepare(StrandPictur
   place_for_card(p);
   order_segments(p, turn->view);
   const LightLatticeView& lattice = p.lattice.view();
-  p.block = make_tile_block(
-      {p.look, turn->view, p.facts, p.detail, p.lights, lattice, kShadowLift * lattice.soft_m});
+  p.block =
+      make_tile_block({p.look, turn->view, p.facts, p.detail, p.lights, lattice, kSkinLift * lattice.soft_m});
   StrandPictureParts& parts = p.parts;
   parts.block = offset_of(&p.block);
   parts.block_bytes = sizeof p.block;

@@ -64,9 +64,11 @@ inline constexpr float kLightSumUnit = 1.0f / 65536.0f;
 inline constexpr float kLightPiecesPerCell = 0.5f;
 inline constexpr int kMaxLightCellsPerAxis = 160;
 /// The head as an obstacle to light: its surface lies this deep below the skin, so that roots and skin stay
-/// lit, and opacity ramps over this width. Both in units of LatticeFrame::soft_m.
-inline constexpr float kSolidInset = 1.25f;
-inline constexpr float kSolidRamp = 1.25f;
+/// lit, and opacity ramps over this width. Skin looks up its light this far above itself. All in units of
+/// LatticeFrame::soft_m.
+inline constexpr float kSolidInset = 0.5f;
+inline constexpr float kSolidRamp = 0.8f;
+inline constexpr float kSkinLift = 0.9f;
 /// Cells along the lattice's sides in which the head has no effect. Lookups outside the lattice use them, and
 /// a body that continues there must not shade itself.
 inline constexpr int kSolidBorderCells = 2;

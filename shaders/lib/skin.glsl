@@ -8,7 +8,7 @@
 LAW vec3 skin_radiance(vec3 skin_color, vec3 root_color, HairLights lights, LightDepth depth, vec3 normal, vec3 to_eye,
                    float cover) {
   // Light scattered inside skin reaches past the terminator, red furthest (Green 2004, wrap lighting).
-  const vec3 kWrap = vec3(0.42, 0.24, 0.18);
+  const vec3 kWrap = vec3(0.12, 0.05, 0.03);
   // Short hair and roots that are not drawn tint the skin between those that are.
   const float kScalpTint = 0.85;
   const float kShine = 0.10;
@@ -16,7 +16,7 @@ LAW vec3 skin_radiance(vec3 skin_color, vec3 root_color, HairLights lights, Ligh
   const float kSkyReach = 0.18;
   const float kSkyFloor = 0.30;
   const float kSeepReach = 0.15;  // light that seeps through hair onto skin, as scattered as within it
-  const float kSeep = 0.12;
+  const float kSeep = 0.02;
   // Faces turned away are seen only where the mesh is open; lit as if turned here.
   vec3 outward = select(dot(normal, to_eye) < -0.2, -normal, normal);
   float tint = kScalpTint * clamp(cover, 0.0, 1.0);

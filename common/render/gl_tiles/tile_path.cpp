@@ -28,8 +28,6 @@ constexpr uint64_t kPointBytes = 32;
 constexpr uint64_t kStrandBytes = 16;
 // Points of all drawn strands at most: 128 MiB. More, and fewer strands are drawn.
 constexpr uint64_t kMaxGpuPoints = uint64_t{4} << 20;
-// Above the skin, in LatticeFrame::soft_m.
-constexpr float kGlShadowLift = 1.5f;
 // Samples of the head per pixel side.
 constexpr uint32_t kHeadSide = 2;
 
@@ -117,7 +115,7 @@ class TileExpandPass final : public RenderPass {
     frame_.lattice =
         fit_lattice(frame_.lattice_desc, frame_.lights, turn.strands.position_m, style_room_m(style));
     frame_.block = make_tile_block({scene_.look, turn.view, frame_.facts, frame_.detail, frame_.lights,
-                                    frame_.lattice, kGlShadowLift * frame_.lattice.soft_m});
+                                    frame_.lattice, kSkinLift * frame_.lattice.soft_m});
     frame_.send();
     const uint64_t strands = frame_.detail.strand_count;
     // Never without storage: views of it have to be there.

@@ -21,8 +21,6 @@ namespace {
 
 // Points of all drawn strands at most: 256 MiB. More, and fewer strands are drawn.
 constexpr uint64_t kMaxPoints = uint64_t{8} << 20;
-// Above the skin, in LatticeFrame::soft_m.
-constexpr float kShadowLift = 1.5f;
 
 /// Memory of an object that a pass writes, as it is now.
 template <class Object>
@@ -142,7 +140,7 @@ Status bin(TileState& state, RenderTurn& turn) {
   turn.unusable_segments = state.counts.not_finite;
   if (state.head.mesh != nullptr) {
     state.skin.pose(turn.strands.bust, state.mesh);
-    state.head.shadow_lift_m = kShadowLift * state.lattice.view().soft_m;
+    state.head.shadow_lift_m = kSkinLift * state.lattice.view().soft_m;
     place_head(turn.view, state.workers, state.head);
   }
   state.bins.bin_boxes(state.head.box, grid);
