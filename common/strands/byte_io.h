@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -22,6 +23,11 @@ class ByteWriter {
   void put(T value) {
     static_assert(std::is_arithmetic_v<T>);
     put_bytes(std::as_bytes(std::span(&value, 1)));
+  }
+  /// Appends a number in LEB128: seven bits a byte, the lowest first.
+  void put_varint(uint64_t value) {
+    for (; value >= 0x80; value >>= 7) bytes_.push_back(static_cast<std::byte>(value | 0x80u));
+    bytes_.push_back(static_cast<std::byte>(value));
   }
   void put_bytes(std::span<const std::byte> source) {
     bytes_.insert(bytes_.end(), source.begin(), source.end());
@@ -44,6 +50,23 @@ class ByteReader {
     const auto source = take_bytes(sizeof(T));
     if (!source.empty()) std::memcpy(&value, source.data(), sizeof(T));
     return value;
+  }
+  /// Takes a number in LEB128. One that T cannot hold, or that ends with an empty byte, is an error.
+  template <class T>
+  T take_varint() {
+    static_assert(std::is_unsigned_v<T>);
+    T value = 0;
+    for (int shift = 0;; shift += 7) {
+      const auto byte = take<uint8_t>();
+      const auto bits = static_cast<T>(byte & 0x7fu);
+      const bool is_lost =
+          shift >= std::numeric_limits<T>::digits || static_cast<T>(bits << shift) >> shift != bits;
+      if (!ok_ || is_lost || (byte == 0 && shift > 0)) break;
+      value = static_cast<T>(value | static_cast<T>(bits << shift));
+      if ((byte & 0x80u) == 0) return value;
+    }
+    take_bytes(bytes_.size() + 1);
+    return 0;
   }
   /// Takes the next `count` bytes; returns an empty span if fewer are left.
   std::span<const std::byte> take_bytes(size_t count) {

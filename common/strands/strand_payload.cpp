@@ -46,16 +46,32 @@ void append_fixed_part(const SnapshotInfo& snapshot, uint64_t state_hash, uint8_
   CHECK(payload.size() - begin == kStrandFixedBytes);
 }
 
+Result<FrameHeader> read_strand_header(std::span<const std::byte> message) {
+  ASSIGN_OR_RETURN(const FrameHeader header, unpack_frame_header(message));
+  if (header.opcode != Opcode::StrandKeyframe && header.opcode != Opcode::StrandDelta)
+    return make_error(ErrorCode::BadInput, "opcode 0x{:02x} is no strand message",
+                      static_cast<uint8_t>(header.opcode));
+  if (header.sequence == 0)
+    return make_error(ErrorCode::BadInput, "strand message has sequence number 0, they count from 1");
+  return header;
+}
+
+Status check_numbers(const StrandMessage& message) {
+  const StrandFixedPart& fixed = message.fixed;
+  RETURN_IF_ERROR(check_pose(fixed));
+  for (const int64_t time_ns :
+       {message.header.sim_time_ns, message.header.send_time_ns, fixed.motion_time_ns}) {
+    if (time_ns < -kMaxStrandTimeNs || time_ns > kMaxStrandTimeNs)
+      return make_error(ErrorCode::BadInput, "tick {} has the time {} ns, allowed is +-{}", fixed.tick,
+                        time_ns, kMaxStrandTimeNs);
+  }
+  return {};
+}
+
 Result<StrandMessage> read_strand_message(std::span<const std::byte> message, uint8_t codec_number,
                                           const StrandStreamLimits& limits) {
   StrandMessage result;
-  ASSIGN_OR_RETURN(result.header, unpack_frame_header(message));
-  if (result.header.opcode != Opcode::StrandKeyframe && result.header.opcode != Opcode::StrandDelta)
-    return make_error(ErrorCode::BadInput, "opcode 0x{:02x} is no strand message",
-                      static_cast<uint8_t>(result.header.opcode));
-  if (result.header.sequence == 0)
-    return make_error(ErrorCode::BadInput, "strand message has sequence number 0, they count from 1");
-
+  ASSIGN_OR_RETURN(result.header, read_strand_header(message));
   ByteReader reader(message.subspan(kFrameHeaderBytes));
   StrandFixedPart& fixed = result.fixed;
   const auto codec = reader.take<uint8_t>();
@@ -85,13 +101,7 @@ Result<StrandMessage> read_strand_message(std::span<const std::byte> message, ui
   if (!(fixed.quantum_m > 0.0f && fixed.quantum_m <= kMaxQuantumM))
     return make_error(ErrorCode::BadInput, "lattice step {} m is not in (0, {}]", fixed.quantum_m,
                       kMaxQuantumM);
-  RETURN_IF_ERROR(check_pose(fixed));
-  for (const int64_t time_ns :
-       {result.header.sim_time_ns, result.header.send_time_ns, fixed.motion_time_ns}) {
-    if (time_ns < -kMaxStrandTimeNs || time_ns > kMaxStrandTimeNs)
-      return make_error(ErrorCode::BadInput, "tick {} has the time {} ns, allowed is +-{}", fixed.tick,
-                        time_ns, kMaxStrandTimeNs);
-  }
+  RETURN_IF_ERROR(check_numbers(result));
   result.body = reader.rest();
   return result;
 }

@@ -41,6 +41,10 @@ constexpr uint8_t bust_flags(const SnapshotInfo& snapshot) {
   return static_cast<uint8_t>(snapshot.bust >> 24);
 }
 
+/// Reads the header of an untrusted strand message.
+Result<FrameHeader> read_strand_header(std::span<const std::byte> message);
+/// Checks times and the head's pose against the limits.
+Status check_numbers(const StrandMessage& message);
 /// Checks header, codec, counts and finite numbers of an untrusted strand message.
 Result<StrandMessage> read_strand_message(std::span<const std::byte> message, uint8_t codec_number,
                                           const StrandStreamLimits& limits);

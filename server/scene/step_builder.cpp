@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/base/hash.h"
+#include "common/math/pose_lattice.h"
 #include "common/math/turn.h"
 
 namespace strandcast {
@@ -68,7 +69,7 @@ std::vector<GustWave> make_gust_waves(const WindDesc& wind) {
 
 StepBuilder::StepBuilder(const SceneDesc& scene, std::vector<SphereCollider> colliders)
     : groom_gravity_in_head_mps2_(scene.gravity_mps2) {
-  world_from_head_.position_m = scene.place_m;
+  world_from_head_ = rounded_pose({scene.place_m, world_from_head_.rotation});
   change(scene, std::move(colliders));
 }
 
@@ -178,6 +179,7 @@ void StepBuilder::begin(const InputFrame& input, double end_time_s, double input
   input_ = input;
   Pose target = input.has_motion ? input.world_from_head : world_from_head_;
   if (input.has_motion && scene_.place_m != glm::dvec3(0.0)) target.position_m += scene_.place_m;
+  target = rounded_pose(target);  // as frames tell it
   // The first pose is a jump too: until then the head stood at its place.
   const bool has_jumped = input.has_motion && (input.has_teleported || !has_motion_);
   const double step_s = 1.0 / scene_.step_rate_hz;

@@ -77,9 +77,10 @@ Pose head_pose(uint32_t frame) {
 
 /// Strands that stay where they rest: steps tell nearly all.
 bool is_still(const StreamCase& stream) {
-  return stream.name == "still";
+  return stream.name == "still" || stream.name == "exact";
 }
 Pose pose_of(const StreamCase& stream, uint32_t frame) {
+  if (stream.name == "exact") return {};
   return head_pose(is_still(stream) ? 0 : frame);
 }
 
@@ -211,7 +212,7 @@ std::vector<StreamCase> stream_cases() {
   }
   cases.push_back({"no_rest", "tangent", 7, 5, 7, false});
   cases.push_back({"slices", "tangent", kSlicedStrands, kSlicedVertices, kSlicedStrands});
-  for (const char* name : {"whole", "rod", "still"}) cases.push_back({name, "step", 7, 5, 7});
+  for (const char* name : {"whole", "rod", "still", "exact"}) cases.push_back({name, "step", 7, 5, 7});
   for (const char* name : {"volume", "volume_extras", "volume_air"}) cases.push_back({name, "step", 7, 5, 7});
   cases.push_back({"prefix", "step", 7, 5, 3});
   cases.push_back({"slices", "step", kSlicedStrands, kSlicedVertices, kSlicedStrands});

@@ -24,7 +24,8 @@ struct StreamCase {
 
 /// Every codec: frames of a chain, joins, vertices that cannot be predicted, another bound; a prefix. Of
 /// "tangent" also without a rest shape, and with slices and as many classes of weights as there can be. Of
-/// "step" with two kernels, and strands that stay where steps leave them.
+/// "step" with two kernels, and strands that stay where steps leave them, under a head
+/// off the lattice of poses and on it.
 std::vector<StreamCase> stream_cases();
 
 /// A state to be coded.

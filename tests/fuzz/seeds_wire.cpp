@@ -101,6 +101,11 @@ void add_chains(const SeedFolder& seeds) {
     for (int settings = 1; codec.name == "step" && settings < 2 * kHairSizes; settings += 2)
       seeds.add("strand_" + codec.name, fmt::format("head_{}", settings),
                 joined({packed(static_cast<uint8_t>(settings)), head_patches, honest}));
+    // The last of the chain is exact: its head, and ticks.
+    Bytes exact(7, honest[0]);
+    for (uint16_t at = kFrameHeaderBytes + 9; codec.name == "step" && at < kFrameHeaderBytes + 17; ++at)
+      exact = joined({exact, chain_step(ChainStep::Patched, kKnowsHash, packed(at, uint8_t{4}))});
+    if (codec.name == "step") seeds.add("strand_step", "exact", joined({packed(uint8_t{1}), exact, honest}));
     const Bytes made_up = joined({packed(uint8_t{0}), chain_step(ChainStep::Whole, 0, frame->message), honest,
                                   chain_step(ChainStep::Body, kAsKeyframe | kKnowsHash, body),
                                   chain_step(ChainStep::Body, kKnowsHash, body),

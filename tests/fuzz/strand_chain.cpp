@@ -23,9 +23,17 @@ constexpr float kBoundM = 1e-4f;
 constexpr size_t kFrames = 8;
 constexpr size_t kJoinFrame = 3;  // late joiners get a keyframe of this state
 constexpr size_t kPayloadLengthAt = 12;
-constexpr size_t kStateHashAt = kFrameHeaderBytes + 88;
 
-constexpr size_t kStepCheckAt = kFrameHeaderBytes + kStrandFixedBytes + 2;
+/// Where a strand message has what only who knows it can say. An exact frame begins with its hash.
+struct KnownPlaces {
+  size_t state_hash, step_check;
+};
+KnownPlaces places_in(std::span<const std::byte> message) {
+  const bool is_exact =
+      message.size() > kFrameHeaderBytes && (message[kFrameHeaderBytes] & std::byte{0x80}) != std::byte{0};
+  if (is_exact) return {kFrameHeaderBytes + 1, kFrameHeaderBytes + 9};
+  return {kFrameHeaderBytes + 88, kFrameHeaderBytes + kStrandFixedBytes + 2};
+}
 
 /// The steps bound what an input costs. Slices need 1024 strands; such an input takes as long as ten others,
 /// so few have any.
@@ -55,6 +63,7 @@ struct HonestChain {
 
 constexpr size_t kOtherSceneFrame = 5;
 constexpr size_t kOtherModelFrame = 6;
+constexpr size_t kExactFrame = 7;  // the state before once more, as it was decoded
 
 /// A solver and a scene that are about what moves the hair here: "step" predicts by them.
 std::shared_ptr<const StepModel> step_model(const HairSize& size, std::span<const glm::vec3> rest_in_head_m,
@@ -151,6 +160,7 @@ HonestChain make_chain(const std::string& codec, uint8_t settings) {
   for (size_t i = 0; i < kFrames; ++i) {
     hair.step();
     Snapshot snapshot = hair.snapshot(lattice_step_m(codec, kBoundM).value());
+    if (i == kExactFrame) snapshot = *chain.decoded.back();
     snapshot.trail = trails.of(snapshot, i);
     if (i == kJoinFrame) {
       JoinFrames frames = (*encoder)->encode_for_join(snapshot);
@@ -249,7 +259,8 @@ class Game {
     header.sequence = sequence_ + 1;
     std::vector<std::byte> payload;
     if (step == ChainStep::Body) {
-      const auto fixed = std::span(good).subspan(kFrameHeaderBytes, kStrandFixedBytes);
+      const auto fixed =
+          std::span(good).first(places_in(good).state_hash + sizeof(uint64_t)).subspan(kFrameHeaderBytes);
       payload.assign(fixed.begin(), fixed.end());
     }
     payload.insert(payload.end(), piece.begin(), piece.end());
@@ -276,8 +287,9 @@ class Game {
       std::memcpy(message.data() + at, &number, sizeof number);
       return true;
     };
-    return correct("says of steps has check ", uint16_t{0}, kStepCheckAt) ||
-           correct("decodes to state ", uint64_t{0}, kStateHashAt);
+    const KnownPlaces places = places_in(message);
+    return correct("says of steps has check ", uint16_t{0}, places.step_check) ||
+           correct("decodes to state ", uint64_t{0}, places.state_hash);
   }
 
   const HonestChain& chain_;

@@ -17,7 +17,6 @@ constexpr float kBoundM = SteppedHair::kBoundM;
 constexpr uint32_t kStrands = 64;
 constexpr uint32_t kVertices = 8;
 constexpr int kSoakFrames = 2'000;
-constexpr size_t kBodyAt = kFrameHeaderBytes + kStrandFixedBytes;
 
 class Chance {
  public:
@@ -202,9 +201,10 @@ class SoakedHair {
   double input_rate_ = 1.0;
 };
 
-std::vector<std::byte> damaged(std::vector<std::byte> message, Chance& chance) {
+std::vector<std::byte> damaged(const EncodedFrame& frame, Chance& chance) {
+  std::vector<std::byte> message = frame.message;
   // Mostly behind what is checked before anything is decoded.
-  const size_t begin = chance.once_in(4) ? 0 : kBodyAt;
+  const size_t begin = chance.once_in(4) ? 0 : state_hash_at(frame) + sizeof(uint64_t);
   const auto place = [&] { return begin + chance.below(message.size() - begin); };
   switch (chance.below(4)) {
     case 0:
@@ -229,8 +229,8 @@ std::vector<std::byte> damaged(std::vector<std::byte> message, Chance& chance) {
 }
 
 uint64_t announced_hash(const EncodedFrame& frame) {
-  uint64_t hash = 0;  // the last of the fixed part
-  std::memcpy(&hash, frame.message.data() + kBodyAt - sizeof(hash), sizeof(hash));
+  uint64_t hash = 0;
+  std::memcpy(&hash, frame.message.data() + state_hash_at(frame), sizeof(hash));
   return hash;
 }
 
@@ -249,7 +249,7 @@ class SoakedStream {
                                        : JoinFrames{encoder_->encode(state.snapshot), nullptr};
     ASSERT_TRUE(frames.frame);
     const bool is_keyframe = frames.frame->header.opcode == Opcode::StrandKeyframe;
-    steps_ += !is_keyframe && (frames.frame->message[kBodyAt] & std::byte{2}) != std::byte{0};
+    steps_ += !is_keyframe && (step_flags_of(*frames.frame) & 2) != 0;
     if (has_join) joiner_ = new_decoder();
     if (joiner_)
       check(state, *frames.frame, joiner_->decode((has_join ? frames.keyframe : frames.frame)->message));
@@ -276,7 +276,7 @@ class SoakedStream {
       return;
     }
     if (chance_.once_in(50)) {
-      const Decoded decoded = watcher_->decode(damaged(frame.message, chance_));
+      const Decoded decoded = watcher_->decode(damaged(frame, chance_));
       if (decoded) {
         // Bits that nothing is made of: what is shown is right, and what follows may be refused.
         ++unnoticed_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <functional>
 #include <numbers>
 #include <span>
 
@@ -50,6 +51,9 @@ class Stream {
   /// Whether viewers had to be corrected in the frame, or were told a rounded state.
   bool send(const InputFrame& input, bool joins = false) {
     state_ = hair_.step(input);
+    // As it comes from afar, now sooner, now later.
+    const auto jitter_ns = static_cast<int64_t>(state_.snapshot.tick * 7919 % 4'000'000);
+    state_.snapshot.motion_time_ns = 1'000'000'000'000 + state_.snapshot.sim_time_ns + jitter_ns;
     if (joins) {
       const JoinFrames frames = encoder_->encode_for_join(state_.snapshot);
       take(frames.frame);
@@ -77,7 +81,10 @@ class Stream {
     for (int i = first; i < first + count; ++i) result += send(shaken(i)) ? 1 : 0;
     return result;
   }
-  size_t bytes() const { return bytes_; }  // of the last frame
+  size_t bytes() const { return frame_->message.size(); }  // of the last frame
+  const EncodedFrame& frame() const { return *frame_; }
+  /// Has it look at every frame before the viewer does.
+  void look(std::function<void(const EncodedFrame&, StrandDecoder&)> at) { look_ = std::move(at); }
   /// Farthest that a vertex of the viewer is from the simulation's, m.
   double worst_error_m() const {
     const std::vector<glm::vec3> seen_m = positions_in_head(*seen_);
@@ -95,10 +102,13 @@ class Stream {
     return viewer;
   }
   void take(const EncodedFramePtr& frame) {
+    if (look_) look_(*frame, *viewer_);
     const auto seen = viewer_->decode(frame->message);
     ASSERT_TRUE(seen) << seen.error().to_string();
     seen_ = *seen;
-    bytes_ = frame->message.size();
+    frame_ = frame;
+    EXPECT_EQ(seen_->motion_time_ns, state_.snapshot.motion_time_ns);
+    EXPECT_EQ(seen_->bust, state_.snapshot.bust);
   }
 
   SteppedHair hair_;
@@ -110,7 +120,8 @@ class Stream {
   std::unique_ptr<StrandDecoder> joiner_;
   SteppedState state_;
   std::shared_ptr<const Snapshot> seen_;
-  size_t bytes_ = 0;
+  EncodedFramePtr frame_;
+  std::function<void(const EncodedFrame&, StrandDecoder&)> look_;
 };
 
 class SharedStrands : public testing::TestWithParam<const char*> {};
@@ -129,6 +140,59 @@ TEST_P(SharedStrands, LeaveNothingToCorrect) {
   EXPECT_GT(apart.corrected(kSettledFrames, 150), 10);
   EXPECT_GT(apart.worst_error_m(), 2.0 * quantum_m);
   EXPECT_LE(shared.bytes(), apart.bytes());
+}
+
+/// What a stream of 45 kbit/s at 60 Hz has for a frame is 93.75 bytes.
+TEST_P(SharedStrands, TakeLittleMoreThanTheHeadsPose) {
+  constexpr size_t kWebSocketBytes = 2;
+  constexpr size_t kMostBytes = 90;
+  for (const bool shares : {true, false}) {
+    Stream stream(scene_of(GetParam()), shares);
+    stream.corrected(0, kSettledFrames);
+    int exact = 0;
+    for (int i = 0; i < 150; ++i) {
+      stream.send(shaken(kSettledFrames + i));
+      exact += is_exact(stream.frame()) ? 1 : 0;
+      if (!shares) continue;
+      EXPECT_LE(stream.bytes() + kWebSocketBytes, kMostBytes) << i;
+    }
+    EXPECT_EQ(exact == 150, shares) << exact;
+  }
+}
+
+TEST_P(SharedStrands, AreNotMovedByDamagedFrames) {
+  Stream stream(scene_of(GetParam()), true);
+  stream.corrected(0, kSettledFrames);
+  size_t refused = 0;
+  stream.look([&](const EncodedFrame& frame, StrandDecoder& viewer) {
+    ASSERT_TRUE(is_exact(frame));
+    for (size_t at = kFrameHeaderBytes; at < frame.message.size(); ++at) {
+      std::vector<std::byte> bad = frame.message;
+      bad[at] ^= std::byte{1} << (at % 8);
+      ASSERT_FALSE(viewer.decode(bad)) << at;
+      ++refused;
+    }
+    std::vector<std::byte> longer = frame.message;
+    longer.push_back(std::byte{0});
+    FrameHeader header = frame.header;
+    ++header.payload_bytes;
+    const auto packed = pack(header);
+    std::copy(packed.begin(), packed.end(), longer.begin());
+    EXPECT_FALSE(viewer.decode(longer));
+  });
+  EXPECT_EQ(stream.corrected(kSettledFrames, 4), 0);
+  EXPECT_GT(refused, 4u * 40u);
+}
+
+/// A viewer that has nothing to count from asks for a keyframe.
+TEST_P(SharedStrands, AreOfNoUseWithoutTheFrameBefore) {
+  Stream stream(scene_of(GetParam()), true);
+  stream.corrected(0, kSettledFrames + 3);
+  auto stranger =
+      make_strand_decoder("step", {stream.hair().strand_count(), stream.hair().vertex_count()}).value();
+  stranger->set_rest_shape(stream.hair().rest_in_head_m());
+  ASSERT_TRUE(is_exact(stream.frame()));
+  EXPECT_EQ(stranger->decode(stream.frame().message).error().code, ErrorCode::Unavailable);
 }
 
 TEST_P(SharedStrands, GoOnFromWhatAJoinerIsTold) {

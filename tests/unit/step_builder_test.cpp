@@ -9,6 +9,8 @@
 #include <numbers>
 #include <vector>
 
+#include "common/math/pose_lattice.h"
+
 namespace strandcast::step_builder_test {
 namespace {
 
@@ -104,7 +106,7 @@ double most_felt_mps2(const Change& change) {
     input.has_teleported = jumps;
     builder.begin(input, 0.0, rate);
     const SceneStep& step = builder.step();
-    EXPECT_EQ(step.world_from_head.position_m.x, x_m) << "the head is where it is";
+    EXPECT_EQ(step.world_from_head, rounded_pose(input.world_from_head)) << "the head is where it is";
     const glm::dvec3 mps = step.substeps[0].head_shift_m / h_s;
     most_mps2 = std::max(most_mps2, glm::length(mps - felt_mps) / h_s);
     felt_mps = mps;
@@ -152,7 +154,8 @@ Felt feel(double rate, double motion_speed) {
     InputFrame input = moved({kSwingM * std::sin(kSwingRadPerS * t_s), 0.0, 0.0}, 0.0);
     input.motion_speed = motion_speed;
     builder.begin(input, 0.0, rate);
-    EXPECT_EQ(builder.step().world_from_head, input.world_from_head) << "the head is where it is";
+    EXPECT_EQ(builder.step().world_from_head, rounded_pose(input.world_from_head))
+        << "the head is where it is";
     felt.shift_m.push_back(builder.step().substeps[0].head_shift_m.x);
     felt.carried += builder.step().carried_to_rotation ? 1 : 0;
   }
@@ -177,8 +180,18 @@ TEST(StepBuilder, AHeadThatIsSlowedWithTheSimulationIsFeltAsItIs) {
   const Felt slowed = feel(4.0, 0.25);
   const Felt real = feel(1.0, 1.0);
   EXPECT_EQ(slowed.carried, 1) << "the first pose";
-  for (size_t i = 0; i < real.shift_m.size(); ++i) EXPECT_NEAR(slowed.shift_m[i], real.shift_m[i], 1e-12);
+  for (size_t i = 0; i < real.shift_m.size(); ++i) EXPECT_NEAR(slowed.shift_m[i], real.shift_m[i], 1e-9);
   EXPECT_EQ(feel(4.0, 0.5).carried, 60) << "slowed, but not enough";
+}
+
+// Frames tell such poses in few bytes; what is off is less than the size of an atom.
+TEST(StepBuilder, PlacesTheHeadOnTheLatticeOfPoses) {
+  StepBuilder builder(still_scene(), {});
+  const InputFrame input = moved({0.1, 1.0 / 3.0, -1234.567}, 0.3);
+  EXPECT_FALSE(pose_steps(input.world_from_head));
+  const Pose& pose = builder.build(input, {}, 0.0).world_from_head;
+  EXPECT_TRUE(pose_steps(pose));
+  EXPECT_LT(glm::distance(pose.position_m, input.world_from_head.position_m), 3e-10);
 }
 
 TEST(StepBuilder, WithoutMotionTheHeadStaysWhereItWas) {

@@ -34,9 +34,6 @@ double largest_error_m(const SteppedState& state, const Snapshot& decoded) {
   return largest;
 }
 
-int flags_of(const EncodedFrame& frame) {
-  return std::to_integer<int>(frame.message[kFrameHeaderBytes + kStrandFixedBytes]);
-}
 bool is_keyframe(const EncodedFrame& frame) {
   return frame.header.opcode == Opcode::StrandKeyframe;
 }
@@ -67,7 +64,7 @@ struct Stream {
     ASSERT_TRUE(decoded) << decoded.error().to_string();
     EXPECT_LE(largest_error_m(state, **decoded), kBoundM) << "tick " << state.snapshot.tick;
   }
-  bool is_step() const { return !is_keyframe(*frame) && (flags_of(*frame) & kStepFlag) != 0; }
+  bool is_step() const { return !is_keyframe(*frame) && (step_flags_of(*frame) & kStepFlag) != 0; }
   size_t bytes() const { return frame->message.size(); }
 };
 
@@ -445,7 +442,7 @@ TEST(StepCodec, IsTangentWhileTheSolverHasNoKernel) {
     const auto decoded = joiner->decode(stream.frame->message);
     ASSERT_TRUE(decoded) << decoded.error().to_string();
     if (i == 0) {
-      EXPECT_NE(flags_of(*stream.frame) & kModelFlag, 0);
+      EXPECT_NE(step_flags_of(*stream.frame) & kModelFlag, 0);
     }
     if (i > 0) {
       EXPECT_TRUE(stream.is_step());
@@ -465,8 +462,8 @@ TEST(StepCodec, TellsASceneOnceAndAModelOnce) {
     }
     stream.pass(hair.step());
     if (i == 0) continue;
-    EXPECT_EQ((flags_of(*stream.frame) & kSceneFlag) != 0, i == 3);
-    EXPECT_EQ(flags_of(*stream.frame) & kModelFlag, 0);
+    EXPECT_EQ((step_flags_of(*stream.frame) & kSceneFlag) != 0, i == 3);
+    EXPECT_EQ(step_flags_of(*stream.frame) & kModelFlag, 0);
   }
 }
 
@@ -491,7 +488,7 @@ TEST(StepCodec, EverySolverWithAKernelTakesAFractionOfTangentsBytes) {
       by_motion.pass(state);
       if (i < kFirst) continue;
       EXPECT_TRUE(by_steps.is_step()) << "frame " << i;
-      step_bytes += static_cast<double>(by_steps.bytes() - kFixedBytes);
+      step_bytes += static_cast<double>(by_steps.bytes()) - kFixedBytes;
       motion_bytes += static_cast<double>(by_motion.bytes() - kFixedBytes);
     }
     EXPECT_LT(step_bytes, kMostShare * motion_bytes);

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "common/base/result.h"
+#include "common/math/bust.h"
 #include "common/math/pose.h"
 #include "common/strands/byte_io.h"
 #include "common/strands/tangent/motion.h"
@@ -31,6 +32,12 @@ struct Moment {
   Pose world_from_head;
 };
 
+/// How a delta begins.
+struct Beginning {
+  uint8_t flags = 0;
+  size_t head_bytes = 0;  // after the check, which covers them: of an exact frame (exact_head.h)
+};
+
 class StepReader {
  public:
   virtual ~StepReader() = default;
@@ -38,11 +45,15 @@ class StepReader {
   virtual void restart(std::span<const glm::vec3> rest_in_head_m) = 0;
   /// Reads the bytes after a delta's flags and, if the frame is predicted by steps, simulates them. After an
   /// error nothing has changed.
-  virtual Status begin(uint8_t flags, const Moment& now, const tangent::Layout& layout, ByteReader& body,
-                       tangent::History& history) = 0;
+  virtual Status begin(const Beginning& beginning, const Moment& now, const tangent::Layout& layout,
+                       ByteReader& body, tangent::History& history) = 0;
+  /// Returns the pose of the chest after the newest step.
+  virtual BustCode chest() const = 0;
   /// Restores the state before begin(), because the frame failed its checks.
   virtual void abandon(tangent::History& history) = 0;
   virtual void finish(const Moment& now, const tangent::Frame& frame, const tangent::History& history) = 0;
+  /// As finish(), for a frame that is where the steps led.
+  virtual void finish_exact(const Moment& now) = 0;
   /// After an anchor: rounds the state to the one that joiners receive.
   virtual void settle(const tangent::History& history) = 0;
   /// Reads a keyframe's state except the positions; it is kept until take_over().

@@ -95,6 +95,12 @@ void Steps::follow(const Moment& now, const tangent::Frame& frame, const tangent
   last_ = now;
 }
 
+void Steps::follow_exact(const Moment& now) {
+  ++age_;
+  is_stepping_ = false;
+  last_ = now;
+}
+
 void Steps::settle(const tangent::History& history) {
   base_ = {};
   if (predictor_) predictor_->settle(history.lattice, history.quantum_m);
@@ -138,7 +144,7 @@ void EncoderSteps::restart(const SnapshotInfo& snapshot, const tangent::Layout& 
   is_stepping_ = false;
   last_ = moment_of(snapshot);
   bytes_.clear();
-  has_said_ = false;
+  flags_ = 0;
   is_disturbed_ = true;
   shared_tick_ = 0;
   if (snapshot.trail == nullptr || snapshot.trail->scene == nullptr) return;
@@ -171,10 +177,8 @@ uint8_t EncoderSteps::begin(const SnapshotInfo& snapshot, const tangent::Layout&
                             tangent::History& history, tangent::Planes<int32_t>& target) {
   bytes_.clear();
   is_stepping_ = is_following_ = false;
-  const uint8_t flags = say(snapshot, layout, history, target);
-  check_ = check_of(flags & kTellingFlags, bytes_);
-  has_said_ = flags != 0;
-  return flags;
+  flags_ = say(snapshot, layout, history, target);
+  return flags_;
 }
 
 /// The flags; bytes_ are what they announce.
@@ -228,11 +232,13 @@ bool EncoderSteps::is_waiting(const SnapshotInfo& snapshot) const {
          snapshot.tick - shared_tick_ <= kMostTrailTicks;  // later it cannot be taken over any more
 }
 
-void EncoderSteps::append_bytes(std::vector<std::byte>& body) const {
-  if (!has_said_) return;
+void EncoderSteps::append_bytes(std::span<const std::byte> head, std::vector<std::byte>& body) const {
+  if (flags_ == 0) return;
+  std::vector<std::byte> said(head.begin(), head.end());
+  said.insert(said.end(), bytes_.begin(), bytes_.end());
   ByteWriter writer(body);
-  writer.put(check_);
-  writer.put_bytes(bytes_);
+  writer.put(check_of(flags_ & kTellingFlags, said));
+  writer.put_bytes(said);
 }
 
 void EncoderSteps::finish(const SnapshotInfo& snapshot, const tangent::Frame& frame,
@@ -240,6 +246,11 @@ void EncoderSteps::finish(const SnapshotInfo& snapshot, const tangent::Frame& fr
   const bool is_one_step = is_stepping_ && snapshot.tick == last_.tick + 1;
   is_disturbed_ = is_disturbed_ || !is_one_step || frame.lattice != history.lattice;
   follow(moment_of(snapshot), frame, history);
+}
+
+void EncoderSteps::finish_exact(const SnapshotInfo& snapshot) {
+  is_disturbed_ = is_disturbed_ || snapshot.tick != last_.tick + 1;
+  follow_exact(moment_of(snapshot));
 }
 
 std::shared_ptr<SharedUpdate> EncoderSteps::take_shared(const tangent::Layout& layout,
@@ -291,10 +302,12 @@ void DecoderSteps::restart(std::span<const glm::vec3> rest_in_head_m) {
   is_stepping_ = is_following_ = is_saved_ = false;
 }
 
-Status DecoderSteps::begin(uint8_t flags, const Moment& now, const tangent::Layout& layout, ByteReader& body,
-                           tangent::History& history) {
+Status DecoderSteps::begin(const Beginning& beginning, const Moment& now, const tangent::Layout& layout,
+                           ByteReader& body, tangent::History& history) {
+  const uint8_t flags = beginning.flags;
   const auto announced = static_cast<uint16_t>((flags & kFlags) != 0 ? body.take<uint16_t>() : 0);
   const std::span<const std::byte> all = body.rest();
+  body.take_bytes(beginning.head_bytes);
   std::optional<StepScene> scene;
   std::unique_ptr<Predictor> next;
   if ((flags & kSceneFlag) != 0) {

@@ -36,6 +36,7 @@ class Steps {
             tangent::History& history);
   /// Takes over a finished frame; `frame.lattice` holds what `history.lattice` held before.
   void follow(const Moment& now, const tangent::Frame& frame, const tangent::History& history);
+  void follow_exact(const Moment& now);
 
   WorkerPool& workers_;
   simd::InstructionSet set_;
@@ -61,8 +62,12 @@ class EncoderSteps : public Steps {
   /// Sets the target to the prediction if the simulation is about to take the viewers' state over.
   uint8_t begin(const SnapshotInfo& snapshot, const tangent::Layout& layout, tangent::History& history,
                 tangent::Planes<int32_t>& target);
-  void append_bytes(std::vector<std::byte>& body) const;
+  /// `head`: of an exact frame.
+  void append_bytes(std::span<const std::byte> head, std::vector<std::byte>& body) const;
+  /// Returns the pose of the chest after the newest step.
+  BustCode chest() const { return base_.chest; }
   void finish(const SnapshotInfo& snapshot, const tangent::Frame& frame, const tangent::History& history);
+  void finish_exact(const SnapshotInfo& snapshot);
   /// After an anchor: rounds the state to the one that joiners receive.
   void settle(const tangent::History& history) {
     Steps::settle(history);
@@ -87,9 +92,8 @@ class EncoderSteps : public Steps {
   bool has_model_ = false;  // that this build can step
   std::shared_ptr<const StepScene> told_scene_;
   std::vector<std::byte> model_bytes_;
-  std::vector<std::byte> bytes_;  // that the flags of the frame at work announce
-  uint16_t check_ = 0;
-  bool has_said_ = false;
+  std::vector<std::byte> bytes_;                   // that the flags of the frame at work announce
+  uint8_t flags_ = 0;                              // of the frame at work
   bool is_disturbed_ = false;                      // more than a step a frame acted since take_shared()
   std::shared_ptr<const StepModel> shared_model_;  // whose strands were given away
   uint64_t shared_number_ = 0;                     // of the newest update
@@ -101,10 +105,12 @@ class DecoderSteps final : public Steps, public StepReader {
  public:
   DecoderSteps(WorkerPool& workers, simd::InstructionSet set) : Steps(workers, set) {}
   void restart(std::span<const glm::vec3> rest_in_head_m) override;
-  Status begin(uint8_t flags, const Moment& now, const tangent::Layout& layout, ByteReader& body,
+  Status begin(const Beginning& beginning, const Moment& now, const tangent::Layout& layout, ByteReader& body,
                tangent::History& history) override;
+  BustCode chest() const override { return base_.chest; }
   void abandon(tangent::History& history) override;
   void finish(const Moment& now, const tangent::Frame& frame, const tangent::History& history) override;
+  void finish_exact(const Moment& now) override { follow_exact(now); }
   void settle(const tangent::History& history) override;
   Status read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout) override;
   void take_over(const Moment& now, const tangent::History& history) override;

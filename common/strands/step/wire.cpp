@@ -49,21 +49,12 @@ constexpr uint8_t kCarriedElsewhere = 4;  // not to where the tick ends
 constexpr uint8_t kTickBody = 8;
 constexpr uint8_t kTickNewBody = 16;
 constexpr uint8_t kTickBust = 32;
-constexpr uint8_t kTickFlags = kWaves | kCarried | kCarriedElsewhere | kTickBody | kTickNewBody | kTickBust;
+constexpr uint8_t kSteadyWind = 64;  // as in the tick before
+constexpr uint8_t kTickFlags =
+    kWaves | kCarried | kCarriedElsewhere | kTickBody | kTickNewBody | kTickBust | kSteadyWind;
+/// Bits of each angle of a chest, from the lowest bit of its code.
+constexpr std::array<uint32_t, 3> kChestBits = {12, 10, 10};
 
-void put_varint(uint32_t value, std::vector<std::byte>& bytes) {
-  for (; value >= 0x80; value >>= 7) bytes.push_back(static_cast<std::byte>(value | 0x80u));
-  bytes.push_back(static_cast<std::byte>(value));
-}
-uint32_t take_varint(ByteReader& bytes) {
-  uint32_t value = 0;
-  for (uint32_t shift = 0; shift < 32; shift += 7) {
-    const auto byte = bytes.take<uint8_t>();
-    value |= static_cast<uint32_t>(byte & 0x7fu) << shift;
-    if ((byte & 0x80u) == 0) break;
-  }
-  return value;
-}
 /// Writes and reads vectors, and remembers whether all that was read were usable numbers.
 struct Numbers {
   ByteReader& bytes;
@@ -431,6 +422,26 @@ glm::dvec3 point_of(const PointSteps& steps) {
   return kBodyStepM * glm::dvec3(steps[0], steps[1], steps[2]);
 }
 
+/// Writes or reads the angles of a chest, each beside that of the tick before.
+void put_chest(BustCode chest, BustCode before, ByteWriter& to) {
+  for (const uint32_t bits : kChestBits) {
+    const uint32_t mask = (1u << bits) - 1;
+    to.put_varint(fold_sign(static_cast<int32_t>(chest & mask) - static_cast<int32_t>(before & mask)));
+    chest >>= bits;
+    before >>= bits;
+  }
+}
+BustCode take_chest(BustCode before, ByteReader& from) {
+  BustCode chest = 0;
+  uint32_t shift = 0;
+  for (const uint32_t bits : kChestBits) {
+    const auto beside = static_cast<uint32_t>(unfold_sign(from.take_varint<uint32_t>()));
+    chest |= (((before >> shift) + beside) & ((1u << bits) - 1)) << shift;
+    shift += bits;
+  }
+  return chest;
+}
+
 /// Whether a tick can say where the scene's body is.
 bool tells_body(const StepTick& tick, const StepScene& scene) {
   return tick.has_body && tick.body_m.size() == 2 * scene.body.capsules.size();
@@ -615,7 +626,7 @@ void write_ticks(std::span<const StepTick> ticks, const StepScene& scene, TickBa
   ByteWriter to(bytes);
   to.put(static_cast<uint8_t>(ticks.size()));
   const auto put_beside = [&](const PointSteps& now, const PointSteps& before) {
-    for (size_t axis = 0; axis < 3; ++axis) put_varint(fold_sign(now[axis] - before[axis]), bytes);
+    for (size_t axis = 0; axis < 3; ++axis) to.put_varint(fold_sign(now[axis] - before[axis]));
   };
   for (const StepTick& tick : ticks) {
     const Pose& last = ticks.back().world_from_head;
@@ -625,9 +636,10 @@ void write_ticks(std::span<const StepTick> ticks, const StepScene& scene, TickBa
     if (tells_body(tick, scene)) flags |= kTickBody;
     if (tick.is_body_new) flags |= kTickNewBody;
     if (scene.bust.exists() && tick.bust != kRigidBust) flags |= kTickBust;
-    to.put(flags);
     const WindSteps now = wind_steps(tick.wind_mps);
-    put_beside(now, base.wind);
+    if (now == base.wind) flags |= kSteadyWind;
+    to.put(flags);
+    if (now != base.wind) put_beside(now, base.wind);
     base.wind = now;
     if ((flags & kTickBody) != 0) {
       base.body.resize(tick.body_m.size());  // new ones count from 0
@@ -639,7 +651,8 @@ void write_ticks(std::span<const StepTick> ticks, const StepScene& scene, TickBa
     } else {
       base.body.clear();
     }
-    if ((flags & kTickBust) != 0) to.put(tick.bust);
+    if ((flags & kTickBust) != 0) put_chest(tick.bust, base.chest, to);
+    base.chest = (flags & kTickBust) != 0 ? tick.bust : kRigidBust;
     if (&tick != &ticks.back()) put_near(tick.world_from_head, last, to);
     if ((flags & kCarriedElsewhere) != 0) put_near(*tick.carried_to, last, to);
   }
@@ -653,7 +666,7 @@ Result<std::vector<StepTick>> read_ticks(ByteReader& bytes, const FrameTick& las
     return make_error(ErrorCode::LimitExceeded, "a frame of {} steps, most are {}", count, kMostTrailTicks);
   const auto take_beside = [&](PointSteps& steps, int32_t most) {
     for (int32_t& value : steps)
-      value = std::clamp(wrapping_sum(value, unfold_sign(take_varint(bytes))), -most, most);
+      value = std::clamp(wrapping_sum(value, unfold_sign(bytes.take_varint<uint32_t>())), -most, most);
   };
   std::vector<StepTick> ticks(count);
   for (size_t i = 0; i < count; ++i) {
@@ -664,7 +677,7 @@ Result<std::vector<StepTick>> read_ticks(ByteReader& bytes, const FrameTick& las
     tick.has_waves = (flags & kWaves) != 0;
     tick.has_body = (flags & kTickBody) != 0;
     tick.is_body_new = (flags & kTickNewBody) != 0;
-    take_beside(base.wind, kMostWindSteps);
+    if ((flags & kSteadyWind) == 0) take_beside(base.wind, kMostWindSteps);
     tick.wind_mps = wind_of(base.wind);
     if (tick.has_body) {
       const size_t points = 2 * scene.body.capsules.size();
@@ -678,7 +691,8 @@ Result<std::vector<StepTick>> read_ticks(ByteReader& bytes, const FrameTick& las
     } else {
       base.body.clear();
     }
-    if ((flags & kTickBust) != 0) tick.bust = bytes.take<BustCode>();
+    if ((flags & kTickBust) != 0) tick.bust = take_chest(base.chest, bytes);
+    base.chest = tick.bust;
     tick.world_from_head = i + 1 < count ? take_near(last.world_from_head, from) : last.world_from_head;
     if ((flags & kCarriedElsewhere) != 0)
       tick.carried_to = take_near(last.world_from_head, from);

@@ -44,7 +44,8 @@ using PointSteps = std::array<int32_t, 3>;
 struct TickBase {
   WindSteps wind{};
   std::vector<PointSteps> body;  // empty: not known
-  std::optional<BustTurn> bust = {};
+  BustCode chest = kRigidBust;
+  std::optional<BustTurn> bust = {};  // of the chest under that tick's head
 };
 
 /// Appends the ticks up to a frame under this scene. `base` becomes that of the last tick, whose pose is the

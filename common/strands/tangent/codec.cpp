@@ -13,18 +13,20 @@
 #include "common/base/check.h"
 #include "common/base/worker_pool.h"
 #include "common/strands/byte_io.h"
+#include "common/strands/step/exact_head.h"
 #include "common/strands/step/steps.h"
 #include "common/strands/strand_payload.h"
 #include "common/strands/tangent/order.h"
 #include "common/strands/tangent/sparse_symbols.h"
 #include "common/strands/tangent/symbols.h"
+#include "common/strands/wrapping.h"
 #include "common/strands/zstd_block.h"
 
 namespace strandcast::tangent {
 namespace {
 
 constexpr uint8_t kTangentNumber = 5;
-constexpr uint8_t kStepNumber = 10;
+constexpr uint8_t kStepNumber = 11;
 constexpr int kTableLevel = 3;
 constexpr uint8_t kAnchorFlag = 1;
 
@@ -49,6 +51,7 @@ struct Chain {
   // Of the "step" codec only.
   SparseTables sparse_tables = make_first_sparse_tables();
   BlockCounts blocks;
+  step::HeadBase head;
 
   void reset(const Layout& layout) {
     history.reset(layout);
@@ -60,10 +63,24 @@ struct Chain {
   /// After an anchor: what a joiner knows, and no more. The tables stay.
   void forget_motion(const Layout& layout) {
     history.forget_motion();
+    forget_integers(layout);
+  }
+  void forget_integers(const Layout& layout) {
     sizes.reset(layout);
     blocks.assign(block_count_of(layout), 0);
   }
 };
+
+/// Of an exact frame: it has no integers.
+constexpr uint8_t kExactFlags = step::kStepFlag | step::kSparseFlag;
+
+/// Whether nobody would see that vertices are where steps led: floats of the same strands round differently.
+bool is_foretold(const Planes<int32_t>& expected, const Planes<int32_t>& target) {
+  for (size_t axis = 0; axis < 3; ++axis)
+    for (size_t i = 0; i < target[axis].size(); ++i)
+      if (wrapping_difference(expected[axis][i], target[axis][i]) + 1u > 2u) return false;
+  return true;
+}
 
 /// How many slices a thread works on side by side, so that every thread has some.
 uint32_t slices_at_once(const Layout& layout, const WorkerPool::Terms& terms) {
@@ -178,10 +195,14 @@ class Encoder final : public StrandEncoder {
   void end(const Snapshot& snapshot) {
     remember(chain_.history, frame_);
     if (steps_) steps_->finish(snapshot, frame_, chain_.history);
+    chain_.head.follow(snapshot, (flags_ & kAnchorFlag) != 0);
   }
 
   EncodedFramePtr encode_delta(const Snapshot& snapshot) {
     begin(snapshot, Followers::Some);
+    if (flags_ == kExactFlags && snapshot.bust == steps_->chest() &&
+        is_foretold(chain_.history.lattice, target_))
+      return encode_exact(snapshot);
     if ((flags_ & step::kSparseFlag) != 0) return encode_sparse(snapshot);
     for (auto& escapes : frame_.codes.escapes) escapes.clear();
     std::vector<Tables> tables(layout_.slice_count(), chain_.tables);
@@ -211,12 +232,29 @@ class Encoder final : public StrandEncoder {
                  frame_.codes, writers_[0]);
     remember_step(chain_.history, frame_);
     steps_->finish(snapshot, frame_, chain_.history);
+    chain_.head.follow(snapshot, false);
     std::swap(chain_.sizes, next_sizes_);
     std::swap(chain_.blocks, next_blocks_);
     Slices slices(1);
     writers_[0].finish(slices[0]);
     frame_.length_blend = 0;
     return make_delta(state_of(snapshot), slices);
+  }
+
+  /// After begin(), for a frame that steps tell all of.
+  EncodedFramePtr encode_exact(const Snapshot& snapshot) {
+    steps_->finish_exact(snapshot);
+    remember_exact(chain_.history, snapshot.world_from_head);
+    chain_.forget_integers(layout_);
+    std::vector<std::byte> head;
+    chain_.head.write(snapshot, head);
+    chain_.head.follow(snapshot, false);
+    std::vector<std::byte> payload;
+    ByteWriter writer(payload);
+    writer.put(static_cast<uint8_t>(number_ | step::kExactBit));
+    writer.put(state_of(snapshot).hash);
+    steps_->append_bytes(head, payload);
+    return make_encoded_frame(delta_header(snapshot), payload);
   }
 
   JoinFrames encode_anchor(const Snapshot& snapshot, Followers followers) {
@@ -270,6 +308,15 @@ class Encoder final : public StrandEncoder {
     return {info, hash_planes(layout_, chain_.history.lattice, info)};
   }
 
+  FrameHeader delta_header(const SnapshotInfo& info) {
+    FrameHeader header;
+    header.opcode = Opcode::StrandDelta;
+    header.base_sequence = sequence_++;
+    header.sequence = sequence_;
+    header.sim_time_ns = info.sim_time_ns;
+    return header;
+  }
+
   /// Of the next frame of the chain, with a body for everybody who follows.
   EncodedFramePtr make_delta(const State& state, const Slices& slices) {
     const BodyHead head{flags_, frame_.length_blend};
@@ -277,7 +324,7 @@ class Encoder final : public StrandEncoder {
     body.reserve(sizeof(head) + sizeof(frame_.weights) + sizeof(frame_.shape_weights) + layout_.plane_size());
     ByteWriter writer(body);
     writer.put_bytes(std::as_bytes(std::span(&head, 1)));
-    if (steps_) steps_->append_bytes(body);
+    if (steps_) steps_->append_bytes({}, body);
     if ((flags_ & kAnchorFlag) != 0) writer.put_bytes(std::as_bytes(std::span(frame_.shape_weights)));
     if ((flags_ & step::kSparseFlag) == 0) {
       ValueWriter weights;
@@ -285,12 +332,7 @@ class Encoder final : public StrandEncoder {
       weights.finish(body);
     }
     for (const auto& slice : slices) writer.put_bytes(slice);
-    FrameHeader header;
-    header.opcode = Opcode::StrandDelta;
-    header.base_sequence = sequence_++;
-    header.sequence = sequence_;
-    header.sim_time_ns = state.info.sim_time_ns;
-    return make_frame(header, state, body);
+    return make_frame(delta_header(state.info), state, body);
   }
 
   /// Of the same frame, for a joiner.
@@ -359,6 +401,7 @@ class Decoder final : public StrandDecoder {
   }
 
   Result<std::shared_ptr<const Snapshot>> decode(std::span<const std::byte> bytes) override {
+    if (is_exact(bytes)) return decode_exact(bytes);
     ASSIGN_OR_RETURN(const StrandMessage message, read_strand_message(bytes, number_, limits_));
     RETURN_IF_ERROR(check_chain(message.header, sequence_));
     if (layout_.strand_count == 0) reset_layout({});
@@ -372,6 +415,45 @@ class Decoder final : public StrandDecoder {
   }
 
  private:
+  bool is_exact(std::span<const std::byte> bytes) const {
+    return steps_ && bytes.size() > kFrameHeaderBytes &&
+           bytes[0] == std::byte{uint8_t(Opcode::StrandDelta)} &&
+           bytes[kFrameHeaderBytes] == std::byte{static_cast<uint8_t>(number_ | step::kExactBit)};
+  }
+
+  Result<std::shared_ptr<const Snapshot>> decode_exact(std::span<const std::byte> bytes) {
+    StrandMessage message;
+    ASSIGN_OR_RETURN(message.header, read_strand_header(bytes));
+    RETURN_IF_ERROR(check_chain(message.header, sequence_));
+    ByteReader head(bytes.subspan(kFrameHeaderBytes + 1));
+    message.fixed.state_hash = head.take<uint64_t>();
+    message.body = head.rest();
+    head.take<uint16_t>();  // the check
+    const size_t head_begin = head.rest().size();
+    RETURN_IF_ERROR(chain_.head.read(head, message));
+    RETURN_IF_ERROR(check_numbers(message));
+    auto snapshot = std::make_shared<Snapshot>(make_snapshot(message));
+    const step::Moment moment{snapshot->tick, snapshot->sim_time_ns, snapshot->world_from_head};
+    ByteReader body(message.body);
+    RETURN_IF_ERROR(
+        steps_->begin({kExactFlags, head_begin - head.rest().size()}, moment, layout_, body, chain_.history));
+    snapshot->bust = steps_->chest();
+    Status status = give(message, chain_.history.lattice, *snapshot);
+    if (status && !body.rest().empty())
+      status = make_error(ErrorCode::BadInput, "{} bytes follow an exact frame", body.rest().size());
+    if (!status) {
+      steps_->abandon(chain_.history);
+      return status.error();
+    }
+    // Only now, with everything checked, the state moves on.
+    remember_exact(chain_.history, snapshot->world_from_head);
+    steps_->finish_exact(moment);
+    chain_.forget_integers(layout_);
+    chain_.head.follow(*snapshot, false);
+    sequence_ = message.header.sequence;
+    return std::shared_ptr<const Snapshot>(std::move(snapshot));
+  }
+
   void reset_layout(std::span<const glm::vec3> rest_in_head_m) {
     layout_ = make_layout(limits_.strand_count, limits_.vertex_count, rest_in_head_m);
     frame_.resize(layout_);
@@ -399,11 +481,12 @@ class Decoder final : public StrandDecoder {
     RETURN_IF_ERROR(read_slices(body.rest(), tables, no_sizes_, frame_.shape_codes, [&](uint32_t slice) {
       place_shape(set_, {layout_, chain.history, slice, frame_});
     }));
-    RETURN_IF_ERROR(give(message, snapshot));
+    RETURN_IF_ERROR(give(message, frame_.lattice, snapshot));
     // Only now, with everything checked, the state moves on.
     frame_.head = {snapshot.world_from_head, {}};
     remember(chain.history, frame_);
     chain.forget_motion(layout_);
+    chain.head.follow(snapshot, true);
     chain_ = std::move(chain);
     if (steps_) steps_->take_over(moment, chain_.history);
     return {};
@@ -416,7 +499,7 @@ class Decoder final : public StrandDecoder {
     ByteReader body(message.body);
     ASSIGN_OR_RETURN(const BodyHead head, read_head(body));
     const step::Moment moment{snapshot.tick, snapshot.sim_time_ns, snapshot.world_from_head};
-    if (steps_) RETURN_IF_ERROR(steps_->begin(head.flags, moment, layout_, body, chain_.history));
+    if (steps_) RETURN_IF_ERROR(steps_->begin({head.flags}, moment, layout_, body, chain_.history));
     Learnt learnt{chain_.tables, chain_.sparse_tables};
     const bool is_sparse = (head.flags & step::kSparseFlag) != 0;
     const Status status = is_sparse ? read_sparse_positions(body, message, snapshot, learnt)
@@ -428,6 +511,7 @@ class Decoder final : public StrandDecoder {
     // Only now, with everything checked, the state moves on.
     (is_sparse ? remember_step : remember)(chain_.history, frame_);
     if (steps_) steps_->finish(moment, frame_, chain_.history);
+    chain_.head.follow(snapshot, (head.flags & kAnchorFlag) != 0);
     if ((head.flags & kAnchorFlag) != 0) {
       chain_.forget_motion(layout_);
       if (steps_) steps_->settle(chain_.history);
@@ -461,7 +545,7 @@ class Decoder final : public StrandDecoder {
     for_each_part(decode_terms(layout_, workers_), layout_.slice_count(), [&](uint32_t slice) {
       place_step(set_, {layout_, chain_.history, slice, frame_});
     });
-    return give(message, snapshot);
+    return give(message, frame_.lattice, snapshot);
   }
 
   Status read_tables(std::span<const std::byte> packed, Chain& chain) {
@@ -515,7 +599,7 @@ class Decoder final : public StrandDecoder {
       const auto place = is_anchor ? place_anchor : place_slice;
       place(set_, {layout_, chain_.history, slice, frame_});
     }));
-    return give(message, snapshot);
+    return give(message, frame_.lattice, snapshot);
   }
 
   /// Reads `codes` of all slices, to the last byte; place(slice) finds their positions. `tables` become those
@@ -542,9 +626,9 @@ class Decoder final : public StrandDecoder {
   }
 
   /// The decoded positions, once they are checked.
-  Status give(const StrandMessage& message, Snapshot& snapshot) const {
+  Status give(const StrandMessage& message, const Planes<int32_t>& lattice, Snapshot& snapshot) const {
     snapshot.lattice.resize(3 * snapshot.plane_size());
-    const HashedLattice given = give_planes(layout_, frame_.lattice, snapshot);
+    const HashedLattice given = give_planes(layout_, lattice, snapshot);
     return check_decoded(given.is_valid, given.state_hash, message);
   }
 

@@ -75,9 +75,15 @@ void clear(std::initializer_list<Planes<float>*> all) {
 }  // namespace
 
 void History::forget_motion() {
-  clear({&velocity, &velocity_before, &residual, &residual_before, &drift});
-  has_motion = false;
+  clear({&residual});
+  forget_all_but_residual();
   head = {head.pose, {}};
+}
+
+void History::forget_all_but_residual() {
+  if (!has_motion) return;
+  clear({&velocity, &velocity_before, &residual_before, &drift});
+  has_motion = false;
 }
 
 void Codes::resize(const Layout& layout) {
@@ -133,9 +139,13 @@ void remember_step(History& history, Frame& frame) {
   history.head = frame.head;
   std::swap(history.lattice, frame.lattice);
   std::swap(history.residual, frame.residual);
-  if (!history.has_motion) return;
-  clear({&history.velocity, &history.velocity_before, &history.residual_before, &history.drift});
-  history.has_motion = false;
+  history.forget_all_but_residual();
+}
+
+void remember_exact(History& history, const Pose& world_from_head) {
+  history.head = {world_from_head, {}};
+  clear({&history.residual});
+  history.forget_all_but_residual();
 }
 
 }  // namespace strandcast::tangent

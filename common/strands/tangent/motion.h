@@ -79,6 +79,8 @@ struct History {
   void reset(const Layout& layout);
   /// Forgets everything except strand positions and pose, which are all that a keyframe gives a late joiner.
   void forget_motion();
+  /// Forgets what a frame of steps does not know.
+  void forget_all_but_residual();
 };
 
 /// A vertex coded directly: its position less its last one (in an anchor: less its parent's), in steps of a
@@ -184,5 +186,7 @@ void place_shape(simd::InstructionSet set, const SliceWork& work);
 void remember(History& history, Frame& frame);
 /// Makes a frame of quantise_step() or place_step() part of the history; only corrections count as motion.
 void remember_step(History& history, Frame& frame);
+/// Does so for a frame that is where the step led, which the history holds already.
+void remember_exact(History& history, const Pose& world_from_head);
 
 }  // namespace strandcast::tangent
