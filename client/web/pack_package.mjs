@@ -16,8 +16,8 @@ for (const file of files) fs.copyFileSync(file, path.join(inside, path.basename(
 const entry = (name, node) => ({ types: `./${name}.d.ts`, ...(node && { node: `./${node}.js` }), default: `./${name}.js` });
 fs.writeFileSync(path.join(inside, 'package.json'), `${JSON.stringify({
   name: 'strandcast', version, description: 'Hair that a Strandcast server simulates, in a page of your own', license: 'Apache-2.0',
-  type: 'module', sideEffects: ['./element.js'], types: './strandcast.d.ts',
-  exports: { '.': entry('strandcast', 'node'), './*.wasm': './*.wasm', './worker.js': './worker.js' },
+  type: 'module', sideEffects: ['./view.js'], types: './strandcast.d.ts', peerDependencies: { three: '>=0.111' }, peerDependenciesMeta: { three: { optional: true } },
+  exports: { '.': entry('strandcast', 'node'), './three': entry('hair'), './view': entry('view'), './*.wasm': './*.wasm', './worker.js': './worker.js' },
 }, null, 2)}\n`);
 const scripts = fs.readdirSync(inside).filter((name) => name.endsWith('.js'));
 const bytes = scripts.reduce((all, name) => all + zlib.gzipSync(fs.readFileSync(path.join(inside, name)), { level: 9 }).length, 0);

@@ -8,9 +8,11 @@ import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 import { fileURLToPath, pathToFileURL } from 'node:url';
+import zlib from 'node:zlib';
 import { NodeSocket } from './node_socket.mjs';
 import { Server, SMALL } from './server.mjs';
 
+const MOST_BYTES = 60_000; // of scripts, by gzip, without the modules
 const [program, tar] = process.argv.slice(2);
 const here = path.dirname(fileURLToPath(import.meta.url));
 const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-package-'));
@@ -55,6 +57,15 @@ function inWorld({ positions, strandCount, pose }, strand, vertex) {
 
 let server;
 const tests = {
+  async 'scripts are small, and all that the package names is in it'() {
+    const { exports: entries } = JSON.parse(fs.readFileSync(path.join(installed, 'package.json'), 'utf8'));
+    const named = Object.values(entries).flatMap((entry) => (typeof entry === 'string' ? [entry] : Object.values(entry)));
+    for (const name of named) assert.ok(name.includes('*') || fs.existsSync(path.join(installed, name)), name);
+    const scripts = fs.readdirSync(installed).filter((name) => name.endsWith('.js'));
+    const bytes = scripts.reduce((all, name) => all + zlib.gzipSync(fs.readFileSync(path.join(installed, name)), { level: 9 }).length, 0);
+    console.log(`  ${bytes} bytes by gzip, at most ${MOST_BYTES}`);
+    assert.ok(bytes > 10_000 && bytes <= MOST_BYTES);
+  },
   async 'states are those that another client decodes, and lie where it says'() {
     const raw = await Server.start(program, [...SMALL, '--set', 'stream.codec=raw']);
     const connection = open(raw, { codec: 'raw' });

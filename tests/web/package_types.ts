@@ -1,5 +1,6 @@
 // What users of the npm package write, as its declarations let them; and what these refuse (tests/web/page.sh compiles it).
 import { connect, type State } from '../../client/web/package/strandcast';
+import { StrandcastHair } from '../../client/web/package/three_hair';
 
 export async function use(): Promise<Float32Array> {
   const connection = connect('wss://hair.example/v1', { token: 'token', role: 'viewer', head: 'anna' });
@@ -20,3 +21,6 @@ export async function use(): Promise<Float32Array> {
   if (connection.link.state === 'lost') connection.close();
   return new Float32Array();
 }
+
+/** What draws is what its declaration says. */
+export const declared: typeof import('../../client/web/package/hair').StrandcastHair = StrandcastHair;

@@ -2,8 +2,8 @@
 import { compileCore } from '../page/core';
 import type { FromNet, State } from '../page/messages';
 import { UserConnection } from './connection';
-import { openNear, type Session, type SessionPlan } from './near';
-import type { connect as Connect } from './strandcast';
+import { headIn, openNear, type Session, type SessionPlan } from './near';
+import type { connect as Connect, headOf as HeadOf, Options } from './strandcast';
 
 /** Beside this script, where nobody says another place. */
 export function filesOf(files: string | URL | undefined): URL {
@@ -14,8 +14,8 @@ export function filesOf(files: string | URL | undefined): URL {
 }
 
 /** One of the package's workers. Another origin's script is not let in as one, but may be imported by one. */
-export function startWorker(files: URL, name: string): Worker {
-  const script = new URL('worker.js', files).href;
+export function startWorker(files: URL, file: string, name: string): Worker {
+  const script = new URL(file, files).href;
   if (new URL(script).origin === location.origin) return new Worker(script, { type: 'module', name });
   const url = URL.createObjectURL(new Blob([`import ${JSON.stringify(script)};`], { type: 'text/javascript' }));
   const worker = new Worker(url, { type: 'module', name });
@@ -24,9 +24,10 @@ export function startWorker(files: URL, name: string): Worker {
 }
 
 function openFar(plan: SessionPlan, files: URL): Session {
-  const net = startWorker(files, 'net');
-  const socket = startWorker(files, 'socket');
+  const net = startWorker(files, 'worker.js', 'net');
+  const socket = startWorker(files, 'worker.js', 'socket');
   const states = new MessageChannel();
+  const port = plan.states ?? states.port1;
   const sockets = new MessageChannel();
   const fail = (reason: string): void => plan.tell({ kind: 'state', state: 'ended', reason, retryMs: 0 });
   net.onmessage = ({ data }: MessageEvent<FromNet>) => plan.tell(data);
@@ -34,8 +35,8 @@ function openFar(plan: SessionPlan, files: URL): Session {
   states.port2.onmessage = ({ data }: MessageEvent<State>) => plan.give(data);
   socket.postMessage({ port: sockets.port2 }, [sockets.port2]);
   net.postMessage({
-    kind: 'start', stepCore: '', wholeCore: plan.whole, asked: plan.asked, states: states.port1, sockets: sockets.port1,
-  }, [states.port1, sockets.port1]);
+    kind: 'start', stepCore: '', wholeCore: plan.whole, asked: plan.asked, states: port, sockets: sockets.port1,
+  }, [port, sockets.port1]);
   compileCore(plan.step).then((core) => net.postMessage({ kind: 'core', core }), (error: Error) => fail(error.message));
   return {
     send: (message) => net.postMessage(message),
@@ -48,9 +49,17 @@ function openFar(plan: SessionPlan, files: URL): Session {
   };
 }
 
+/** States go to what draws them, and not through the page. */
+export function connectDrawer(url: string, options: Options, states: MessagePort): UserConnection {
+  const files = filesOf(options.files);
+  return new UserConnection(url, options, files, (plan) => openFar(plan, files), states);
+}
+
 export const connect: typeof Connect = (url, options = {}) => {
   const files = filesOf(options.files);
   const isFar = options.worker ?? typeof document !== 'undefined';
   const Socket = (options.WebSocket ?? globalThis.WebSocket) as typeof WebSocket;
   return new UserConnection(url, options, files, (plan) => (isFar ? openFar(plan, files) : openNear(plan, Socket)));
 };
+
+export const headOf: typeof HeadOf = async (asset, { files } = {}) => headIn(asset, await compileCore(new URL('strand_page.wasm', filesOf(files)).href));

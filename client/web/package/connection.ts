@@ -1,6 +1,7 @@
 // A connection as its user has it (strandcast.d.ts): commands out, and what the session tells by name.
 import type { Camera, FromNet, State as StreamState, ToNet } from '../page/messages';
-import { Command, Mode, Role, type CameraMessage, type WelcomeMessage } from '../page/wire';
+import { cameraOf } from '../page/ui/orbit';
+import { Command, Mode, Role, type WelcomeMessage } from '../page/wire';
 import type { Session, SessionPlan } from './near';
 import type { Connection, Events, Link, Look, Options, State, Welcome } from './strandcast';
 
@@ -17,10 +18,6 @@ function addressOf(url: string | URL): string {
   return address.href;
 }
 
-const vec = (v: { x: number; y: number; z: number } | undefined): [number, number, number] => [v?.x ?? 0, v?.y ?? 0, v?.z ?? 0];
-const cameraOf = (camera: CameraMessage | undefined): Camera => ({
-  offset: vec(camera?.offset_m), target: vec(camera?.target_m), fov: camera?.fov_y_rad ?? 0,
-});
 const welcomeOf = (welcome: WelcomeMessage): Welcome => ({
   scene: welcome.scene_name, role: welcome.role === Role.viewer ? 'viewer' : 'controller', codec: welcome.codec,
   strandCount: welcome.strand_count, vertexCount: welcome.vertex_count, heads: welcome.heads, camera: cameraOf(welcome.camera),
@@ -39,8 +36,8 @@ export class UserConnection implements Connection {
   private isClosed = false;
   private failure?: Error;
 
-  /** `open`: a session where it shall run. */
-  constructor(url: string | URL, options: Options, files: URL, open: (plan: SessionPlan) => Session) {
+  /** `open`: a session where it shall run. `states`: where its states go instead of to the listeners. */
+  constructor(url: string | URL, options: Options, files: URL, open: (plan: SessionPlan) => Session, states?: MessagePort) {
     this.opened = new Promise((done, fail) => {
       this.on('welcome', done);
       this.on('link', ({ state, reason }) => state === 'ended' && fail(new Error(reason)));
@@ -53,9 +50,9 @@ export class UserConnection implements Connection {
         name: options.name ?? 'strandcast',
       },
       step: new URL('strand_step.wasm', files).href, whole: new URL('strand_core.wasm', files).href,
-      tell: (message) => this.hear(message), give: (state) => this.take(state),
+      tell: (message) => this.hear(message), give: (state) => this.take(state), states,
     });
-    this.ask();
+    if (!states) this.ask();
   }
 
   on<K extends Kind>(kind: K, listener: (event: Events[K]) => void): () => void {
@@ -166,6 +163,10 @@ export class UserConnection implements Connection {
   }
   setCamera(camera: Camera): void {
     this.session?.send({ kind: 'camera', camera });
+  }
+  /** What is drawn of the states: the server chooses by it. */
+  report(drawMs: number, shownHz: number, device: number): void {
+    this.session?.send({ kind: 'drawn', drawMs, shownHz, device });
   }
   close(): void {
     this.finish();

@@ -1,9 +1,11 @@
 // A session on the thread that asks for it: a socket of this thread, and states by calls.
-import { compileCore } from '../page/core';
+import { compileCore, Core } from '../page/core';
 import type { Asked, FromNet, State, StatePort, ToNet } from '../page/messages';
+import { StrandPicture } from '../page/picture';
 import { Net } from '../page/session';
 import type { ServerSocket } from '../page/socket';
 import { nowNs } from '../page/clock';
+import type { Mesh } from './strandcast';
 
 /** What a connection has of its session, wherever that runs. */
 export interface Session {
@@ -18,6 +20,7 @@ export interface SessionPlan {
   whole: string;
   tell(message: FromNet): void;
   give(state: State): void;
+  states?: MessagePort; // where they go instead
 }
 
 class NearSocket implements ServerSocket {
@@ -74,4 +77,11 @@ export function openNear(plan: SessionPlan, Socket: typeof WebSocket, load = com
       net.end();
     },
   };
+}
+
+/** The head of an asset, by the module that draws. */
+export async function headIn(asset: ArrayBuffer, module: WebAssembly.Module): Promise<Mesh> {
+  const picture = new StrandPicture(await Core.load(module), new Uint8Array(asset));
+  const { positions, normals, triangles } = picture.head();
+  return { positions: positions.slice(), normals: normals.slice(), triangles: triangles.slice() };
 }

@@ -106,3 +106,12 @@ export interface Connection extends AsyncIterable<State> {
 
 /** `url`: ws: or wss:, or the server's page (http: or https:). Comes back by itself after a lost link. */
 export function connect(url: string | URL, options?: Options): Connection;
+
+/** A mesh in head space, m. */
+export interface Mesh {
+  readonly positions: Float32Array;
+  readonly normals: Float32Array;
+  readonly triangles: Uint32Array;
+}
+/** The head that a connection's `asset` holds. */
+export function headOf(asset: ArrayBuffer, options?: Pick<Options, 'files'>): Promise<Mesh>;

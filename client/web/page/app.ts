@@ -6,7 +6,7 @@ import type { Asked, Camera, DrawFigures, FromDraw, FromNet, NetFigures, ToDraw,
 import { Hud, Row, Warnings } from './ui/hud';
 import type { SocketStart } from './socket';
 import { TAPE_URL } from './tape';
-import { followKey, followPointers, presets } from './ui/orbit';
+import { cameraOf, fittedTo, followKey, followPointers, presets } from './ui/orbit';
 import { Panel } from './ui/panel';
 import {
   CameraMessage, Command, Device, FrameQualityMessage, LookMessage, Mode, Role, StatusMessage, StreamQualityMessage,
@@ -44,23 +44,9 @@ function assets(): Assets {
 
 const ownScript = (): string => document.querySelector<HTMLScriptElement>('script[type=module]')!.src;
 
-const toScene = (v: { x: number; y: number; z: number } | undefined, otherwise: [number, number, number]): [number, number, number] =>
-  v ? [v.x, v.y, v.z] : otherwise;
-function cameraOf(message: CameraMessage | undefined): Camera {
-  const offset = toScene(message?.offset_m, [0.22, 0.07, 0.62]);
-  return {
-    offset: Math.hypot(...offset) > 0.12 ? offset : [0.22, 0.07, 0.62],
-    target: toScene(message?.target_m, [0, -0.055, 0]), fov: message?.fov_y_rad || 0.61,
-  };
-}
-
 const sentence = (text: string): string => (text ? `${text[0]!.toUpperCase()}${text.slice(1).replace(/\.$/, '')}.` : '');
 
-/** Farther away where the window is higher than wide: a head is as wide as the scene's author saw it. */
-function fitted(camera: Camera): Camera {
-  const by = Math.min(Math.max(0.85 / (stage.clientWidth / Math.max(stage.clientHeight, 1)), 1), 2);
-  return { ...camera, offset: camera.offset.map((at) => at * by) as Camera['offset'] };
-}
+const fitted = (camera: Camera): Camera => fittedTo(camera, stage.clientWidth / Math.max(stage.clientHeight, 1));
 
 /** A value of a look by its path, in a copy. */
 function withValue(look: LookMessage, path: string, value: string): LookMessage {

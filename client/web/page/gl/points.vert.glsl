@@ -1,17 +1,12 @@
-// Points of drawn strands onto the screen, lit and shaded, once each (shaders/render/tile_shade.comp is the same for
-// compute kernels); transform feedback captures both corners that a point has across its strand.
-#include "render/tile_frame.glsl"
-#include "render/tile_light.glsl"
-#include "lib/coverage.glsl"
-#include "lib/hermite.glsl"
+// Points of drawn strands, once each; transform feedback captures both corners that a point has across its strand.
+#include "gl/strand_point.glsl"
 
-layout(location = 0) in vec3 in_before_m;   // head space; beyond an end of a strand: another one's
+layout(location = 0) in vec3 in_before_m;
 layout(location = 1) in vec3 in_place_m;
 layout(location = 2) in vec3 in_behind_m;
 layout(location = 3) in uint in_strand;
 
-uniform usampler2D u_strands;   // first point, points, number among all, lock
-const int kStrandsPerRow = 1024;
+uniform usampler2D u_strands;
 
 // Of both corners: where, and how far from the middle line; light and opacity; how cover falls with that distance.
 out vec4 v_place_0;
@@ -21,62 +16,11 @@ out vec4 v_place_1;
 out vec4 v_light_1;
 out vec4 v_line_1;
 
-const float kSkinDepthM = 0.0005;   // strands this far behind the skin are still in front of it: roots stand in it
-
-vec2 on_screen(vec3 point_m) {
-  vec4 clip = u_frame.clip_from_head * vec4(point_m, 1.0);
-  return 0.5 * u_frame.target.xy * (1.0 + clip.xy / max(clip.w, u_frame.eye.w));
-}
-
-struct Way {
-  vec2 unit;      // none where it has no length
-  float squared;  // px
-};
-Way way_between(vec2 from, vec2 to) {
-  const float kNoWay = 1e-4;
-  Way way;
-  way.squared = dot(to - from, to - from);
-  way.unit = way.squared > kNoWay ? (to - from) * inversesqrt(way.squared) : vec2(0.0);
-  return way;
-}
-
 void main() {
-  uvec4 strand = texelFetch(u_strands, ivec2(int(in_strand) % kStrandsPerRow, int(in_strand) / kStrandsPerRow), 0);
-  uint point = uint(gl_VertexID) - strand.x;
-  uint last = strand.y - 1u;
-  vec3 before = point == 0u ? in_place_m : in_before_m;
-  vec3 behind = point >= last ? in_place_m : in_behind_m;
-  HairLook look = frame_look();
-  float along_step = 1.0 / float(max(last, 1u));
-  float along = min(float(point) * along_step, 1.0);
-  vec3 tangent = unit_or(behind - before, vec3(0.0, -1.0, 0.0));
-  vec3 to_eye = unit_or(u_frame.eye.xyz - in_place_m, vec3(0.0, 0.0, 1.0));
-  vec3 light = hair_radiance(look, hair_strand(strand.z, strand.w, look), frame_lights(), light_depth_at(in_place_m),
-                             along, tangent, to_eye);
-  vec4 clip = u_frame.clip_from_head * vec4(in_place_m, 1.0);
-  float away = max(clip.w, u_frame.eye.w);
-  float width = u_frame.strand.x * u_frame.target.z * (1.0 + (u_frame.strand.y - 1.0) * along * along) / away;
-  float opacity = strand_cover(along, along_step, u_frame.strand.z);
-
-  // Joints: cut across the mean of the directions before and behind; a strand that turns back across its longer side.
-  vec2 here = on_screen(in_place_m);
-  Way way_before = way_between(on_screen(before), here);
-  Way way_behind = way_between(here, on_screen(behind));
-  vec2 mitre = way_before.unit + way_behind.unit;
-  vec2 longer = way_before.squared > way_behind.squared ? way_before.unit : way_behind.unit;
-  if (dot(mitre, mitre) < 0.03) mitre = longer;
-  vec2 direction = dot(mitre, mitre) > 0.0 ? normalize(mitre) : vec2(1.0, 0.0);
-  const float kMostLean = 2.0;
-  float lean = min(1.0 / max(dot(direction, longer), 1e-3), kMostLean);
-  LineFilter line = line_filter(max(width, 1e-4), direction);
-  vec2 aside = vec2(-direction.y, direction.x) * (line.reach * lean) * (2.0 / u_frame.target.xy);
-  vec2 middle = 2.0 * here / u_frame.target.xy - 1.0;
-  float near = u_frame.eye.w;
-  float far = u_frame.target.w;
-  float depth = (far + near - 2.0 * far * near / max(clip.w - kSkinDepthM, near)) / (far - near);
-
-  v_place_0 = vec4(middle + aside, depth, line.reach);
-  v_place_1 = vec4(middle - aside, depth, -line.reach);
-  v_light_0 = v_light_1 = vec4(min(light, vec3(60000.0)), opacity);
-  v_line_0 = v_line_1 = vec4(line.base, line.slope, line.peak, 0.0);
+  uvec4 strand = texelFetch(u_strands, strand_place(in_strand), 0);
+  StrandPoint point = strand_point(in_before_m, in_place_m, in_behind_m, strand, uint(gl_VertexID));
+  v_place_0 = vec4(point.middle + point.aside, point.depth, point.line.reach);
+  v_place_1 = vec4(point.middle - point.aside, point.depth, -point.line.reach);
+  v_light_0 = v_light_1 = point.light;
+  v_line_0 = v_line_1 = vec4(point.line.base, point.line.slope, point.line.peak, 0.0);
 }

@@ -1,5 +1,6 @@
 // The project's shader files as WebGL2 takes them: includes joined, each once, behind a prologue of GLSL ES 3.00;
 // without binding numbers, which it does not have.
+import strandPoint from 'client/web/page/gl/strand_point.glsl';
 import coverage from 'shaders/lib/coverage.glsl';
 import hairLight from 'shaders/lib/hair_light.glsl';
 import hash from 'shaders/lib/hash.glsl';
@@ -14,7 +15,7 @@ import limits from 'shaders/shared/limits.h';
 import tiles from 'shaders/shared/tiles.h';
 
 const files: { readonly [path: string]: string } = {
-  'lib/coverage.glsl': coverage, 'lib/hair_light.glsl': hairLight, 'lib/hash.glsl': hash, 'lib/hermite.glsl': hermite,
+  'gl/strand_point.glsl': strandPoint, 'lib/coverage.glsl': coverage, 'lib/hair_light.glsl': hairLight, 'lib/hash.glsl': hash, 'lib/hermite.glsl': hermite,
   'lib/select.glsl': select, 'lib/skin.glsl': skin, 'lib/tone.glsl': tone, 'render/tile_frame.glsl': tileFrame,
   'render/tile_light.glsl': tileLight, 'shared/bindings.h': bindings, 'shared/limits.h': limits, 'shared/tiles.h': tiles,
 };

@@ -1,5 +1,6 @@
 // The camera about the head, as client/window/orbit_camera.h, and what moves it: mouse, touch, keyboard.
 import type { Camera, Vec3 } from '../messages';
+import type { CameraMessage } from '../wire';
 
 const RAD_PER_HEIGHT = 3.1416;
 const MOST_PITCH = 1.5;
@@ -12,6 +13,21 @@ const length = (v: Vec3): number => Math.hypot(...v);
 const scaled = (v: Vec3, by: number): Vec3 => [v[0] * by, v[1] * by, v[2] * by];
 const cross = (a: Vec3, b: Vec3): Vec3 => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const clamp = (x: number, low: number, high: number): number => Math.min(Math.max(x, low), high);
+
+const toScene = (v: { x: number; y: number; z: number } | undefined, otherwise: Vec3): Vec3 => (v ? [v.x, v.y, v.z] : otherwise);
+/** As a server tells it; a usual one where it tells none. */
+export function cameraOf(message: CameraMessage | undefined): Camera {
+  const offset = toScene(message?.offset_m, [0.22, 0.07, 0.62]);
+  return {
+    offset: length(offset) > LEAST_M ? offset : [0.22, 0.07, 0.62],
+    target: toScene(message?.target_m, [0, -0.055, 0]), fov: message?.fov_y_rad || 0.61,
+  };
+}
+
+/** Farther away where the window is higher than wide: a head is as wide as the scene's author saw it. `shape`: width by height. */
+export function fittedTo(camera: Camera, shape: number): Camera {
+  return { ...camera, offset: scaled(camera.offset, clamp(0.85 / shape, 1, 2)) };
+}
 
 /** `x`, `y`: dragged, in heights of the window. */
 export function orbit(camera: Camera, x: number, y: number): Camera {
