@@ -24,6 +24,7 @@ namespace {
 
 using std::chrono::milliseconds;
 constexpr int64_t kCameraSendNs = 33 * kMsInNs;
+constexpr int64_t kWindowSendNs = 200 * kMsInNs;  // while its edge is dragged
 constexpr int64_t kReportNs = 1000 * kMsInNs;
 constexpr int64_t kGrownReportNs = 100 * kMsInNs;  // when the hair is larger by so much:
 constexpr double kGrownHair = 1.1;
@@ -67,6 +68,7 @@ class WindowedView {
       act(actions);
       trace_->want_states(!options_.trace.empty() || window_->is_unfolded());
       tell_drawer();
+      tell_window();
       report();
       if (is_picture_due(actions)) present(woke_ns);
       if (options_.seconds && static_cast<double>(now_ns() - begin_ns) * 1e-9 >= *options_.seconds) break;
@@ -187,6 +189,10 @@ class WindowedView {
   void begin_session(bool is_first) {
     if (is_first) orbit_ = OrbitCamera(state_->look.camera);
     is_camera_sent_ = false;
+    const Welcome& welcome = state_->welcome;
+    if (!config_.hello.codec_wish.empty() && config_.hello.codec_wish != welcome.codec)
+      show_message(fmt::format("not by the codec {}: {}", config_.hello.codec_wish, welcome.codec_reason));
+    told_window_ = {config_.hello.frame_width, config_.hello.frame_height, false};
     camera_moves_ = 0;
   }
 
@@ -287,6 +293,23 @@ class WindowedView {
     drawer_.set_view(is_wanted
                          ? std::optional(DrawView{orbit_.camera(), window_->framebuffer_size(), debug_view_})
                          : std::nullopt);
+  }
+
+  /// The server's pictures are as large as the window, and none come while it is minimised.
+  void tell_window() {
+    const int64_t time_ns = now_ns();
+    if (!state_->is_connected || time_ns - window_told_ns_ < kWindowSendNs) return;
+    WindowChange window = told_window_;
+    window.is_hidden = !is_visible();
+    if (is_visible()) {
+      const RenderSize size = window_->framebuffer_size();
+      window.frame_width = std::clamp(size.width, kMinPictureSide, kMaxPictureWidth);
+      window.frame_height = std::clamp(size.height, kMinPictureSide, kMaxPictureHeight);
+    }
+    if (window == told_window_ || !send(window)) return;
+    for (const OtherHead& other : others_) (void)other.viewer->send(window);
+    told_window_ = window;
+    window_told_ns_ = time_ns;
   }
 
   /// Tells the server about once a second what this machine makes of the stream.
@@ -477,6 +500,8 @@ class WindowedView {
   StageTimer answer_timer_;
   bool is_camera_sent_ = false;
   int64_t camera_sent_ns_ = 0;
+  WindowChange told_window_;  // that the server knows
+  int64_t window_told_ns_ = 0;
   uint64_t camera_moves_ = 0;  // by others, that were followed
   int64_t reported_ns_ = 0;
   double reported_hair_px_ = 0.0;

@@ -203,6 +203,14 @@ void visit(Visitor& v, RecordCommand& m) {
   v.text("name", m.name, kMaxNameChars);
 }
 template <>
+inline constexpr const char* kKind<WindowChange> = "window";
+template <class Visitor>
+void visit(Visitor& v, WindowChange& m) {
+  v.side("frame_width", m.frame_width, scene_fields::kFrameWidth);
+  v.side("frame_height", m.frame_height, scene_fields::kFrameHeight);
+  v.value("is_hidden", m.is_hidden);
+}
+template <>
 inline constexpr const char* kKind<Welcome> = "welcome";
 template <class Visitor>
 void visit(Visitor& v, Welcome& m) {

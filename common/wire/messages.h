@@ -201,10 +201,18 @@ struct RecordCommand {
   std::string name = {};  // of the file; empty = the server's choice
   bool operator==(const RecordCommand&) const = default;
 };
+/// How large the window is that shows the stream, and whether anybody can see it.
+struct WindowChange {
+  uint32_t frame_width = 0;  // of pictures from now on; 0 = as before
+  uint32_t frame_height = 0;
+  bool is_hidden = false;  // nobody sees it: nothing is drawn or sent for it
+  bool operator==(const WindowChange&) const = default;
+};
 using ClientMessage =
     std::variant<Hello, MotionSamples, WindSamples, CameraChange, KeyframeRequest, FrameAck, Ping,
                  ControlCommand, SetParameter, AdminCommand, ViewerReport, ModeRequest, SceneRequest,
-                 LiveCommand, ParameterRequest, CameraCommand, StateTimesRequest, RecordCommand>;
+                 LiveCommand, ParameterRequest, CameraCommand, StateTimesRequest, RecordCommand,
+                 WindowChange>;
 /// Answer to a Hello.
 struct Welcome {
   std::string session_id = {};  // 16 hex digits, new for every server start

@@ -165,6 +165,7 @@ void SessionDesk::on_message(SessionId session, const ClientMessage& message, in
                         [&](const ParameterRequest& request) { answer(session, request); },
                         [&](const StateTimesRequest& request) { answer(session, request); },
                         [&](const CameraChange& camera) { move_camera(session, camera); },
+                        [&](const WindowChange& window) { follow_window(session, window); },
                         [&](const ViewerReport& report) { viewers_.set_report(session, report); },
                         [&](const ModeRequest& request) { viewers_.request_mode(session, request.mode); },
                         [&](const AdminCommand&) { is_shut_down_wanted_ = true; },  // all that comes here
@@ -368,6 +369,19 @@ void SessionDesk::move_camera(SessionId session, const CameraChange& camera) {
     net_->send(session, Notice{true, status.error().to_string()});
   else
     parts_.hub.tell_camera(session, camera.camera);
+}
+
+/// Whose pictures have no room any more when its window is seen again may come back like anybody else.
+void SessionDesk::follow_window(SessionId session, const WindowChange& window) {
+  const RenderSize before = viewers_.picture_size(session);
+  const bool was_hidden = viewers_.is_hidden(session);
+  Result<std::string> why = viewers_.set_window(session, window);
+  if (!why && was_hidden && !window.is_hidden) why = viewers_.set_window(session, {});
+  if (!why && was_hidden) return net_->close(session, CloseCode::TryLater, why.error().to_string());
+  if (!why) return net_->send(session, Notice{true, why.error().to_string()});
+  const RenderSize now = viewers_.picture_size(session);
+  if (now.width == before.width && now.height == before.height) return;
+  if (const auto pictures = viewers_.pictures(session)) tell_quality(session, *pictures, *why);
 }
 
 /// Looks whether this session should change between strands and frames.

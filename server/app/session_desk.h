@@ -95,6 +95,7 @@ class SessionDesk : public NetHandler {
   void answer(SessionId session, const ParameterRequest& request);
   void answer(SessionId session, const StateTimesRequest& request);
   void move_camera(SessionId session, const CameraChange& camera);
+  void follow_window(SessionId session, const WindowChange& window);
   Welcome make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const;
   bool may_control(SessionId session, std::string_view what);
   Status may_change(const std::string& assignment) const;

@@ -25,6 +25,19 @@ PictureCodec best_codec(PictureCodecs decodable, const RenderSize& size) {
   return PictureCodec::Jpeg;
 }
 
+/// Empty where the size is as wished.
+std::string fitted_text(const RenderSize& wished, const RenderSize& fitted) {
+  if (fitted.width == wished.width) return {};
+  return fmt::format("; without a GPU this server draws {} x {} instead of {} x {} pixels", fitted.width,
+                     fitted.height, wished.width, wished.height);
+}
+
+/// That a step of the ladder has.
+RenderSize size_at(const RenderSize& size, const PictureStep& step) {
+  return {std::max(size.width / step.size_divisor, kMinPictureSide),
+          std::max(size.height / step.size_divisor, kMinPictureSide)};
+}
+
 std::vector<double> costs_of(const std::vector<PictureStep>& ladder) {
   std::vector<double> costs;
   for (const PictureStep& step : ladder) costs.push_back(step.relative_cost);
@@ -49,6 +62,7 @@ PictureView make_scene_view(const SceneDesc& scene, const RenderSize& size, Pict
 /// What the viewer gets, and during a change what it is about to get as well.
 Demand Viewers::demand_of(const Viewer& viewer, const Subscription& wanted, const PictureView& view) {
   Demand demand;
+  if (wanted.is_hidden()) return demand;
   demand.hair_px = viewer.report.hair_px;
   if (wanted.gets(StreamMode::Strands)) demand.strand_stream = stream_id_of(wanted.strands);
   if (wanted.gets(StreamMode::Frames)) demand.picture = view;
@@ -95,9 +109,7 @@ Result<Viewers::Place> Viewers::add(SessionId session, ReaderId reader, Subscrip
   } else if (hello.mode == StreamMode::Frames) {
     wanted.start_with(StreamMode::Frames);
     place.reason = "frames were asked for";
-    if (place.size.width != wished.width)
-      place.reason += fmt::format("; without a GPU this server draws {} x {} instead of {} x {} pixels",
-                                  place.size.width, place.size.height, wished.width, wished.height);
+    place.reason += fitted_text(wished, place.size);
   } else {
     place.reason = hello.mode == StreamMode::Strands
                        ? "strands were asked for"
@@ -137,6 +149,30 @@ Status Viewers::set_camera(SessionId session, const CameraDesc& camera) {
   PictureView view = found->second.view;
   view.camera = camera;
   return change(found->second, *found->second.subscription, view);
+}
+
+Result<std::string> Viewers::set_window(SessionId session, const WindowChange& window) {
+  const auto found = viewers_.find(session);
+  if (found == viewers_.end() || found->second.subscription->is_empty())
+    return make_error(ErrorCode::NotFound, "only viewers have a window");
+  Viewer& viewer = found->second;
+  RenderSize wished = viewer.size;
+  if (window.frame_width > 0) wished.width = window.frame_width;
+  if (window.frame_height > 0) wished.height = window.frame_height;
+  RenderSize size = fit_picture(wished, desk_.picture_budget());
+  if (viewer.view.codec == PictureCodec::H264)
+    size = {size.width - size.width % kH264SizeStep, size.height - size.height % kH264SizeStep};
+  PictureView view = viewer.view;
+  Subscription wanted = *viewer.subscription;
+  view.size = size_at(size, viewer.ladder[wanted.pictures.step]);
+  // What nobody sees cannot become ready.
+  const bool gives_up_change = window.is_hidden && wanted.next();
+  if (gives_up_change) wanted.give_up_change();
+  wanted.set_hidden(window.is_hidden);
+  RETURN_IF_ERROR(change(viewer, std::move(wanted), view));
+  viewer.is_answer_due |= gives_up_change;
+  viewer.size = size;
+  return "the window has another size" + fitted_text(wished, size);
 }
 
 Result<Viewers::Aimed> Viewers::aimed_at(SessionId by, SessionId whose) const {
@@ -256,8 +292,7 @@ Result<Viewers::Pictures> Viewers::set_picture_step(SessionId session, size_t st
   PictureView view = viewer.view;
   view.quality = row.quality;
   view.rate_divisor = row.rate_divisor;
-  view.size.width = std::max(viewer.size.width / row.size_divisor, kMinPictureSide);
-  view.size.height = std::max(viewer.size.height / row.size_divisor, kMinPictureSide);
+  view.size = size_at(viewer.size, row);
   Subscription wanted = *viewer.subscription;
   wanted.pictures.step = step;
   RETURN_IF_ERROR(change(viewer, std::move(wanted), view));
@@ -273,6 +308,11 @@ std::optional<Viewers::Pictures> Viewers::pictures(SessionId session) const {
 void Viewers::note_strand_class(SessionId session) {
   const auto found = viewers_.find(session);
   if (found != viewers_.end()) change_surely(found->second, *found->second.subscription);
+}
+
+bool Viewers::is_hidden(SessionId session) const {
+  const auto found = viewers_.find(session);
+  return found != viewers_.end() && found->second.subscription->is_hidden();
 }
 
 RenderSize Viewers::picture_size(SessionId session) const {

@@ -58,6 +58,10 @@ class Viewers {
   /// Sets a viewer's camera; for a viewer of strands it is stored for later. NotFound for a session that
   /// views nothing.
   Status set_camera(SessionId session, const CameraDesc& camera);
+  /// Sets the size of a viewer's pictures and whether its window is hidden, and returns the reason of the
+  /// size for a person. NotFound for a session that views nothing. Unavailable as in add(): the viewer keeps
+  /// its size, and stays hidden if it was.
+  Result<std::string> set_window(SessionId session, const WindowChange& window);
   /// Sessions that a command about cameras concerns.
   struct Aimed {
     std::vector<SessionId> movable;
@@ -87,6 +91,8 @@ class Viewers {
 
   /// Notes that the session's subscription has another strand class; it joins with class 0.
   void note_strand_class(SessionId session);
+  /// Returns whether nobody sees a session's window.
+  bool is_hidden(SessionId session) const;
   /// Returns the size of a session's pictures.
   RenderSize picture_size(SessionId session) const;
 

@@ -178,9 +178,12 @@ FrameWorker::Job FrameWorker::wait_for_job() {
     const bool has_news = is_stopping_ || can_draw() != is_active_ || has_new_views_ || !pending_.empty() ||
                           !wanted_wholes_.empty() || new_look_ || is_redraw_wanted_;
     const auto due = is_active_ ? next_due() : std::nullopt;
-    const int64_t wait_ns = due ? due->wait.due_ns - now_ns() : 1;
+    std::optional<int64_t> due_ns;
+    if (due) due_ns = due->wait.due_ns;
+    if (!is_active_ && painter_ != nullptr) due_ns = resting_since_ns_ + config_.painter_rest_ns;
+    const int64_t wait_ns = due_ns ? *due_ns - now_ns() : 1;
     if (has_news || wait_ns <= 0) break;
-    if (due)
+    if (due_ns)
       changed_.wait_for(lock, std::chrono::nanoseconds(wait_ns));
     else
       changed_.wait(lock);
@@ -204,8 +207,8 @@ void FrameWorker::begin() {
 }
 
 void FrameWorker::rest() {
-  is_active_ = false;
-  painter_.reset();
+  if (std::exchange(is_active_, false)) resting_since_ns_ = now_ns();
+  if (failure() || now_ns() - resting_since_ns_ >= config_.painter_rest_ns) painter_.reset();
   snapshot_.reset();
   drawn_.clear();
   const std::lock_guard lock(mutex_);

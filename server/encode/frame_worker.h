@@ -48,9 +48,14 @@ struct FrameCounters {
 /// Number of periods without change after which a picture is sent once more at the finest quality.
 inline constexpr uint32_t kStillPeriods = 5;
 
+/// Time for which a server keeps the painter of pictures that nobody watches, so that a viewer who looks away
+/// for a while sees the next one at once.
+inline constexpr int64_t kPainterRestNs = 300'000'000'000;
+
 struct FrameWorkerConfig {
   double rate_hz = 15.0;                   // at most so many frames of each view in a second
   uint32_t still_periods = kStillPeriods;  // 0 = no stills
+  int64_t painter_rest_ns = 0;             // without views the painter is destroyed after that
 };
 
 class FrameWorker {
@@ -85,8 +90,8 @@ class FrameWorker {
   /// Offers every strand frame, in the order of the chain. Returns at once; frames are dropped while there
   /// are no views.
   void offer(EncodedFramePtr strand_frame);
-  /// Sets what is drawn from now on, by picture class. Without views the painter is destroyed, and strand
-  /// frames are not needed.
+  /// Sets what is drawn from now on, by picture class. Without views the painter rests, and strand frames are
+  /// not needed.
   void set_views(std::map<uint32_t, PictureView> views);
   /// Sets the look from now on and redraws current pictures. Before the first call it is that of the painter.
   void set_look(const LookDesc& look);
@@ -194,6 +199,7 @@ class FrameWorker {
 
   // Of the worker's thread.
   bool is_active_ = false;
+  int64_t resting_since_ns_ = 0;  // while it is not
   std::unique_ptr<PicturePainter> painter_;
   std::optional<LookDesc> look_;         // of the pictures; nothing = as painters are made
   std::optional<LookDesc> wanted_look_;  // not yet tried

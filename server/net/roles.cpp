@@ -51,6 +51,7 @@ constexpr Kind kKinds[] = {
     {"CameraCommand", Sender::Steers},
     {"StateTimesRequest", Sender::Watches},
     {"RecordCommand", Sender::Steers},
+    {"WindowChange", Sender::Watches},
 };
 // clang-format on
 // schema end

@@ -118,6 +118,8 @@ void Session::on_read(const beast::error_code& error) {
 void Session::send(ServerMessage message) {
   if (state_ != State::Joined) return;
   if (auto* status = std::get_if<ServerStatus>(&message)) {
+    is_status_left_out_ = subscription_.is_hidden() && !is_status_left_out_;
+    if (is_status_left_out_) return;
     status->dropped_frames = queue_.dropped_frames();
     if (subscription_.mode() != StreamMode::Frames) status->picture_motions.clear();
     status->queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kMsInNs;

@@ -63,7 +63,7 @@ void Session::ask_for_anchor(int64_t time_ns) {
 }
 
 void Session::deliver_chain(const std::vector<EncodedFramePtr>& chain) {
-  if (state_ != State::Joined || chain.empty() ||
+  if (state_ != State::Joined || chain.empty() || subscription_.is_hidden() ||
       chain.front()->header.stream_id != stream_id_of(subscription_.strands))
     return;
   guarded([&] {
@@ -74,7 +74,9 @@ void Session::deliver_chain(const std::vector<EncodedFramePtr>& chain) {
 }
 
 void Session::deliver_strands(const EncodedFramePtr& frame) {
-  if (state_ != State::Joined || frame->header.stream_id != stream_id_of(subscription_.strands)) return;
+  if (state_ != State::Joined || subscription_.is_hidden() ||
+      frame->header.stream_id != stream_id_of(subscription_.strands))
+    return;
   guarded([&] {
     const int64_t time_ns = now_ns();
     const SendQueue::Offer offer = queue_.offer_strands(frame);
@@ -119,7 +121,8 @@ void Session::ask_for_keyframe(int64_t time_ns) {
   const bool is_changing = subscription_.changes_to(StreamMode::Frames) && queue_.awaits_picture();
   const bool needs_picture =
       is_changing || (queue_.needs_picture() && !subscription_.changes_to(StreamMode::Strands));
-  if (state_ != State::Joined || !(needs_picture || queue_.needs_keyframe())) return;
+  if (state_ != State::Joined || subscription_.is_hidden()) return;
+  if (!(needs_picture || queue_.needs_keyframe())) return;
   if (!is_changing && !flow_.may_start(time_ns)) return;
   const int64_t interval_ns = context_.config.limits.keyframe_interval_ms * kMsInNs;
   if (keyframe_asked_ns_ != 0 && time_ns - keyframe_asked_ns_ < interval_ns) return;
@@ -169,7 +172,7 @@ void Session::adapt_pictures(int64_t time_ns) {
 
 /// Moves to another strand class when the link says so. A relay has asked for the one that it needs.
 void Session::adapt(int64_t time_ns) {
-  if (is_relay()) return;
+  if (is_relay() || subscription_.is_hidden()) return;
   if (subscription_.mode() == StreamMode::Frames) return adapt_pictures(time_ns);
   if (state_ != State::Joined || subscription_.mode() != StreamMode::Strands || !flow_.expects_acks()) return;
   const std::vector<double> costs = head().strands.bytes_per_s(subscription_.strands.codec);
@@ -235,7 +238,7 @@ void Session::follow_strand_classes(const std::string& reason) {
 
 void Session::report_link(int64_t time_ns) {
   const bool is_due = time_ns - link_reported_ns_ >= context_.config.limits.link_interval_ms * kMsInNs;
-  if (subscription_.is_empty() || !(is_due || is_mode_request_waiting_)) return;
+  if (subscription_.is_empty() || subscription_.is_hidden() || !(is_due || is_mode_request_waiting_)) return;
   link_reported_ns_ = time_ns;
   LinkState link;
   link.mode = subscription_.mode();

@@ -122,6 +122,7 @@ void Session::join(const Hello& hello) {
 
 void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
   std::visit(Overloaded{[&](const CameraChange& camera) { move_camera(camera); },
+                        [&](const WindowChange& window) { follow_window(window, arrival_ns); },
                         [&](const KeyframeRequest&) {
                           if (is_relay())
                             ask_for_anchor(arrival_ns);
@@ -146,6 +147,16 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
 void Session::move_camera(const CameraChange& camera) {
   const PictureClass before = subscription_.pictures.picture_class;
   head().handler.on_message(id_, camera, now_ns());
+  follow_picture_class(before);
+}
+
+/// What nobody sees stops at once, and begins again like what a client has lost.
+void Session::follow_window(const WindowChange& window, int64_t time_ns) {
+  const PictureClass before = subscription_.pictures.picture_class;
+  const bool was_hidden = subscription_.is_hidden();
+  head().handler.on_message(id_, window, time_ns);
+  if (subscription_.is_hidden()) give_up_mode_change();
+  if (subscription_.is_hidden() != was_hidden) return start_again(time_ns);
   follow_picture_class(before);
 }
 

@@ -21,15 +21,22 @@ void Session::follow_picture_class(PictureClass before) {
   ask_for_keyframe(now_ns());
 }
 
+/// What was begun for the next mode stops.
+void Session::give_up_mode_change() {
+  if (std::exchange(untold_change_, std::nullopt)) stop_other_mode();
+}
+
+void Session::stop_other_mode() {
+  if (subscription_.mode() == StreamMode::Strands)
+    queue_.stop_pictures();
+  else if (!queue_.stop_strands())
+    has_asset_ = false;
+}
+
 void Session::answer_mode(const ModeAnswer& answer) {
   if (state_ != State::Joined || subscription_.is_empty()) return;
   if (!subscription_.next()) {
-    if (std::exchange(untold_change_, std::nullopt)) {
-      if (subscription_.mode() == StreamMode::Strands)
-        queue_.stop_pictures();
-      else if (!queue_.stop_strands())
-        has_asset_ = false;
-    }
+    give_up_mode_change();
     return queue_control(answer.change);
   }
   untold_change_ = answer.change;
@@ -50,10 +57,7 @@ void Session::finish_mode_switch() {
   const int64_t time_ns = now_ns();
   subscription_.finish_change();
   flow_.start_over(time_ns);
-  if (subscription_.mode() == StreamMode::Strands)
-    queue_.stop_pictures();
-  else if (!queue_.stop_strands())
-    has_asset_ = false;
+  stop_other_mode();
   context_.count(&NetCounters::mode_changes);
   context_.note(fmt::format("session {} gets {}: {}", id_, to_string(subscription_.mode()), change.reason));
   head().handler.on_change(id_, SubscriptionChange::Mode);

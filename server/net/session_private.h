@@ -74,6 +74,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void dispatch(const ClientMessage& message, int64_t arrival_ns);
   void obey(const AdminCommand& command, int64_t time_ns);
   void move_camera(const CameraChange& camera);
+  void follow_window(const WindowChange& window, int64_t time_ns);
   void reject(CloseCode code, const std::string& reason);
   void queue_control(ServerMessage message);
   void pump();
@@ -90,6 +91,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void follow_picture_class(PictureClass before);
   void answer_mode(const ModeAnswer& answer);
   void finish_mode_switch();
+  void give_up_mode_change();
+  void stop_other_mode();
   void report_link(int64_t time_ns);
   void adapt_pictures(int64_t time_ns);
   std::string describe_link(int64_t time_ns) const;
@@ -114,7 +117,8 @@ class Session : public std::enable_shared_from_this<Session> {
   std::string codec_;                        // name of that of its strands
   std::optional<ModeChange> untold_change_;  // goes right before the first frame of the next mode
   bool is_mode_request_waiting_ = false;
-  bool has_asset_ = false;  // sent, or next in line
+  bool is_status_left_out_ = false;  // the newest one, of a hidden window
+  bool has_asset_ = false;           // sent, or next in line
   bool has_joined_ = false;
 
   beast::flat_buffer read_buffer_{kMaxSessionReadBytes};

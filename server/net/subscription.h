@@ -34,10 +34,13 @@ class Subscription {
   /// is ready.
   std::optional<StreamMode> next() const { return next_; }
   int64_t changing_since_ns() const { return changing_since_ns_; }
+  /// Returns whether nobody sees the viewer's window: it then gets nothing, whatever its mode is.
+  bool is_hidden() const { return is_hidden_; }
+  void set_hidden(bool is_hidden) { is_hidden_ = is_hidden; }
   bool gets(StreamMode kind) const { return !is_empty_ && (mode_ == kind || next_ == kind); }
   bool changes_to(StreamMode kind) const { return next_ == kind; }
   bool watches(PictureClass picture_class) const {
-    return gets(StreamMode::Frames) && picture_class == pictures.picture_class;
+    return !is_hidden_ && gets(StreamMode::Frames) && picture_class == pictures.picture_class;
   }
 
   /// Begins the subscription before all else; a viewer that gets nothing here never gets anything.
@@ -57,6 +60,7 @@ class Subscription {
 
  private:
   bool is_empty_ = false;
+  bool is_hidden_ = false;
   StreamMode mode_ = StreamMode::Strands;
   std::optional<StreamMode> next_;
   int64_t changing_since_ns_ = 0;

@@ -129,11 +129,21 @@ void RelayDesk::on_message(SessionId session, const ClientMessage& message, int6
   std::visit(Overloaded{[&](const CameraChange&) {  // other viewers draw by themselves
                           if (leaf.subscription->gets(StreamMode::Frames)) say(session, message);
                         },
+                        [&](const WindowChange& window) { follow_window(session, leaf, window); },
                         [&](const ViewerReport& report) { leaf.report = report; },
                         [&](const ModeRequest&) { leaf.is_answer_due = true; },
                         [&](const AdminCommand&) { is_shut_down_wanted_ = true; },  // all that comes here
                         [&](const auto&) { say(session, message); }},
              message);
+}
+
+/// What no window shows is not fetched either; pictures stop and change at the server above.
+void RelayDesk::follow_window(SessionId session, Leaf& leaf, const WindowChange& window) {
+  if (window.frame_width > 0) leaf.hello.frame_width = window.frame_width;
+  if (window.frame_height > 0) leaf.hello.frame_height = window.frame_height;
+  leaf.subscription->set_hidden(window.is_hidden);
+  if (leaf.subscription->gets(StreamMode::Frames)) say(session, window);
+  follow_demand();
 }
 
 void RelayDesk::on_need(SessionId session, const StreamNeed& need) {
@@ -171,7 +181,7 @@ void RelayDesk::follow_demand() {
   std::set<uint16_t> streams;
   uint32_t viewers = 0;
   for (const auto& [session, leaf] : leaves_) {
-    if (leaf.subscription->gets(StreamMode::Strands))
+    if (leaf.subscription->gets(StreamMode::Strands) && !leaf.subscription->is_hidden())
       streams.insert(stream_id_of(leaf.subscription->strands));
     viewers += leaf.subscription->is_empty() ? 0 : 1;
   }

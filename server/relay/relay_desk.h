@@ -56,7 +56,7 @@ class RelayDesk : public NetHandler {
   struct Leaf {
     Hello hello;
     std::string address;  // what counts as one
-    const Subscription* subscription = nullptr;
+    Subscription* subscription = nullptr;
     ViewerReport report;
     bool is_answer_due = false;  // to a ModeRequest
   };
@@ -64,6 +64,7 @@ class RelayDesk : public NetHandler {
   Status check(const Hello& hello, const Relayed& relayed) const;
   SimulatedModel model(const Relayed& relayed) const;
   void say(SessionId session, const ClientMessage& message);
+  void follow_window(SessionId session, Leaf& leaf, const WindowChange& window);
   void follow_demand();
 
   const RelayDeskParts parts_;

@@ -88,8 +88,9 @@ Result<std::unique_ptr<FrameWorker>> StreamHub::make_frames() {
   hooks.on_failure = [this](const Error& error) {
     give([](const Entry&) { return true; }, [&](StreamReader& reader) { reader.on_pictures_failed(error); });
   };
-  return std::make_unique<FrameWorker>(std::move(decoder), make_painter_,
-                                       FrameWorkerConfig{stream_.frame_rate_hz}, std::move(hooks));
+  return std::make_unique<FrameWorker>(
+      std::move(decoder), make_painter_,
+      FrameWorkerConfig{stream_.frame_rate_hz, kStillPeriods, kPainterRestNs}, std::move(hooks));
 }
 
 /// Gives something to every reader with a demand for it, once.

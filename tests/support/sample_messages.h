@@ -39,7 +39,8 @@ inline std::vector<ClientMessage> sample_client_messages() {
           ParameterRequest{"look.shading", 128, true},
           CameraCommand{1ull << 40, camera.camera},
           StateTimesRequest{true},
-          RecordCommand{true, "take 5"}};
+          RecordCommand{true, "take 5"},
+          WindowChange{1280, 720, true}};
 }
 
 inline std::vector<ServerMessage> sample_server_messages() {

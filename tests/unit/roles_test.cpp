@@ -32,7 +32,7 @@ TEST(Roles, EveryMessageAndRole) {
       "no no no no",    "no no yes yes",   "no no yes yes", "yes yes no yes", "yes yes no yes",
       "yes yes no yes", "yes yes yes yes", "no yes no yes", "no yes no yes",  "no no no yes",
       "yes yes no yes", "yes yes no yes",  "no yes no yes", "no yes no yes",  "yes yes no yes",
-      "no yes no yes",  "yes yes no yes",  "no yes no yes"};
+      "no yes no yes",  "yes yes no yes",  "no yes no yes", "yes yes no yes"};
   const auto messages = sample_client_messages();
   ASSERT_EQ(messages.size(), expected.size());
   for (size_t i = 0; i < messages.size(); ++i) {

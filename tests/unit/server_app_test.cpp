@@ -148,6 +148,59 @@ TEST(Viewers, AStepOfTheLadderConcernsItsViewerOnly) {
   EXPECT_FALSE(viewers.set_picture_step(3, 0).ok());
 }
 
+TEST(Viewers, AWindowChangesTheSizeAtAnyStepOfTheLadder) {
+  Viewing viewing;
+  Viewers& viewers = viewing.viewers;
+  Hello message = hello(Role::Viewer, StreamMode::Frames, 640, 360);
+  message.picture_codecs = kAllPictureCodecs;
+  ASSERT_TRUE(viewing.add(1, message).ok());
+  const PictureClass own = viewing.subscriptions[1].pictures.picture_class;
+  const size_t last = viewing.subscriptions[1].pictures.costs.size() - 1;
+  ASSERT_TRUE(viewers.set_window(1, {406, 720, false}).ok());
+  const RenderSize size = viewers.pictures(1)->view.size;
+  const bool is_h264 = viewers.pictures(1)->view.codec == PictureCodec::H264;
+  EXPECT_EQ(size.width, is_h264 ? 404u : 406u) << "H.264 halves even sides";
+  EXPECT_EQ(size.height, 720u);
+  EXPECT_EQ(viewing.subscriptions[1].pictures.picture_class, own) << "alone in its class";
+  ASSERT_TRUE(viewers.set_picture_step(1, last).ok());
+  EXPECT_EQ(viewers.pictures(1)->view.size.height, 360u);
+  ASSERT_TRUE(viewers.set_window(1, {0, 400, false}).ok());
+  EXPECT_EQ(viewers.pictures(1)->view.size.width, size.width / 2) << "a side that is not said stays";
+  EXPECT_EQ(viewers.pictures(1)->view.size.height, 200u);
+  ASSERT_TRUE(viewing.add(2, hello(Role::Source, StreamMode::Frames)).ok());
+  EXPECT_FALSE(viewers.set_window(2, {64, 64, false}).ok()) << "a source has none";
+}
+
+TEST(Viewers, AHiddenWindowWantsNothingAndGivesUpItsChange) {
+  Viewing viewing;
+  Viewers& viewers = viewing.viewers;
+  ASSERT_TRUE(viewing.add(1, hello(Role::Viewer, StreamMode::Strands)).ok());
+  ASSERT_TRUE(viewing.add(2, hello(Role::Viewer, StreamMode::Frames, 320, 200)).ok());
+  for (const SessionId session : {1, 2}) ASSERT_TRUE(viewers.set_window(session, {0, 0, true}).ok());
+  EXPECT_EQ(viewing.facts().strand_viewers + viewing.facts().frame_viewers, 0u);
+  EXPECT_TRUE(viewing.book.picture_views().empty()) << "its place is for others";
+  EXPECT_EQ(viewers.viewer_count(), 2u) << "it is there all the same";
+  CameraDesc camera;
+  camera.offset_m = {0.0f, 0.0f, 2.0f};
+  ASSERT_TRUE(viewers.set_camera(2, camera).ok());
+  for (const SessionId session : {1, 2}) ASSERT_TRUE(viewers.set_window(session, {}).ok());
+  EXPECT_EQ(viewing.facts().strand_viewers, 1u);
+  EXPECT_EQ(viewing.book.picture_views().begin()->second.camera, camera) << "as it was moved meanwhile";
+
+  viewing.subscriptions[1].begin_change(StreamMode::Frames, 0);
+  ASSERT_TRUE(viewers.set_window(1, {0, 0, true}).ok());
+  EXPECT_FALSE(viewing.subscriptions[1].next());
+  // Others have taken the places meanwhile: it stays hidden.
+  Viewing full;
+  ASSERT_TRUE(full.add(1, hello(Role::Viewer, StreamMode::Frames, 100, 100)).ok());
+  ASSERT_TRUE(full.viewers.set_window(1, {0, 0, true}).ok());
+  for (uint32_t i = 0; i + 1 < kMaxPictureViews; ++i)
+    ASSERT_TRUE(
+        full.add(10 + i, hello(Role::Viewer, StreamMode::Frames, 64 + i, 64), std::to_string(i)).ok());
+  EXPECT_FALSE(full.viewers.set_window(1, {}).ok());
+  EXPECT_TRUE(full.viewers.is_hidden(1));
+}
+
 /// Takes every place for pictures of their own that there is, from as many addresses as needed.
 void fill(Viewing& viewing) {
   for (uint32_t i = 0; i + 1 < kMaxPictureViews; ++i)

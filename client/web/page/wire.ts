@@ -49,6 +49,9 @@ export const ParameterRequest = { prefix: [1, 'string'], first: [2, 'uint32'], i
 export const CameraCommand = { session: [1, 'uint64'], camera: [2, Camera] } as const;
 export const StateTimesRequest = { is_wanted: [1, 'bool'] } as const;
 export const RecordCommand = { is_wanted: [1, 'bool'], name: [2, 'string'] } as const;
+export const WindowChange = {
+  frame_width: [1, 'uint32'], frame_height: [2, 'uint32'], is_hidden: [3, 'bool'],
+} as const;
 export const Color = { r: [1, 'double'], g: [2, 'double'], b: [3, 'double'] } as const;
 export const StrandStyle = {
   clump: [1, 'float'], locks: [2, 'uint32'], spread: [3, 'float'], wave_m: [4, 'float'], wave_count: [5, 'float'],
@@ -147,7 +150,7 @@ export const ClientMessage = {
   ping: [7, Ping], command: [8, ControlCommand], set_parameter: [9, SetParameter], admin: [12, AdminCommand],
   viewer_report: [10, ViewerReport], mode_request: [11, ModeRequest], scene_request: [13, SceneRequest],
   live_command: [18, LiveCommand], parameter_request: [16, ParameterRequest], camera_command: [24, CameraCommand],
-  state_times_request: [25, StateTimesRequest], record_command: [28, RecordCommand],
+  state_times_request: [25, StateTimesRequest], record_command: [28, RecordCommand], window: [29, WindowChange],
 } as const;
 export const ServerMessage = {
   welcome: [1, Welcome], pong: [2, Pong], status: [3, ServerStatus], goodbye: [4, Goodbye], notice: [5, Notice],
@@ -160,10 +163,10 @@ export const ServerMessage = {
 export const schemas: { readonly [name: string]: Schema } = {
   Hello, Vec3, Camera, CameraChange, KeyframeRequest, FrameAck, Ping, ControlCommand, SetParameter, AdminCommand,
   ViewerReport, ModeRequest, SceneRequest, LiveCommand, ParameterRequest, CameraCommand, StateTimesRequest,
-  RecordCommand, Color, StrandStyle, HairShading, RenderMethods, Look, Welcome, Pong, PictureMotion, LiveValue,
-  LiveInput, ServerStatus, Goodbye, Notice, StreamQuality, FrameQuality, SessionInfo, SessionList, ModeChange,
-  LookChange, SceneText, ParameterInfo, ParameterList, StateTime, StateTimes, StreamClass, StreamList, ClientMessage,
-  ServerMessage,
+  RecordCommand, WindowChange, Color, StrandStyle, HairShading, RenderMethods, Look, Welcome, Pong, PictureMotion,
+  LiveValue, LiveInput, ServerStatus, Goodbye, Notice, StreamQuality, FrameQuality, SessionInfo, SessionList,
+  ModeChange, LookChange, SceneText, ParameterInfo, ParameterList, StateTime, StateTimes, StreamClass, StreamList,
+  ClientMessage, ServerMessage,
 };
 export const Role = { viewer: 0, controller: 1, source: 2, admin: 3 } as const;
 export const Mode = { strands: 0, frames: 1, auto: 2 } as const;
