@@ -5,6 +5,7 @@
 
 #include "common/base/hash.h"
 #include "common/render/tiles/tile_frame.h"
+#include "common/simd/lanes.h"
 
 namespace strandcast {
 namespace {
@@ -125,10 +126,9 @@ float strand_depth_per_m(const LatticeFrame& frame, float width_m) {
 }
 
 uint64_t LightLattice::size_bytes() const {
-  uint64_t bytes =
-      key_.capacity() * sizeof(uint16_t) + others_.capacity() * sizeof(uint32_t) +
-      (halved_.capacity() + halved_solid_.capacity() + rim_depth_.capacity() + sky_depth_.capacity()) *
-          sizeof(float);
+  uint64_t bytes = key_.capacity() * sizeof(uint16_t) + others_.capacity() * sizeof(uint32_t) +
+                   (halved_.capacity() + halved_solid_.capacity() + rim_depth_.capacity()) * sizeof(float);
+  for (const auto& depth : sky_depth_) bytes += depth.capacity() * sizeof(float);
   for (const auto& sums : sums_) bytes += sums.capacity() * sizeof(int32_t);
   return bytes;
 }
@@ -138,22 +138,42 @@ void LightLattice::build(const LatticeFrame& frame, const StrandPoints& points, 
   static_cast<LatticeFrame&>(view_) = frame;
   sum_strands(points, strands, workers);
   sweep_key(workers);
-  workers.at(Priority::Drawing).for_ranges(2, 1, [&](size_t light, size_t) {
-    if (light == 0)
-      sweep(along_axes(lights.up, view_), halved_with(kSolidSkyDepth), sky_depth_);
+  const std::array<glm::vec3, kSkyWays> ways = sky_ways(lights.up);
+  const std::vector<float> to_sky = halved_with(kSolidSkyDepth);
+  workers.at(Priority::Drawing).for_ranges(kSkyWays + 1, 1, [&](size_t way, size_t) {
+    if (way < kSkyWays)
+      sweep(along_axes(ways[way], view_), to_sky, sky_depth_[way]);
     else if (lights.has_rim)
       sweep(along_axes(lights.to_rim, view_), halved_with(kSolidRimDepth), rim_depth_);
     else
       rim_depth_.assign(halved_.size(), 0.0f);
   });
+  store_others(workers);
+  view_.key = key_.data();
+  view_.others = others_.data();
+}
+
+// The sky's depth: of what its ways let through together.
+void LightLattice::store_others(WorkerPool& workers) {
+  using simd::Float, simd::kLanes;
+  constexpr size_t kCellsPerRange = 8192;
+  constexpr float kLeast = 1e-6f;
+  constexpr float kPerLog2 = -0.693147181f / kSkyReach;
+  // Sizes are multiples of 4, their product of 64.
+  static_assert(kSizeStep * kSizeStep * kSizeStep / 8 % kLanes == 0);
   others_.resize(halved_.size());
   const auto stored = [](float depth) {
     return static_cast<uint32_t>(std::clamp(depth * (1.0f / kLightDepthUnit), 0.0f, 65535.0f));
   };
-  for (size_t i = 0; i < others_.size(); ++i)
-    others_[i] = stored(rim_depth_[i]) | stored(sky_depth_[i]) << 16;
-  view_.key = key_.data();
-  view_.others = others_.data();
+  workers.at(Priority::Drawing).for_ranges(halved_.size(), kCellsPerRange, [&](size_t begin, size_t end) {
+    for (size_t first = begin; first < end; first += kLanes) {
+      Float open(0.0f);
+      for (const auto& depth : sky_depth_) open += exp(-kSkyReach * simd::load_lanes(depth.data() + first));
+      const Float sky = kPerLog2 * log2(max(open * (1.0f / kSkyWays), kLeast));
+      for (size_t lane = 0; lane < kLanes; ++lane)
+        others_[first + lane] = stored(rim_depth_[first + lane]) | stored(sky.v[lane]) << 16;
+    }
+  });
 }
 
 void LightLattice::sum_strands(const StrandPoints& points, const LightStrands& strands, WorkerPool& workers) {

@@ -4,6 +4,7 @@
 // lights. No GL.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
@@ -76,9 +77,11 @@ inline constexpr int kSolidBorderCells = 2;
 /// as the ramp.
 inline constexpr float kSolidDepth = 12.0f;
 /// Optical depth of the head per LatticeFrame::soft_m for rim light and sky, which sum it up. The sky's is
-/// small, because an obstacle above hides only a part of it.
+/// small, because each way stands for a part of the sky that is wide.
 inline constexpr float kSolidRimDepth = 2.0f;
-inline constexpr float kSolidSkyDepth = 0.06f;
+inline constexpr float kSolidSkyDepth = 0.2f;
+/// The sky's depth is that of the mean light of its ways, when each loses exp(-this * depth) of it.
+inline constexpr float kSkyReach = 0.16f;
 /// Returns the optical depth that one metre of a strand of this width adds to its cell.
 float strand_depth_per_m(const LatticeFrame& frame, float width_m);
 
@@ -104,6 +107,7 @@ class LightLattice {
  private:
   void sum_strands(const StrandPoints& points, const LightStrands& strands, WorkerPool& workers);
   void sweep_key(WorkerPool& workers);
+  void store_others(WorkerPool& workers);
   bool has_solid() const { return desc_.solid && !desc_.solid->is_empty(); }
   void find_solid(int y, int z, std::vector<float>& share) const;
   /// Sweeps across the lattice of half resolution; the head has this opacity per LatticeFrame::soft_m.
@@ -119,7 +123,7 @@ class LightLattice {
   std::vector<float> halved_;        // optical depth of strands across a halved cell
   std::vector<float> halved_solid_;  // likewise, how much of the way leads through the head, in whole cells
   std::vector<float> rim_depth_;
-  std::vector<float> sky_depth_;
+  std::array<std::vector<float>, kSkyWays> sky_depth_;  // along each way
   std::vector<uint32_t> others_;
 };
 

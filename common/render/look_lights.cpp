@@ -1,5 +1,6 @@
 #include "common/render/look_lights.h"
 
+#include <algorithm>
 #include <glm/gtc/quaternion.hpp>
 
 #include "common/scene/hair_color.h"
@@ -18,6 +19,23 @@ LightDirections light_directions(const LookDesc& look, const glm::dquat& world_f
   return {to_light_in_head(look.light_direction, world_from_head_rotation),
           to_light_in_head(look.rim_direction, world_from_head_rotation), up,
           look.rim_color != glm::vec3(0.0f)};
+}
+
+std::array<glm::vec3, kSkyWays> sky_ways(const glm::vec3& up) {
+  constexpr float kUpwards = 0.64278761f;  // cosine and sine of 50 degrees
+  constexpr float kAside = 0.76604444f;
+  // Of a fifth of a turn, and of two.
+  constexpr float kCos[] = {1.0f, 0.30901699f, -0.80901699f, -0.80901699f, 0.30901699f};
+  constexpr float kSin[] = {0.0f, 0.95105652f, 0.58778525f, -0.58778525f, -0.95105652f};
+  // Duff et al. 2017, Building an orthonormal basis, revisited; about y.
+  constexpr float kLeast = 1e-3f;
+  const float scale = 1.0f / std::max(1.0f + up.y, kLeast);
+  const glm::vec3 side(1.0f - up.x * up.x * scale, -up.x, -up.x * up.z * scale);
+  const glm::vec3 other = glm::cross(up, side);
+  std::array<glm::vec3, kSkyWays> ways{up};
+  for (int i = 1; i < kSkyWays; ++i)
+    ways[i] = glm::normalize(kUpwards * up + kAside * (kCos[i - 1] * side + kSin[i - 1] * other));
+  return ways;
 }
 
 ShadingNumbers shading_numbers(const LookDesc& look) {

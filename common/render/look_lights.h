@@ -2,6 +2,7 @@
 // thread.
 #pragma once
 
+#include <array>
 #include <glm/glm.hpp>
 
 #include "common/math/pose.h"
@@ -24,6 +25,12 @@ glm::vec3 to_light_in_head(const glm::vec3& direction, const glm::dquat& world_f
 /// Returns the directions to the lights; `up` is the world's up in head space.
 LightDirections light_directions(const LookDesc& look, const glm::dquat& world_from_head_rotation,
                                  const glm::vec3& up);
+
+/// Ways along which light of the sky is looked for.
+inline constexpr int kSkyWays = 6;
+/// Returns unit vectors to parts of the sky that count alike: straight up, and five around, 50 degrees from
+/// it. They change smoothly with `up`, except where it points straight down.
+std::array<glm::vec3, kSkyWays> sky_ways(const glm::vec3& up);
 
 /// The look as the parameters of shaders/lib/hair_light.glsl.
 struct ShadingNumbers {

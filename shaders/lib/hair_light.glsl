@@ -133,6 +133,7 @@ LAW vec3 hair_radiance(HairLook look, HairStrand hair, HairLights lights, LightD
   const float kSkyReach = 0.14;
   const float kSkyFloor = 0.15;
   const float kGroundLight = 0.35;
+  const float kSkySheen = 0.06;  // what the surfaces of strands send on of the sky, in its own colour
   vec3 color = hair_color(look, hair, along);
   float tilt = look.tilt + hair.tilt;
   vec3 scattered_color = color * sqrt(color) * look.scatter;
@@ -147,7 +148,7 @@ LAW vec3 hair_radiance(HairLook look, HairStrand hair, HairLights lights, LightD
   float facing = 0.5 + 0.5 * dot(across, lights.up);
   float open_sky = mix(kSkyFloor, 1.0, exp(-kSkyReach * depth.sky));
   float sky = lights.ambient * mix(kGroundLight, 1.0, facing) * open_sky;
-  return lights.key_color * key + lights.rim_color * rim + color * sky;
+  return lights.key_color * key + lights.rim_color * rim + (color + vec3(kSkySheen)) * sky;
 }
 
 // How much of its width a strand covers at `along`: it comes out of the skin over its first part and fades out over its

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <functional>
 #include <random>
 
 #include "common/groom/mesh.h"
@@ -75,19 +76,51 @@ class LightLatticeTest : public testing::Test {
   WorkerPool workers_{2};
 };
 
+/// Depth of the sky where its ways have these depths.
+double mean_of_sky(const glm::vec3& up, const std::function<double(const glm::vec3&)>& depth) {
+  double open = 0.0;
+  for (const glm::vec3& way : sky_ways(up)) open += std::exp(-kSkyReach * depth(way)) / kSkyWays;
+  return -std::log(open) / kSkyReach;
+}
+
 TEST_F(LightLatticeTest, DepthGrowsAsTheHairThatIsPassed) {
+  // From a point within the box to its side.
+  const auto way_out = [](const glm::vec3& from, const glm::vec3& way) {
+    double out_m = 1.0;
+    for (int a = 0; a < 3; ++a)
+      if (way[a] != 0.0f)
+        out_m = std::min(out_m, (std::copysign(0.5 * kSideM, double{way[a]}) - from[a]) / way[a]);
+    return out_m;
+  };
   const StrandPoints points = strands_in_box(kCount, kSideM);
   LightLattice lattice({kSideM, 32, false, {}, nullptr});
   build(lattice, points, {kWidthM, 1.0f, 0.0f}, {{0, 1, 0}, {0, 0, 1}, {0, 1, 0}, true}, workers_);
   for (const float y : {0.03f, 0.0f, -0.03f}) {
     const double passed_m = 0.5 * kSideM - y;
     EXPECT_NEAR(key_depth(lattice.view(), {0, y, 0}), kPerM * passed_m, 0.04 * kPerM * kSideM) << y;
-    EXPECT_NEAR(other_depth(lattice.view(), {0, y, 0}, true), kPerM * passed_m, 0.06 * kPerM * kSideM) << y;
+    const double open = mean_of_sky({0, 1, 0}, [&](const glm::vec3& way) {
+      return kPerM * way_out({0, y, 0}, way);
+    });
+    EXPECT_NEAR(other_depth(lattice.view(), {0, y, 0}, true), open, 0.06 * kPerM * kSideM) << y;
   }
   for (const float z : {0.03f, -0.03f})
     EXPECT_NEAR(other_depth(lattice.view(), {0, 0, z}, false), kPerM * (0.5 * kSideM - z),
                 0.06 * kPerM * kSideM)
         << z;
+}
+
+// A dense roof takes the light of the one way that it stands in, where a sky of one way would be dark.
+TEST_F(LightLatticeTest, TheSkyIsAllAround) {
+  constexpr float kRoofM = 0.02f;
+  StrandPoints points = strands_in_box(20000, kRoofM);
+  for (StrandPoint& p : points.point) p.y += 0.05f;
+  LightLattice lattice({kSideM, 64, true, FittedSphere{glm::vec3(0.0f), 0.06f}, nullptr});
+  build(lattice, points, {kWidthM, 1.0f, 0.0f}, {{0, 1, 0}, {0, 0, 1}, {0, 1, 0}, false}, workers_);
+  const double alone = key_depth(lattice.view(), {0, -0.03f, 0});
+  EXPECT_GT(alone, 10.0);
+  const double expected =
+      mean_of_sky({0, 1, 0}, [&](const glm::vec3& way) { return way.y > 0.99f ? alone : 0.0; });
+  EXPECT_NEAR(other_depth(lattice.view(), {0, -0.03f, 0}, true), expected, 0.1);
 }
 
 TEST_F(LightLatticeTest, NothingIsShadowedInFrontOfTheHair) {
@@ -155,9 +188,14 @@ TEST_F(LightLatticeTest, AHeadIsOpaqueAndBesideItNothingIs) {
   }
   // From straight above it hides a part of the sky, that goes with what lies above.
   build(lattice, points, {kWidthM, 1.0f, 0.0f}, {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, false}, workers_);
-  const float chord_cells = 2.0f * (kRadiusM - kSolidInset * lattice.view().soft_m) / lattice.view().cell_m;
-  EXPECT_NEAR(other_depth(lattice.view(), {0, -1.2f * kRadiusM, 0}, true), kSolidSkyDepth * chord_cells,
-              0.1f * kSolidSkyDepth * chord_cells + 0.05f);
+  const double seen_m = kRadiusM - kSolidInset * lattice.view().soft_m;
+  const glm::vec3 below(0, -1.2f * kRadiusM, 0);
+  const double expected = mean_of_sky({0, 1, 0}, [&](const glm::vec3& way) {
+    const double nearest_m = glm::length(below - glm::dot(below, way) * way);
+    const double chord_m = 2.0 * std::sqrt(std::max(seen_m * seen_m - nearest_m * nearest_m, 0.0));
+    return kSolidSkyDepth * chord_m / lattice.view().soft_m;
+  });
+  EXPECT_NEAR(other_depth(lattice.view(), below, true), expected, 0.1 * expected + 0.05);
 }
 
 /// Does the mesh stand between a point and a light? Moeller and Trumbore 1997.

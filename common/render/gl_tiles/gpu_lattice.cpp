@@ -43,6 +43,7 @@ Status GpuLattice::prepare(const gl::ShaderLibrary& shaders, const HeadOccupancy
   ASSIGN_OR_RETURN(key_, gl::Program::make(shaders, {"render/tile_light_key.comp"}, {}));
   ASSIGN_OR_RETURN(half_, gl::Program::make(shaders, {"render/tile_light_half.comp"}, {}));
   ASSIGN_OR_RETURN(sweep_, gl::Program::make(shaders, {"render/tile_light_sweep.comp"}, {}));
+  ASSIGN_OR_RETURN(mean_, gl::Program::make(shaders, {"render/tile_light_mean.comp"}, {}));
   if (solid.is_empty()) return {};
   const glm::uvec3 cells(solid.size);
   solid_ = gl::Texture::volume("head occupancy", GL_R8_SNORM, cells.x, cells.y, cells.z);
@@ -73,7 +74,7 @@ uint64_t GpuLattice::size_bytes() const {
 void GpuLattice::resize(const LatticeFrame& frame) {
   sums_.reserve(cell_count(frame.size) * sizeof(int32_t));
   halved_.reserve(cell_count(frame.half_size) * sizeof(float));
-  swept_.reserve(cell_count(frame.half_size) * sizeof(float));
+  swept_.reserve(kSkyWays * cell_count(frame.half_size) * sizeof(float));
   if (size_ == frame.size) return;
   size_ = frame.size;
   key_depth_ = depth_volume("key depth", frame.size);
@@ -108,13 +109,10 @@ void GpuLattice::build(const LatticeFrame& frame, const LightDirections& lights,
   bind_depth_image(key_depth_);
   dispatch_cells(frame.size.x, frame.size.y, 1);
   halve(frame, kSolidSkyDepth);
-  const auto along_axes = [&](const glm::vec3& v) {
-    return glm::vec3(glm::dot(v, frame.axis[0]), glm::dot(v, frame.axis[1]), glm::dot(v, frame.axis[2]));
-  };
-  sweep(frame, along_axes(lights.up), sky_depth_);
+  sweep(frame, sky_ways(lights.up), sky_depth_);
   if (lights.has_rim) {
     if (solid_from_m_.x > 0.0f) halve(frame, kSolidRimDepth);
-    sweep(frame, along_axes(lights.to_rim), rim_depth_);
+    sweep(frame, std::span(&lights.to_rim, 1), rim_depth_);
   } else {
     const float none = 0.0f;
     glClearTexImage(rim_depth_.name(), 0, GL_RED, GL_FLOAT, &none);
@@ -129,19 +127,29 @@ void GpuLattice::halve(const LatticeFrame& frame, float solid_depth) {
   dispatch_cells(frame.half_size.x, frame.half_size.y, frame.half_size.z);
 }
 
-void GpuLattice::sweep(const LatticeFrame& frame, const glm::vec3& to_light, const gl::Texture& depth) {
-  const glm::vec3 length = glm::abs(to_light);
-  const int axis = length.x >= length.y && length.x >= length.z ? 0 : (length.y >= length.z ? 1 : 2);
-  if (!(length[axis] > 0.0f)) return;
+void GpuLattice::sweep(const LatticeFrame& frame, std::span<const glm::vec3> to_light,
+                       const gl::Texture& depth) {
+  static_assert(kSkyWays <= 8);
+  glm::mat4 ways[2] = {glm::mat4(0.0f), glm::mat4(0.0f)};
+  for (size_t i = 0; i < to_light.size(); ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      ways[i / 4][static_cast<int>(i % 4)][axis] = glm::dot(to_light[i], frame.axis[axis]);
+  const glm::ivec3 size = frame.half_size;
+  const int most = std::max({size.x, size.y, size.z});
   sweep_.use();
-  sweep_.set("u_to_light", to_light);
-  sweep_.set("u_axis", axis);
-  bind_depth_image(depth);
-  for (int slice = 0; slice < frame.half_size[axis]; ++slice) {
+  sweep_.set("u_ways", ways[0]);
+  sweep_.set("u_more_ways", ways[1]);
+  for (int slice = 0; slice < most; ++slice) {
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     sweep_.set("u_slice", slice);
-    dispatch_cells(frame.half_size[(axis + 1) % 3], frame.half_size[(axis + 2) % 3], 1);
+    dispatch_cells(most, most, static_cast<int>(to_light.size()));
   }
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+  mean_.use();
+  mean_.set("u_way_count", static_cast<int>(to_light.size()));
+  mean_.set("u_reach", kSkyReach);
+  bind_depth_image(depth);
+  dispatch_cells(size.x, size.y, size.z);
 }
 
 void GpuLattice::bind() const {

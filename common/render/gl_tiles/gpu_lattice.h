@@ -25,9 +25,9 @@ class GpuLattice final : public gl::Resource {
  private:
   void resize(const LatticeFrame& frame);
   void halve(const LatticeFrame& frame, float solid_depth);
-  void sweep(const LatticeFrame& frame, const glm::vec3& to_light, const gl::Texture& depth);
+  void sweep(const LatticeFrame& frame, std::span<const glm::vec3> to_light, const gl::Texture& depth);
 
-  gl::Program sum_, key_, half_, sweep_;
+  gl::Program sum_, key_, half_, sweep_, mean_;
   GrownBuffer sums_{"light sums"};
   GrownBuffer halved_{"light halved"};
   GrownBuffer swept_{"light swept"};
