@@ -95,18 +95,18 @@ struct Hello {
   Role role = Role::Viewer;  // a Controller views and may steer; a Source sends motion and wind; an Admin all
   StreamMode mode = StreamMode::Strands;
   std::string name = {};  // shown in logs, at most 64 characters
-  std::string token = {};  // empty on loopback
+  std::string token = {};  // empty where the server has none
   uint32_t frame_width = 0;  // frames mode; 0 = server's choice
   uint32_t frame_height = 0;
   bool acknowledges = false;  // sends a FrameAck for every media message
   PictureCodecs picture_codecs = 0;  // bit 1 << PictureCodec
   bool gets_no_stream = false;  // neither strands nor frames
   double step_ns = 0.0;  // of one vertex in one solver step here, one thread; 0 = cannot predict
-  std::string codec_wish = {};  // strand codec that is insisted on; empty = the server chooses
+  std::string codec_wish = {};  // the only strand codec that it takes; empty = the server chooses
   bool keeps_camera = false;  // nobody else moves its camera
-  std::string head = {};  // of those that the server has, by its name; empty = the first
+  std::string head = {};  // name of a head of the server; empty = the first
   std::string relay_id = {};  // of a relay: its session_id; empty = a viewer
-  uint32_t strand_class = 0;  // that a relay wants, by its place in the StreamList
+  uint32_t strand_class = 0;  // of a relay: the class that it wants, by its place in the StreamList
   bool operator==(const Hello&) const = default;
 };
 /// A camera. To the server: where this viewer looks from; to a viewer: where it is to look from.
@@ -220,7 +220,7 @@ struct Welcome {
   std::string scene_name = {};
   StreamMode mode = StreamMode::Strands;  // what was chosen for `Auto`
   std::string mode_reason = {};
-  std::string codec = {};  // of strands, as long as the connection lasts
+  std::string codec = {};  // of strands, until a StreamQuality names another
   std::string codec_reason = {};  // for a person: why this one
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
@@ -388,10 +388,10 @@ struct ParameterList {
 struct StateTime {
   uint64_t tick = 0;
   int64_t sim_time_ns = 0;  // simulation time
-  int64_t source_ns = 0;  // its newest motion sample was made
-  int64_t motion_ns = 0;  // and arrived
-  int64_t published_ns = 0;  // simulated
-  int64_t encoded_ns = 0;  // its first frame of strands
+  int64_t source_ns = 0;  // when its newest motion sample was made
+  int64_t motion_ns = 0;  // when that arrived
+  int64_t published_ns = 0;  // when it was simulated
+  int64_t encoded_ns = 0;  // when its first frame of strands was encoded
   bool operator==(const StateTime&) const = default;
 };
 /// When each new state was where on its way.

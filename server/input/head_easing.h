@@ -33,8 +33,8 @@ class HeadEasing {
   Pose follow(const Pose& seen, double since_s, double passed_s);
 
   /// Returns the pose to show while the source says nothing, `passed_s` after the frame before. The head
-  /// slows by no more than kEasyStart, up to kLongestSlowingS; on its way back it goes on with that
-  /// meanwhile.
+  /// slows by no more than kEasyStart, for at most kLongestSlowingS. A head on its way back to the source
+  /// goes on with that meanwhile.
   Pose coast(double passed_s);
 
  private:

@@ -94,7 +94,7 @@ class NetHandler {
  public:
   virtual ~NetHandler() = default;
   /// Decides on a Hello. An error closes the session with its sentence: LimitExceeded as Full, Unavailable as
-  /// TryLater, Unauthorized as Unauthorized, else Policy.
+  /// TryLater, Unsupported as Refused, Unauthorized and NotFound as such, else Policy.
   virtual Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) = 0;
   /// Handles what a session says after its Hello, when its role may say it. The network answers Ping,
   /// FrameAck and KeyframeRequest itself, and AdminCommand except ShutDown. A CameraChange or WindowChange may

@@ -10,10 +10,10 @@
 
 namespace strandcast {
 
-/// A chain wants a fresh keyframe after so long, once its deltas have as many bytes as its keyframe, so that
-/// keyframes take no more of the link than deltas;
+/// Age at which a chain asks for a fresh keyframe if its deltas have as many bytes as its keyframe. Keyframes
+/// then take no more of the link than deltas.
 inline constexpr int64_t kChainNs = 1'000'000'000;
-/// after so long in any case.
+/// Age at which it asks in any case.
 inline constexpr int64_t kLongestChainNs = 2'000'000'000;
 /// Largest number of deltas that a joining viewer waits for a keyframe; a longer chain is dropped.
 inline constexpr size_t kMaxChainFrames = 240;

@@ -31,7 +31,7 @@ class VolumeExtras {
   explicit VolumeExtras(const VolumeOptions& options)
       : options_(options), workers_(options.workers == nullptr ? &shared_workers() : options.workers) {}
 
-  /// What is not asked for is left as it was, but the wind: all of it comes through.
+  /// Updates what is asked for. Without a target the excess stays; without a shadow all wind comes through.
   void update(const VolumeGrid& grid, std::span<const glm::vec4> nodes, const TargetDensity* target,
               const WindShadow* shadow);
   /// (nodes of the last update) density less the target's, m/m^3, smoothed as the density is, so that its

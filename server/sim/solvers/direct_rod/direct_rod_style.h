@@ -29,9 +29,9 @@ namespace strandcast {
 
 /// Lowest frequency squared of a hanging chain over g / length: (2.40483 / 2)^2, from the first zero of J0.
 inline constexpr double kHangingMargin = 1.446;
-/// A fibre of 3.4 times the radius; who needs more has a style that hair does not have.
+/// Largest factor of a strand's stiffness: that of a fibre of 3.4 times the radius.
 inline constexpr double kMaxStiffening = 128.0;
-/// Factors are 2^(k / this), the least that holds: within 1.1 %.
+/// Number of factors tried per doubling: the chosen one is within 1.1 % of the least that holds.
 inline constexpr int kStiffeningSteps = 64;
 
 /// Second variation of a strand's energy over its mass per length, in the rotations of its free edges, root

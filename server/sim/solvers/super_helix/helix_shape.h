@@ -20,7 +20,7 @@ struct HelixLine {
   glm::dquat clamp{1.0, 0.0, 0.0, 0.0};  // material frame there, in head space: z along the strand
 };
 
-/// A point at which the derivatives are integrated, with what lies behind its share of the arc.
+/// A point at which the derivatives are integrated; `weight_m` is its share of the arc.
 struct HelixPoint {
   glm::dmat3 frame{1.0};
   glm::dvec3 position_m{0.0};
