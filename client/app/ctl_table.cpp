@@ -85,7 +85,8 @@ void declare_params(CLI::App& app, CtlCommandLine& line) {
 
 void declare_test(CLI::App& app, CtlCommandLine& line) {
   TestOptions& test = line.test;
-  app.add_option("--scenario", test.scenarios, "Scenario file (protobuf text); repeatable")
+  app.add_option("--scenario", test.scenarios,
+                 "Scenario file (protobuf text), or a folder of them; repeatable")
       ->expected(1)
       ->take_all()
       ->required();
@@ -96,6 +97,10 @@ void declare_test(CLI::App& app, CtlCommandLine& line) {
       "--server", test.server,
       "Server program (default: strandcast-server beside this one); with --connect none is started");
   app.add_flag("--renew", test.renews_goldens, "Write the golden pictures instead of comparing with them");
+  app.add_option("--jobs", test.jobs, "Scenarios at the same time, each with a server of its own")
+      ->check(CLI::Range(1u, kMaxTestJobs))
+      ->capture_default_str();
+  app.add_flag("--watch", test.is_watching, "Run again after each change of a file or of the server program");
 }
 
 void declare_monitor(CLI::App& app, CtlCommandLine& line) {

@@ -1,6 +1,7 @@
 #include "server/net/connection_private.h"
 
 #include <algorithm>
+#include <cctype>
 #include <string_view>
 #include <utility>
 
@@ -41,6 +42,15 @@ bool is_ambiguous(const http::request<http::empty_body>& request) {
 bool is_gone(const beast::error_code& error) {
   return error == http::error::end_of_stream || error == asio::error::connection_reset ||
          error == http::error::partial_message || error == asio::error::operation_aborted;
+}
+
+/// RFC 6455, section 4.1: 16 bytes in base64.
+bool is_websocket_key(std::string_view key) {
+  constexpr size_t kLetters = 22;
+  return key.size() == kLetters + 2 && key.ends_with("==") &&
+         std::all_of(key.begin(), key.begin() + kLetters, [](unsigned char c) {
+           return c < 128 && (std::isalnum(c) != 0 || c == '+' || c == '/');
+         });
 }
 
 bool offers_protocol(beast::string_view header) {
@@ -246,7 +256,7 @@ void Connection::answer(const Request& request) {
                   "This Host is not served here (--allow-host adds one).", quoted(view(host)));
   const std::string_view path = without_session(view(request.target()));
   if (websocket::is_upgrade(request) && path == kWebSocketPath) return answer_upgrade(request);
-  const bool is_get = request.method() == http::verb::get;
+  const bool is_get = request.method() == http::verb::get || request.method() == http::verb::head;
   if (is_get && path == "/healthz") return respond(http::status::ok, "ok\n");
   if (is_get && path == "/readyz") return answer_readiness();
   if (is_get && path == "/metrics") return answer_metrics(request);
@@ -307,6 +317,10 @@ void Connection::answer_upgrade(const Request& request) {
     return refuse(Refusal::Path, http::status::bad_request,
                   fmt::format("The WebSocket subprotocol must be {}.", kWebSocketProtocol),
                   quoted(view(protocols)));
+  const auto key = request[http::field::sec_websocket_key];
+  if (!is_websocket_key(view(key)))
+    return refuse(Refusal::Request, http::status::bad_request,
+                  "Sec-WebSocket-Key must be 16 bytes in base64.", quoted(view(key)));
   upgrade();
 }
 
@@ -348,6 +362,8 @@ void Connection::respond(http::status status, const std::string& text, const cha
   response_.keep_alive(false);
   response_.body() = text;
   response_.prepare_payload();
+  // An answer to HEAD says how long the text is, and ends there.
+  if (parser_ && parser_->get().method() == http::verb::head) response_.body().clear();
   http::async_write(stream_, response_, [self = shared_from_this()](const beast::error_code& error, size_t) {
     if (error || self->is_finished_) return self->finish();
     self->stream_.async_shut_down([self](const beast::error_code&) { self->finish(); });

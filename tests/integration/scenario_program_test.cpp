@@ -2,6 +2,7 @@
 // left behind.
 #include <gmock/gmock.h>
 
+#include <csignal>
 #include <fstream>
 #include <sstream>
 
@@ -59,6 +60,49 @@ TEST_F(ScenarioProgram, SaysWhatHoldsAndLeavesXml) {
   EXPECT_THAT(text_of("results.xml"), AllOf(HasSubstr("<testsuites tests=\"13\" failures=\"0\">"),
                                             HasSubstr("<testsuite name=\"good\" tests=\"13\"")));
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "out")) << "nothing failed";
+}
+
+TEST_F(ScenarioProgram, RunsAFolderAtTheSameTimeWithTheLinesOfEachTogether) {
+  const std::string begin = std::string("name: \"%\"\n") + kStart + "do { step: 3 }\n";
+  const auto named = [&](const std::string& name) {
+    std::string text = begin;
+    return text.replace(text.find('%'), 1, name);
+  };
+  write("b.textproto", named("b") + "do { expect { no_quarantine: true } }\n");
+  write("a.textproto", named("a") + "do { expect { hash: \"1\" } }\n");
+  write("c.textproto", named("c") + "do { expect { no_quarantine: true } }\n");
+  write("notes.txt", "no scenario");
+  EXPECT_EQ(run({"--scenario", folder_.path().string(), "--jobs", "3"}), 1) << text_of("said");
+  EXPECT_THAT(text_of("said"), AllOf(HasSubstr("2 of 3 scenarios hold"), HasSubstr("a: 0 of 1 checks hold")));
+  for (const std::string name : {"b", "c"})
+    EXPECT_THAT(text_of("said"),
+                testing::ContainsRegex("\n" + name + "\nok [^\n]*\n" + name + ": 1 of 1 checks"));
+  const std::string xml = text_of("results.xml");
+  EXPECT_LT(xml.find("name=\"a\""), xml.find("name=\"b\"")) << "in the order of the files";
+  const auto empty = folder_.path() / "empty";
+  std::filesystem::create_directory(empty);
+  EXPECT_EQ(run({"--scenario", empty.string()}), 2);
+  EXPECT_THAT(text_of("said"), HasSubstr("no .textproto"));
+  EXPECT_EQ(run({"--scenario", folder_.path().string(), "--jobs", "2", "--connect", "127.0.0.1:1"}), 2);
+  EXPECT_THAT(text_of("said"), HasSubstr("one scenario at a time"));
+}
+
+TEST_F(ScenarioProgram, WatchesItsFile) {
+  const auto path = write("mine.textproto", std::string("name: \"mine\"\n") + kStart +
+                                                "do { step: 3 }\ndo { expect { hash: \"1\" } }\n");
+  test::ChildProcess program(STRANDCAST_CTL_PROGRAM,
+                             {"test", "--scenario", path.string(), "--watch", "--server",
+                              STRANDCAST_SERVER_PROGRAM, "--out", (folder_.path() / "out").string()},
+                             folder_.path() / "said");
+  const auto says = [&](const char* what) { return text_of("said").find(what) != std::string::npos; };
+  ASSERT_TRUE(eventually([&] { return says("waiting for a change"); })) << text_of("said");
+  EXPECT_TRUE(says("mine: 0 of 1 checks hold"));
+  write("mine.textproto", std::string("name: \"mine\"\n") + kStart +
+                              "do { step: 3 }\n"
+                              "do { expect { no_quarantine: true } }\n");
+  EXPECT_TRUE(eventually([&] { return says("mine: 1 of 1 checks hold"); })) << text_of("said");
+  program.send_signal(SIGTERM);
+  EXPECT_EQ(program.wait(), 0) << "the last round holds";
 }
 
 TEST_F(ScenarioProgram, AnExpectationThatFailsIsExitCodeOneWithEvidence) {

@@ -33,6 +33,27 @@ TEST_F(ServerNet, ServesHealthMetricsAndNothingElse) {
   EXPECT_NE(test::http_get(server_->port(), "/healthz", "evil.example").find("403"), std::string::npos);
 }
 
+TEST_F(ServerNet, AnswersHeadAsGetWithoutTheText) {
+  start();
+  const auto ask = [&](const std::string& method, const std::string& path) {
+    RawClient client(server_->port());
+    client.send_raw(method + " " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
+    const std::string answer = client.read_raw_to_end();
+    const size_t end = answer.find("\r\n\r\n");
+    return std::pair(answer.substr(0, end), answer.substr(end + 4));
+  };
+  for (const std::string path : {"/healthz", "/readyz"}) {
+    const auto [get_header, get_text] = ask("GET", path);
+    const auto [head_header, head_text] = ask("HEAD", path);
+    EXPECT_EQ(head_header, get_header);
+    EXPECT_NE(get_text, "");
+    EXPECT_EQ(head_text, "");
+  }
+  const auto [header, text] = ask("HEAD", "/metrics");
+  EXPECT_NE(header.find("200 OK"), std::string::npos);
+  EXPECT_EQ(text, "");
+}
+
 TEST_F(ServerNet, MetricsFollowTheirFormat) {
   start();
   const auto viewer = join();
@@ -109,6 +130,22 @@ TEST_F(ServerNet, FieldsThatDecideStandOnce) {
     EXPECT_TRUE(client.read_raw_to_end().starts_with("HTTP/1.1 400 ")) << field;
   }
   EXPECT_EQ(server_->counters().open_sessions, 0u);
+}
+
+TEST_F(ServerNet, AKeyOfAWebSocketIsSixteenBytes) {
+  start();
+  const auto ask = [&](const std::string& key) {
+    RawClient client(server_->port());
+    client.send_raw(
+        "GET /v1 HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: strandcast.v1\r\nSec-WebSocket-Key: " +
+        key + "\r\n\r\n");
+    return client.read_answer();
+  };
+  EXPECT_TRUE(ask("dGhlIHNhbXBsZSBub25jZQ==").starts_with("HTTP/1.1 101 "));
+  for (const char* key : {"", "x", "dGhlIHNhbXBsZSBub25jZQ=", "dGhlIHNhbXBsZSBub25jZQ===",
+                          "dGhlIHNhbXBsZSBub25j!Q==", "dGhlIHNhbXBsZSBub25jZWUg"})
+    EXPECT_TRUE(ask(key).starts_with("HTTP/1.1 400 ")) << key;
 }
 
 /// A message as a client's WebSocket frame, masked with zeros.

@@ -27,7 +27,7 @@ inline void tell(FieldTexts& told, const std::string& where, const BundleCommand
   OPTION_FIELDS(all, recording, page, seconds, has_all_solvers);
 }
 inline void tell(FieldTexts& told, const std::string& where, const TestOptions& all) {
-  OPTION_FIELDS(all, scenarios, junit, out, server, uses_running, renews_goldens);
+  OPTION_FIELDS(all, scenarios, junit, out, server, uses_running, renews_goldens, jobs, is_watching);
 }
 inline void tell(FieldTexts& told, const std::string& where, const ParameterOptions& all) {
   OPTION_FIELDS(all, prefix, is_watching, is_live_only);
@@ -137,7 +137,9 @@ const OptionRow kCommandRows[] = {
     {"--junit", {"j"}, {{"test.junit", "j"}}, kScenario, "test"},
     {"--out", {"o"}, {{"test.out", "o"}}, kScenario, "test"},
     {"--server", {"s"}, {{"test.server", "s"}}, kScenario, "test"},
-    {"--renew", {}, {{"test.renews_goldens", "true"}}, kScenario, "test"}};
+    {"--renew", {}, {{"test.renews_goldens", "true"}}, kScenario, "test"},
+    {"--jobs", {"3"}, {{"test.jobs", "3"}}, kScenario, "test"},
+    {"--watch", {}, {{"test.is_watching", "true"}}, kScenario, "test"}};
 
 /// What a command cannot be without: its fields are those beside the first ones of any command.
 const OptionRow kRequiredRows[] = {

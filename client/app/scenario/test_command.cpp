@@ -1,6 +1,11 @@
 #include "client/app/scenario/test_command.h"
 
+#include <algorithm>
+#include <chrono>
+#include <functional>
 #include <iostream>
+#include <mutex>
+#include <thread>
 
 #include "client/app/ctl_commands.h"
 #include "client/app/scenario/scenario_run.h"
@@ -29,13 +34,17 @@ Status check_names(const std::vector<Scenario>& scenarios) {
   return {};
 }
 
+using PrintLine = std::function<void(const std::string&)>;
+
 /// All runs of one scenario; the states that their steps lead to must be the same.
-ScenarioResult run_scenario(const Scenario& scenario, const ScenarioOptions& options) {
-  const auto print = [](const CheckResult& check) { std::cout << to_line(check) << std::endl; };
+ScenarioResult run_scenario(const Scenario& scenario, const ScenarioOptions& options,
+                            const PrintLine& print) {
+  print(scenario.name + (scenario.about.empty() ? "" : ": ") + scenario.about);
+  const auto tell = [&](const CheckResult& check) { print(to_line(check)); };
   ScenarioResult result;
   for (uint32_t i = 0; i < scenario.repeat; ++i) {
-    if (scenario.repeat > 1) std::cout << fmt::format("  run {} of {}\n", i + 1, scenario.repeat);
-    ScenarioResult next = ScenarioRun(scenario, options, print).run();
+    if (scenario.repeat > 1) print(fmt::format("  run {} of {}", i + 1, scenario.repeat));
+    ScenarioResult next = ScenarioRun(scenario, options, tell).run();
     if (i == 0) {
       result = std::move(next);
       continue;
@@ -49,53 +58,135 @@ ScenarioResult run_scenario(const Scenario& scenario, const ScenarioOptions& opt
                                                   : std::string("are others"),
                             is_same,
                             0.0};
-    print(check);
+    tell(check);
     result.seconds += next.seconds;
     result.checks.insert(result.checks.end(), next.checks.begin(), next.checks.end());
     result.checks.push_back(check);
   }
+  print(fmt::format("{}: {} of {} checks hold, {:.1f} s", result.name,
+                    result.checks.size() - result.failed_count(), result.checks.size(), result.seconds));
   return result;
+}
+
+/// Runs them, `jobs` at the same time; those that did not begin before the stop are left out. The lines of
+/// one scenario stand together.
+std::vector<ScenarioResult> run_all(const std::vector<Scenario>& scenarios, const ScenarioOptions& options,
+                                    uint32_t jobs) {
+  std::vector<std::optional<ScenarioResult>> done(scenarios.size());
+  std::atomic<size_t> next = 0;
+  std::mutex printing;
+  const auto work = [&] {
+    for (size_t i = next++; i < scenarios.size() && !*options.stop; i = next++) {
+      std::string lines;
+      const auto keep = [&](const std::string& line) { lines += line + '\n'; };
+      const auto show = [](const std::string& line) { std::cout << line << std::endl; };
+      done[i] = run_scenario(scenarios[i], options, jobs > 1 ? PrintLine(keep) : PrintLine(show));
+      const std::lock_guard lock(printing);
+      std::cout << lines << std::flush;
+    }
+  };
+  {
+    std::vector<std::jthread> workers;
+    for (uint32_t i = 1; i < jobs; ++i) workers.emplace_back(work);
+    work();
+  }
+  std::vector<ScenarioResult> results;
+  for (auto& result : done)
+    if (result) results.push_back(std::move(*result));
+  return results;
+}
+
+/// When the files and the server program were written last.
+std::vector<std::filesystem::file_time_type> written_times(const TestOptions& options,
+                                                           const std::filesystem::path& server) {
+  const auto files = scenario_files(options.scenarios);
+  std::vector<std::filesystem::path> paths = files ? *files : options.scenarios;
+  if (!server.empty()) paths.push_back(server);
+  std::vector<std::filesystem::file_time_type> times;
+  std::error_code is_gone;
+  for (const std::filesystem::path& path : paths)
+    times.push_back(std::filesystem::last_write_time(path, is_gone));
+  return times;
+}
+
+Result<std::vector<Scenario>> load_all(const TestOptions& options) {
+  const auto files = scenario_files(options.scenarios);
+  if (!files) return files.error();
+  std::vector<Scenario> scenarios;
+  for (const std::filesystem::path& path : *files) {
+    auto scenario = load_scenario(path);
+    if (!scenario) return scenario.error();
+    scenarios.push_back(std::move(scenario).value());
+  }
+  if (const Status status = check_names(scenarios); !status) return status.error();
+  return scenarios;
+}
+
+/// Loads all files and runs them once.
+int run_round(const TestOptions& options, const ScenarioOptions& run) {
+  const auto loaded = load_all(options);
+  if (!loaded) return ctl_failure(loaded.error());
+  const std::vector<Scenario>& scenarios = *loaded;
+  const std::vector<ScenarioResult> results = run_all(scenarios, run, options.jobs);
+  if (!options.junit.empty()) {
+    const std::string xml = to_junit(results);
+    if (const Status saved = save_file(options.junit, std::as_bytes(std::span(xml))); !saved)
+      return ctl_failure(saved.error());
+  }
+  size_t failed = 0;
+  for (const ScenarioResult& result : results) failed += result.failed_count() > 0;
+  if (results.size() > 1)
+    std::cout << fmt::format("{} of {} scenarios hold\n", results.size() - failed, results.size());
+  if (failed > 0) std::cout << fmt::format("what failed: {}\n", options.out.string());
+  return failed == 0 && results.size() == scenarios.size() ? kDoneExit : kRefusedExit;
 }
 
 }  // namespace
 
+Result<std::vector<std::filesystem::path>> scenario_files(const std::vector<std::filesystem::path>& given) {
+  std::vector<std::filesystem::path> files;
+  std::error_code failure;
+  for (const std::filesystem::path& path : given) {
+    if (!std::filesystem::is_directory(path, failure)) {
+      files.push_back(path);
+      continue;
+    }
+    std::vector<std::filesystem::path> inside;
+    for (const auto& entry : std::filesystem::directory_iterator(path, failure))
+      if (entry.path().extension() == ".textproto" && entry.is_regular_file(failure))
+        inside.push_back(entry.path());
+    if (inside.empty())
+      return make_error(ErrorCode::NotFound, "there is no .textproto in the folder {}", path.string());
+    std::sort(inside.begin(), inside.end());
+    files.insert(files.end(), inside.begin(), inside.end());
+  }
+  return files;
+}
+
 int run_test(const CtlTarget& target, const TestOptions& options, const std::atomic<bool>& stop) {
   // Files first: a typing error must not need a server to be found.
-  std::vector<Scenario> scenarios;
-  for (const std::filesystem::path& path : options.scenarios) {
-    auto scenario = load_scenario(path);
-    if (!scenario) return ctl_failure(scenario.error());
-    scenarios.push_back(std::move(scenario).value());
-  }
-  if (const Status status = check_names(scenarios); !status) return ctl_failure(status.error());
+  if (const auto loaded = load_all(options); !loaded) return ctl_failure(loaded.error());
   ScenarioOptions run{{}, {}, options.out, options.renews_goldens, &stop};
   if (options.uses_running) {
+    if (options.jobs > 1)
+      return ctl_failure(make_error(ErrorCode::BadInput,
+                                    "one server that runs already takes one scenario at a time: no --jobs"));
     run.running = target;
   } else {
     auto server = find_server(options);
     if (!server) return ctl_failure(server.error());
     run.server = std::move(server).value();
   }
-  std::vector<ScenarioResult> results;
-  size_t failed = 0;
-  for (const Scenario& scenario : scenarios) {
-    if (stop) break;
-    std::cout << scenario.name << (scenario.about.empty() ? "" : ": ") << scenario.about << std::endl;
-    results.push_back(run_scenario(scenario, run));
-    const ScenarioResult& result = results.back();
-    failed += result.failed_count();
-    std::cout << fmt::format("{}: {} of {} checks hold, {:.1f} s\n", result.name,
-                             result.checks.size() - result.failed_count(), result.checks.size(),
-                             result.seconds);
+  constexpr std::chrono::milliseconds kLookAgain{200};
+  while (true) {
+    const auto times = written_times(options, run.server);
+    const int outcome = run_round(options, run);
+    if (stop) std::cout << "stopped\n";
+    if (stop || !options.is_watching) return outcome;
+    std::cout << "waiting for a change (Ctrl-C ends)" << std::endl;
+    while (!stop && written_times(options, run.server) == times) std::this_thread::sleep_for(kLookAgain);
+    if (stop) return outcome;
   }
-  if (!options.junit.empty()) {
-    const std::string xml = to_junit(results);
-    if (const Status saved = save_file(options.junit, std::as_bytes(std::span(xml))); !saved)
-      return ctl_failure(saved.error());
-  }
-  if (failed > 0) std::cout << fmt::format("what failed: {}\n", options.out.string());
-  if (stop) std::cout << "stopped\n";
-  return failed == 0 && !stop ? kDoneExit : kRefusedExit;
 }
 
 }  // namespace strandcast
