@@ -12,3 +12,4 @@ for ((i = 1; i < $#; ++i)); do
 done
 bash tests/bench/wasm.sh "$@"
 node tests/bench/page.mjs "$build/bin/strandcast-server" "$build/bin/strandcast-view" "$build/bin/strandcast-ctl"
+node tests/bench/package.mjs "$build/bin/strandcast-server" "$(ls -t "$build"/web/npm/strandcast-*.tgz | head -n 1)"

@@ -2,51 +2,43 @@
 // the example. three.js is Debian's libjs-three, or what STRANDCAST_THREE names.
 //   node tests/web/package_browser.mjs strandcast-server strandcast-<version>.tgz [FOLDER for pictures]
 // Ends with 77 where there is no browser or no three.js; a line per test; the exit status is 1 when any fails.
-import { execFileSync } from 'node:child_process';
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
-import http from 'node:http';
 import os from 'node:os';
 import path from 'node:path';
-import { fileURLToPath, pathToFileURL } from 'node:url';
+import { pathToFileURL } from 'node:url';
 import { Browser, sleep, whyNoBrowser } from './browser.mjs';
 import { NodeSocket } from './node_socket.mjs';
+import { HEAD, PackageSite, root, whyNoThree } from './package_site.mjs';
 import { psnr, readPng } from './png.mjs';
 import { Server, SMALL } from './server.mjs';
 
 const [program, tar, shots] = process.argv.slice(2);
-const three = process.env.STRANDCAST_THREE ?? '/usr/share/javascript/three';
-const missing = whyNoBrowser() ?? (fs.existsSync(path.join(three, 'build/three.module.js')) ? undefined : 'needs three.js (libjs-three)');
+const missing = whyNoBrowser() ?? whyNoThree();
 if (missing) {
   console.log(`skipped: ${missing}`);
   process.exit(77);
 }
-const root = path.join(path.dirname(fileURLToPath(import.meta.url)), '../..');
 const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-package-'));
 const LEAST_DB = 40;
 const SIZE = { width: 640, height: 360 };
-const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm', '.glb': 'model/gltf-binary' };
-
-const IMPORTS = JSON.stringify({ imports: { three: '/node_modules/three/build/three.module.js', strandcast: '/node_modules/strandcast/strandcast.js',
-  'strandcast/three': '/node_modules/strandcast/hair.js', 'strandcast/view': '/node_modules/strandcast/view.js' } });
-const START = `<!DOCTYPE html><style>body { margin: 0; } canvas, strandcast-view { display: block; width: 100vw; height: 100vh; }</style>
-  <script type="importmap">${IMPORTS}</script>`;
+const address = () => `ws://127.0.0.1:${server.port}`;
 /** Pages of tests; what they have learnt stands in document.documentElement.dataset.strandcast. */
 const PAGES = {
-  '/view.html': (address) => `${START}<strandcast-view src="${address}" codec="tangent" draw="tiles"></strandcast-view><script type="module">
+  '/view.html': () => `${HEAD}<strandcast-view src="${address()}" codec="tangent" draw="tiles"></strandcast-view><script type="module">
     import 'strandcast/view';
     let pictures = 0;
     document.querySelector('strandcast-view').addEventListener('picture', () =>
       (document.documentElement.dataset.strandcast = JSON.stringify({ pictures: ++pictures })));</script>`,
   // The page's camera about a head that turns, before the page's background.
-  '/hair.html': (address) => `${START}<canvas></canvas><script type="module">
+  '/hair.html': () => `${HEAD}<canvas></canvas><script type="module">
     import * as THREE from 'three';
     import { connect } from 'strandcast';
     import { StrandcastHair } from 'strandcast/three';
     const canvas = document.querySelector('canvas');
     const renderer = new THREE.WebGLRenderer({ canvas, context: canvas.getContext('webgl2', { antialias: true, alpha: true }), alpha: true });
     renderer.setSize(innerWidth, innerHeight, false);
-    const connection = connect('${address}', { codec: 'tangent' });
+    const connection = connect('${address()}', { codec: 'tangent' });
     const hair = new StrandcastHair(connection, { head: true, followsPose: true });
     const scene = new THREE.Scene();
     scene.add(hair);
@@ -77,20 +69,6 @@ const PAGES = {
     document.body.style.background = \`url(\${behind.toDataURL()}) repeat-x\`;</script>`,
 };
 
-function serve(address) {
-  const files = http.createServer(({ url }, answer) => {
-    const name = new URL(url, 'http://here').pathname;
-    const inThree = name.replace('/node_modules/three/', '');
-    const file = inThree !== name ? path.join(three, inThree) : name.startsWith('/node_modules/') ? path.join(work, name)
-      : name.endsWith('.glb') ? path.join(work, name) : path.join(root, 'examples/three', name);
-    const page = PAGES[name]?.(address());
-    if (!page && !fs.existsSync(file)) return answer.writeHead(404).end();
-    answer.writeHead(200, { 'content-type': page ? 'text/html' : TYPES[path.extname(name)] ?? 'text/plain' });
-    answer.end(page ?? fs.readFileSync(file));
-  });
-  return new Promise((done) => files.listen(0, '127.0.0.1', () => done(files)));
-}
-
 let server;
 let browser;
 let site;
@@ -118,11 +96,11 @@ let page;
 const tests = {
   async 'the element shows what the page shows'() {
     page = await shownBy(`${server.url}#mode=strands&codec=tangent&draw=tiles`, 'page', (tab) => tab.evaluate('Number(document.body?.dataset.pictures ?? 0)'));
-    const seen = await shownBy(`${site}view.html`, 'view', picturesOf);
+    const seen = await shownBy(`${site.origin}/view.html`, 'view', picturesOf);
     assert.equal(psnr(page, seen), Infinity);
   },
   async 'three shows what the page shows'() {
-    const alike = psnr(page, await shownBy(`${site}hair.html`, 'hair', picturesOf));
+    const alike = psnr(page, await shownBy(`${site.origin}/hair.html`, 'hair', picturesOf));
     console.log(`  ${alike.toFixed(2)} dB`);
     assert.ok(alike >= LEAST_DB, `${alike} dB`);
   },
@@ -130,8 +108,8 @@ const tests = {
     fs.copyFileSync(path.join(root, 'examples/three/head.mjs'), path.join(work, 'head.mjs'));
     const { glbOf } = await import(pathToFileURL(path.join(work, 'head.mjs')));
     fs.writeFileSync(path.join(work, 'head.glb'), glbOf(await strandcast.headOf(pausing.asset)));
-    const shares = async (address, least) => {
-      const tab = await browser.open(`${site}index.html#${address}`, SIZE);
+    const shares = async (to, least) => {
+      const tab = await browser.open(`${site.origin}/index.html#${to}`, SIZE);
       await tab.until(async () => (await tab.evaluate('document.readyState')) === 'complete', 'the example');
       let seen;
       // Hair is dark, the head is not, and what is behind both is white.
@@ -148,7 +126,7 @@ const tests = {
       return seen;
     };
     const bare = await shares('ws://127.0.0.1:1', -1);
-    const whole = await shares(`ws://127.0.0.1:${server.port}`, bare.hair + 0.02);
+    const whole = await shares(address(), bare.hair + 0.02);
     console.log(`  hair on ${(100 * whole.hair).toFixed(1)} % of the picture, ${(100 * bare.hair).toFixed(1)} % without`);
     assert.ok(bare.head > 0.03 && whole.head > 0.03 && whole.hair > bare.hair + 0.02, JSON.stringify([bare, whole]));
   },
@@ -157,14 +135,10 @@ const tests = {
 let failed = 0;
 try {
   if (shots) fs.mkdirSync(shots, { recursive: true });
-  const installed = path.join(work, 'node_modules/strandcast');
-  fs.mkdirSync(installed, { recursive: true });
-  execFileSync('tar', ['-xzf', path.resolve(tar), '--strip-components=1', '-C', installed]);
-  const files = await serve(() => `ws://127.0.0.1:${server.port}`);
-  site = `http://127.0.0.1:${files.address().port}/`;
-  server = await Server.start(program, [...SMALL, '--allow-origin', site.slice(0, -1)]);
+  site = await PackageSite.open(tar, work, PAGES);
+  server = await Server.start(program, [...SMALL, '--allow-origin', site.origin]);
   browser = await Browser.start();
-  strandcast = await import(pathToFileURL(path.join(installed, 'node.js')));
+  strandcast = await import(pathToFileURL(path.join(work, 'node_modules/strandcast/node.js')));
   pausing = strandcast.connect(server.url, { WebSocket: globalThis.WebSocket ?? NodeSocket });
   await pausing.opened;
   for await (const { tick } of pausing) if (tick > 60) break; // some hair has moved
@@ -176,8 +150,7 @@ try {
       (error) => (++failed, console.log(`FAILED: ${name}: ${error.stack}`)));
   }
   pausing.close();
-  files.close();
-  files.closeAllConnections?.();
+  site.close();
 } finally {
   await browser?.end();
   await server?.end();

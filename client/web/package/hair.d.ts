@@ -16,6 +16,8 @@ export interface HairOptions {
 export class StrandcastHair extends Object3D {
   constructor(connection: Connection, options?: HairOptions);
   readonly connection: Connection;
+  /** There is something that no picture has shown: for pages that draw only then. */
+  readonly isDirty: boolean;
   /** What the newest picture took of the thread that draws, ms. */
   readonly drawMs: number;
   /** Leaves scene and connection, and frees what the graphics card holds. The connection stays open. */

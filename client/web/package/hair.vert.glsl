@@ -1,24 +1,34 @@
 // Corners of segments where nothing captures points: each corner makes its own.
 #include "gl/strand_point.glsl"
 
-uniform sampler2D u_points;    // place in head space, m, and number of the strand; one more at both ends
+uniform sampler2D u_points;     // on a lattice in head space, two a texel (prepare.ts); one more at both ends
+uniform vec3 u_least_m;
+uniform vec3 u_step_m;
+uniform sampler2D u_strand_of;
 uniform sampler2D u_strands;
+uniform sampler2D u_order;      // first points of segments, from back to front
 
 out float v_across_px;
 out vec4 v_light;
 out vec3 v_line;
 
-vec4 point_at(int number) {
+ivec2 row_place(int number) {
   const int kPointsPerRow = 2048;
-  return texelFetch(u_points, ivec2(number % kPointsPerRow, number / kPointsPerRow), 0);
+  return ivec2(number % kPointsPerRow, number / kPointsPerRow);
+}
+vec3 point_at(int number) {
+  vec4 both = texelFetch(u_points, row_place(number >> 1), 0);
+  uvec2 one = uvec2((number & 1) == 0 ? both.xy : both.zw);
+  return u_least_m + u_step_m * vec3(one.x & 65535u, (one.x >> 16) | ((one.y >> 16) << 8), one.y & 65535u);
 }
 
 void main() {
-  int number = gl_VertexID >> 1;
-  vec4 here = point_at(number + 1);
-  uvec4 strand = uvec4(texelFetch(u_strands, strand_place(uint(here.w)), 0));
-  StrandPoint point = strand_point(point_at(number).xyz, here.xyz, point_at(number + 2).xyz, strand, uint(number));
-  float side = (gl_VertexID & 1) == 0 ? 1.0 : -1.0;
+  int corner = gl_VertexID & 3;   // of four: two at each end
+  int number = int(texelFetch(u_order, row_place(gl_VertexID >> 2), 0).r) + (corner >> 1);
+  uint of = uint(texelFetch(u_strand_of, row_place(number), 0).r);
+  uvec4 strand = uvec4(texelFetch(u_strands, strand_place(of), 0));
+  StrandPoint point = strand_point(point_at(number), point_at(number + 1), point_at(number + 2), strand, uint(number));
+  float side = (corner & 1) == 0 ? 1.0 : -1.0;
   gl_Position = vec4(point.middle + side * point.aside, point.depth, 1.0);
   v_across_px = side * point.line.reach;
   v_light = point.light;

@@ -47,8 +47,8 @@ function frameOf(block: ArrayBuffer): Frame {
   return frame;
 }
 
-function textureOf(data: ArrayBufferView, width: number, height: number): THREE.DataTexture {
-  const texture = new THREE.DataTexture(data, width, height, THREE.RGBAFormat, THREE.FloatType);
+function textureOf(data: ArrayBufferView, width: number, height: number, format: number): THREE.DataTexture {
+  const texture = new THREE.DataTexture(data, width, height, format, THREE.FloatType);
   texture.needsUpdate = true;
   return texture;
 }
@@ -76,6 +76,7 @@ export class StrandcastHair extends THREE.Object3D {
   private readonly ends: (() => void)[] = [];
   private readonly uniforms = {
     u_frame: { value: undefined as Frame | undefined }, u_points: { value: null as THREE.Texture | null }, u_strands: { value: null as THREE.Texture | null },
+    u_order: { value: null as THREE.Texture | null }, u_strand_of: { value: null as THREE.Texture | null }, u_least_m: { value: [0, 0, 0] }, u_step_m: { value: [0, 0, 0] },
     u_key_depth: { value: null as THREE.Texture | null }, u_rim_depth: { value: null as THREE.Texture | null }, u_sky_depth: { value: null as THREE.Texture | null },
   };
   private readonly blend = { transparent: true, depthTest: true, depthWrite: false, blending: THREE.CustomBlending, blendSrc: THREE.OneFactor,
@@ -132,6 +133,10 @@ export class StrandcastHair extends THREE.Object3D {
         if (!this.isReady) this.ask({ offset: [0, 0, 1], target: [0, 0, 0], fov: 0.6 }, 640, 360); // nothing is seen yet
       }));
   }
+  /** There is something that no picture has shown. */
+  get isDirty(): boolean {
+    return this.prepared.length > 0 || (this.state !== undefined && !this.isBusy);
+  }
   private tell(message: ToPrepare): void {
     this.worker.postMessage(message);
   }
@@ -169,22 +174,30 @@ export class StrandcastHair extends THREE.Object3D {
   private upload(made: Prepared): void {
     const { uniforms } = this;
     uniforms.u_frame.value = frameOf(made.block);
-    if (made.points) uniforms.u_points.value = this.renewed(uniforms.u_points.value, made.points, POINTS_PER_ROW);
+    if (made.points) {
+      uniforms.u_points.value = this.renewed(uniforms.u_points.value, made.points.data, POINTS_PER_ROW);
+      uniforms.u_least_m.value = made.points.least;
+      uniforms.u_step_m.value = made.points.step;
+    }
+    if (made.strandOf) uniforms.u_strand_of.value = this.renewed(uniforms.u_strand_of.value, made.strandOf, POINTS_PER_ROW, 1);
     if (made.strands) uniforms.u_strands.value = this.renewed(uniforms.u_strands.value, made.strands, STRANDS_PER_ROW);
     for (const [i, depth] of (made.depths ?? []).entries()) {
       const uniform = [uniforms.u_key_depth, uniforms.u_rim_depth, uniforms.u_sky_depth][i]!;
-      uniform.value?.dispose();
+      const before = uniform.value as THREE.DataTexture | null;
+      if (before?.image.data.length === depth.data.length) {
+        before.image.data = depth.data;
+        before.needsUpdate = true;
+        continue;
+      }
+      before?.dispose();
       uniform.value = depthOf(depth);
     }
-    const index = this.strands.geometry.index!;
-    if (index.array.length === made.corners.length) {
-      (index as { array: unknown }).array = made.corners;
-      index.needsUpdate = true;
-    } else {
+    uniforms.u_order.value = this.renewed(uniforms.u_order.value, made.order, POINTS_PER_ROW, 1);
+    if (made.corners) {
       this.strands.geometry.dispose();
       this.strands.geometry = geometryOf(made.corners);
     }
-    this.strands.geometry.setDrawRange(0, made.cornerCount);
+    this.strands.geometry.setDrawRange(0, 6 * made.segmentCount);
     if (made.head && this.skin.visible) {
       this.skin.geometry.dispose();
       const geometry = (this.skin.geometry = geometryOf(made.head.triangles));
@@ -192,7 +205,7 @@ export class StrandcastHair extends THREE.Object3D {
         geometry.setAttribute(name, new THREE.BufferAttribute(data, width));
     }
   }
-  private renewed(texture: THREE.Texture | null, data: Float32Array, width: number): THREE.Texture {
+  private renewed(texture: THREE.Texture | null, data: Float32Array, width: number, parts = 4): THREE.Texture {
     const before = texture as THREE.DataTexture | null;
     if (before?.image.data.length === data.length) {
       before.image.data = data;
@@ -200,7 +213,7 @@ export class StrandcastHair extends THREE.Object3D {
       return before;
     }
     before?.dispose();
-    return textureOf(data, width, data.length / (4 * width));
+    return textureOf(data, width, data.length / (parts * width), parts === 4 ? THREE.RGBAFormat : THREE.RedFormat);
   }
 
   // ---- a picture
@@ -276,7 +289,7 @@ export class StrandcastHair extends THREE.Object3D {
     for (const end of this.ends.splice(0)) end();
     this.worker.terminate();
     this.target.dispose();
-    for (const { value } of Object.values(this.uniforms)) (value as { dispose?(): void } | undefined)?.dispose?.();
+    for (const { value } of Object.values(this.uniforms)) (value as { dispose?(): void } | null | undefined)?.dispose?.();
     for (const mesh of [this.strands, this.skin, this.over]) {
       mesh.geometry.dispose();
       (mesh.material as THREE.Material).dispose();
