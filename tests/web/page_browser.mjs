@@ -6,51 +6,14 @@ import { spawn, spawnSync } from 'node:child_process';
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import http from 'node:http';
-import os from 'node:os';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import zlib from 'node:zlib';
-import { Browser, sleep, whyNoBrowser } from './browser.mjs';
+import { sleep } from './browser.mjs';
+import { begin, program, runAll, Server, shots, SMALL, work } from './served.mjs';
 
-const [program, shots] = process.argv.slice(2);
-if (!program) {
-  console.error('usage: node page_browser.mjs strandcast-server [FOLDER]');
-  process.exit(2);
-}
-const missing = whyNoBrowser();
-if (missing) {
-  console.log(`skipped: ${missing}`);
-  process.exit(77);
-}
-const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-page-'));
 const SLIDERS = ['Quality', 'Length', 'Curl', 'Stiffness', 'Friction', 'Wind'];
-const SMALL = ['--set', 'groom.procedural.strand_count=400', '--set', 'groom.procedural.vertex_count=12'];
-
-class Server {
-  static async start(options = [], port = 0) {
-    const server = new Server();
-    server.log = '';
-    const portFile = path.join(work, `port${Math.random()}`);
-    server.child = spawn(program, ['--port', String(port), '--port-file', portFile, ...options], { stdio: ['ignore', 'ignore', 'pipe'] });
-    server.child.stderr.setEncoding('utf8').on('data', (text) => (server.log += text));
-    for (let i = 0; i < 600 && !(fs.existsSync(portFile) && fs.readFileSync(portFile, 'utf8').trim()); ++i) {
-      if (server.child.exitCode !== null) throw new Error(server.log);
-      await sleep(50);
-    }
-    if (!fs.existsSync(portFile)) {
-      server.child.kill('SIGKILL');
-      throw new Error(`the server did not start in time: ${server.log}`);
-    }
-    server.port = Number(fs.readFileSync(portFile, 'utf8'));
-    server.url = `http://127.0.0.1:${server.port}/`;
-    return server;
-  }
-  async end() {
-    if (this.child.exitCode !== null || this.child.signalCode !== null) return;
-    this.child.kill('SIGTERM');
-    await new Promise((done) => this.child.once('exit', done));
-  }
-}
+const { browser, server } = await begin();
 
 function get(url, headers = {}) {
   return new Promise((done, fail) => {
@@ -61,8 +24,6 @@ function get(url, headers = {}) {
   });
 }
 
-let browser;
-let server;
 const all = {
   async 'strands come, and every state has its hash'() {
     const tab = await browser.open(`${server.url}#mode=strands`, { seesWorkers: true });
@@ -332,27 +293,4 @@ const all = {
   },
 };
 
-const wanted = process.env.STRANDCAST_TEST ?? '';
-const tests = Object.fromEntries(Object.entries(all).filter(([name]) => name.includes(wanted)));
-let failed = 0;
-try {
-  if (shots) fs.mkdirSync(shots, { recursive: true });
-  browser = await Browser.start();
-  server = await Server.start(SMALL);
-  for (const [name, test] of Object.entries(tests)) {
-    const begin = Date.now();
-    try {
-      await test();
-      console.log(`passed: ${name} (${((Date.now() - begin) / 1000).toFixed(1)} s)`);
-    } catch (error) {
-      ++failed;
-      console.log(`FAILED: ${name}: ${error.stack}`);
-    }
-  }
-} finally {
-  await browser?.end();
-  await server?.end();
-  fs.rmSync(work, { recursive: true, force: true });
-}
-console.log(`${Object.keys(tests).length - failed} of ${Object.keys(tests).length} passed`);
-process.exit(failed ? 1 : 0);
+await runAll(all, browser, server);

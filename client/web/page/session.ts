@@ -17,6 +17,8 @@ const QUICK_PING_MS = 20;
 const PING_MS = 1000;
 const KEYFRAME_REQUEST_MS = 1000;
 const CAMERA_MS = 33;
+const WAKE_MS = 1000; // so long an answer may take after sleep
+const SLEPT_MS = 3000; // a timer that is so late has slept
 const REPORT_MS = 1000;
 const MOST_WAITING = 256; // messages for the core, which has not come yet
 const PICTURE_BITS: { [wish: string]: number } = {
@@ -51,6 +53,8 @@ class Net {
   private readonly policy = new ReconnectPolicy();
   private retry = 0;
   private openedMs = 0;
+  private lookedMs = Date.now();
+  private isHidden = false;
   private wasIn = false; // somebody said Welcome
   drawn = { drawMs: 0, shownHz: 0, device: 0 };
   private wantsState = false;
@@ -72,7 +76,23 @@ class Net {
     if (this.asked.drawsStrands && this.asked.mode !== Mode.frames) await this.coreAnswer;
     if (this.asked.codec && this.asked.codec !== 'tangent') await this.learnSteps();
     this.connect();
-    setInterval(() => this.connection?.report(), 500);
+    setInterval(() => this.look(), 500);
+  }
+  private look(): void {
+    if (Date.now() - this.lookedMs > SLEPT_MS) this.wake();
+    this.lookedMs = Date.now();
+    this.connection?.report();
+  }
+  /** After sleep a connection may be dead and not know it, and who waits to come back has waited long enough. */
+  private wake(): void {
+    if (!this.retry) return this.connection?.probe();
+    this.connect();
+  }
+  /** A page that keeps a connection is not kept itself for the way back. */
+  private rest(): void {
+    clearTimeout(this.retry);
+    this.retry = 0;
+    this.leave();
   }
   async setCore(module: WebAssembly.Module): Promise<void> {
     this.use(await Core.load(module));
@@ -121,19 +141,25 @@ class Net {
     });
     return true;
   }
+  get window(): { frame_width: number; frame_height: number; is_hidden: boolean } {
+    return { frame_width: this.asked.width, frame_height: this.asked.height, is_hidden: this.isHidden };
+  }
   reconnect(asked: Asked): void {
     this.asked = asked;
-    clearTimeout(this.retry);
-    if (this.socket) {
-      this.socket.onclose = undefined;
-      this.socket.drop(1000, '');
-      this.connection?.end();
-      this.connection = undefined; // whoever asks it for a state meanwhile gets none
-    }
+    this.leave();
     this.connect();
+  }
+  private leave(): void {
+    if (!this.socket) return;
+    this.socket.onclose = undefined;
+    this.socket.drop(1000, '');
+    this.connection?.end();
+    this.connection = undefined; // whoever asks it for a state meanwhile gets none
   }
 
   private connect(): void {
+    clearTimeout(this.retry);
+    this.retry = 0;
     post({ kind: 'state', state: 'connecting', reason: '', retryMs: 0 });
     const socket = new DistantSocket(this.sockets, this.asked.url, PROTOCOL);
     this.socket = socket;
@@ -179,6 +205,14 @@ class Net {
         return connection?.send({ mode_request: { mode: message.mode } });
       case 'camera':
         return connection?.lookFrom(message.camera);
+      case 'window':
+        this.asked = { ...this.asked, width: message.width, height: message.height };
+        this.isHidden = message.isHidden;
+        return connection?.tellWindow();
+      case 'wake':
+        return this.wake();
+      case 'rest':
+        return this.rest();
       case 'command':
         return connection?.send({ command: { command: message.command } });
       case 'set':
@@ -317,8 +351,7 @@ class Connection {
     try {
       take();
     } catch (error) {
-      this.goodbye ||= `the server sent what cannot be read: ${(error as Error).message}`;
-      this.socket.drop(GIVEN_UP_CODE, this.goodbye);
+      this.giveUp(`the server sent what cannot be read: ${(error as Error).message}`);
     }
   }
 
@@ -365,15 +398,30 @@ class Connection {
     post({ kind: 'state', state: 'open', reason: '', retryMs: 0 });
     this.ping();
     this.timers.push(self.setInterval(() => this.listen(), 500));
+    const { frame_width, frame_height, is_hidden } = this.net.window;
+    if (is_hidden || frame_width !== this.asked.width || frame_height !== this.asked.height) this.tellWindow();
+  }
+  tellWindow(): void {
+    if (this.welcome) this.send({ window: this.net.window });
+  }
+  /** Whether the server still answers. */
+  probe(): void {
+    if (!this.welcome) return; // it has its own patience
+    const sinceMs = this.lastReceivedMs;
+    this.send({ ping: { client_time_ns: nowNs() } });
+    this.timers.push(self.setTimeout(() => {
+      if (this.lastReceivedMs === sinceMs) this.giveUp('the server did not answer after this machine slept');
+    }, WAKE_MS));
+  }
+  private giveUp(why: string): void {
+    this.goodbye ||= why;
+    this.socket.drop(GIVEN_UP_CODE, this.goodbye);
   }
 
   /** A silent server is shown as away, and after IDLE_MS it is looked for anew. */
   private listen(): void {
     const silentMs = performance.now() - this.lastReceivedMs;
-    if (silentMs > IDLE_MS) {
-      this.goodbye ||= `nothing came from the server for ${IDLE_MS / 1000} s`;
-      return this.socket.drop(GIVEN_UP_CODE, this.goodbye);
-    }
+    if (silentMs > IDLE_MS) return this.giveUp(`nothing came from the server for ${IDLE_MS / 1000} s`);
     const isSilent = silentMs > SILENT_MS;
     if (isSilent === this.isSilent) return;
     this.isSilent = isSilent;
