@@ -174,6 +174,8 @@ async function main(host = '127.0.0.1', port = '7878', states = '10') {
   server.socket.destroy();
 }
 
+// Who reads what is printed may have had enough.
+process.stdout.on('error', (error) => process.exit(error.code === 'EPIPE' ? 0 : 1));
 main(...process.argv.slice(2)).catch((error) => {
   console.error(`join.mjs: ${error.message}`);
   process.exitCode = 1;

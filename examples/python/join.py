@@ -155,7 +155,11 @@ def main(host="127.0.0.1", port="7878", states="10"):
         elif message[0] in (KEYFRAME, DELTA):
             tick, state, tip = tip_of(message, strand=0)
             line = "tick {}: tip of strand 0 at {:.4f} {:.4f} {:.4f} m, state {:016x}"
-            print(line.format(tick, *tip, state), flush=True)
+            try:
+                print(line.format(tick, *tip, state), flush=True)
+            except BrokenPipeError:  # who reads this has had enough
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+                return
             left -= 1
 
 

@@ -63,6 +63,20 @@ std::string reason_for_frames(const ModeFacts& facts) {
                      frames.rate_hz);
 }
 
+/// Why the rates alone say something else than the choice; empty where they do not.
+std::string why_still(StreamMode chosen, const ModeFacts& facts, double gain) {
+  if (facts.device == DrawingDevice::None || !facts.paint_trouble.empty()) return {};
+  const ModePrediction strands = predict_strands(facts);
+  const ModePrediction frames = predict_frames(facts);
+  const bool is_frames = chosen == StreamMode::Frames;
+  if (is_frames && strands.worth() > frames.worth()) return "; strands come when that has lasted";
+  if (!is_frames && frames.worth() > gain * strands.worth()) return "; pictures come when that has lasted";
+  if (!is_frames && frames.worth() > strands.worth())
+    return fmt::format("; pictures would have to be worth {:g} times as much", gain);
+  if (is_frames ? frames.rate_hz >= strands.rate_hz : strands.rate_hz >= frames.rate_hz) return {};
+  return fmt::format("; strands are {:.0f} ms late, pictures {:.0f}", strands.latency_ms, frames.latency_ms);
+}
+
 std::string reason_for_strands(const ModeFacts& facts) {
   if (!facts.paint_trouble.empty())
     return fmt::format("strands: the server can draw no pictures: {}", facts.paint_trouble);
@@ -111,9 +125,11 @@ ModeChoice ModePolicy::choose(StreamMode present, const ModeFacts& facts, int64_
   const bool can_draw = facts.device != DrawingDevice::None;
   const bool can_paint = facts.paint_trouble.empty();
   const ModePrediction strands = predict_strands(facts);
+  const double gain = facts.is_paint_guessed ? kGuessedFramesGain : kFramesGain;
   const auto choice = [&](StreamMode mode) {
-    return ModeChoice{mode, mode == StreamMode::Frames ? reason_for_frames(facts) : reason_for_strands(facts),
-                      strands.strand_class};
+    const std::string reason =
+        mode == StreamMode::Frames ? reason_for_frames(facts) : reason_for_strands(facts);
+    return ModeChoice{mode, reason + why_still(mode, facts, gain), strands.strand_class};
   };
   // What is impossible waits for nothing, except for another try of what has just failed.
   const bool may_try = !has_failed_ || has_settled(time_ns);
@@ -121,7 +137,6 @@ ModeChoice ModePolicy::choose(StreamMode present, const ModeFacts& facts, int64_
   if (!can_draw) return choice(may_try ? StreamMode::Frames : present);
 
   const double frames_worth = predict_frames(facts).worth();
-  const double gain = facts.is_paint_guessed ? kGuessedFramesGain : kFramesGain;
   const bool is_other_better =
       present == StreamMode::Strands ? frames_worth > gain * strands.worth() : strands.worth() > frames_worth;
   if (!is_other_better) {

@@ -32,6 +32,16 @@ class Client:
         words = [*map(str, self.command), "127.0.0.1", str(port), str(states)]
         return subprocess.run(words, capture_output=True, text=True, timeout=60)
 
+    def trouble_without_reader(self, port):
+        """What it says when nobody reads its lines any more."""
+        words = [*map(str, self.command), "127.0.0.1", str(port), "200"]
+        process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process.stdout.readline()
+        process.stdout.close()
+        trouble = process.stderr.read()
+        process.wait(60)
+        return trouble
+
     def states(self, port, count):
         """(tick, hash) of so many states."""
         ended = self.run(port, count)
@@ -105,7 +115,9 @@ def check_a_real_server(client, program):
         states = client.states(port, 5)
         if any(a >= b for (a, _), (b, _) in zip(states, states[1:])):
             fail(f"ticks do not rise: {states}")
-    print("5 states of a real server")
+        if trouble := client.trouble_without_reader(port):
+            fail(f"nobody reads what it prints: {trouble}")
+    print("5 states of a real server, and a quiet end with who reads them")
     with Server(program, "--set", "stream.codec=tangent") as port:
         if client.language == "cpp":
             client.states(port, 5)

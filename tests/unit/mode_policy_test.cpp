@@ -152,6 +152,42 @@ TEST(ModePolicy, ChoosesByTheTable) {
   }
 }
 
+/// What a person is told next to the numbers, of a viewer that has just asked the server to choose.
+TEST(ModePolicy, AReasonSaysWhyItsNumbersDoNotDecide) {
+  const auto reason = [](StreamMode present, double draw_ms, double paint_ms, bool is_guessed = false) {
+    ModeFacts known = facts();
+    known.strand_draw_ms = draw_ms;
+    known.paint_ms = paint_ms;
+    known.is_paint_guessed = is_guessed;
+    ModePolicy policy;
+    const ModeChoice choice = policy.choose(present, known, kSInNs);
+    EXPECT_EQ(choice.mode, present) << "a wish must last";
+    return choice.reason;
+  };
+  // 2 Hz here, 0.6 Hz there.
+  EXPECT_THAT(reason(StreamMode::Frames, 500.0, 1666.7),
+              testing::EndsWith("2.0 pictures per second of these strands, the server 0.6; strands come when "
+                                "that has lasted"));
+  EXPECT_THAT(reason(StreamMode::Strands, 500.0, 20.0),
+              testing::EndsWith("; pictures come when that has lasted"));
+  // As in "between" above.
+  EXPECT_THAT(reason(StreamMode::Strands, 80.0, 20.0),
+              testing::EndsWith("; pictures would have to be worth 1.5 times as much"));
+  EXPECT_THAT(reason(StreamMode::Strands, 100.0, 20.0, true), testing::EndsWith("worth 8 times as much"));
+  // Where the numbers decide, nothing is added.
+  EXPECT_THAT(reason(StreamMode::Frames, 333.3, 20.0), testing::EndsWith("the server 15.0"));
+  EXPECT_THAT(reason(StreamMode::Strands, 20.0, 1666.7), testing::EndsWith("0.6 from the server"));
+  // More pictures, so late that they are worth less: 10 Hz at 100 ms against 10.5 Hz at 315 ms, nobody's
+  // limit.
+  ModeFacts late = facts();
+  late.strand_draw_ms = 100.0;
+  late.paint_ms = 95.0;
+  late.picture_bytes = 120e3;
+  late.capacity_bytes_per_s = link_of(1.5e6);
+  EXPECT_THAT(ModePolicy().choose(StreamMode::Strands, late, kSInNs).reason,
+              testing::ContainsRegex("strands are [0-9]+ ms late, pictures [0-9]+$"));
+}
+
 TEST(ModePolicy, AGlitchChangesNothing) {
   ModeFacts slow = facts();
   slow.strand_draw_ms = 500.0;

@@ -40,15 +40,15 @@ async function removeFolder(folder) {
 }
 
 export class Browser {
-  /** draws: 'mesa' (ANGLE on the system's OpenGL, llvmpipe where there is no GPU) or 'swiftshader'. */
-  static async start(draws = process.env.STRANDCAST_BROWSER_DRAWS ?? 'mesa') {
+  /** draws: 'mesa' (ANGLE on the system's OpenGL, llvmpipe where there is no GPU), 'swiftshader' or 'none'. */
+  static async start(draws = process.env.STRANDCAST_BROWSER_DRAWS ?? 'mesa', options = []) {
     const profile = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-browser-'));
-    const graphics = draws === 'mesa' ? ['--use-gl=angle', '--use-angle=gl-egl', '--ignore-gpu-blocklist'] : ['--enable-unsafe-swiftshader'];
+    const graphics = { mesa: ['--use-gl=angle', '--use-angle=gl-egl', '--ignore-gpu-blocklist'], swiftshader: ['--enable-unsafe-swiftshader'] }[draws] ?? [];
     const child = spawn(findChromium(), [
       '--headless=new', '--remote-debugging-pipe', `--user-data-dir=${profile}`, '--no-first-run', '--no-default-browser-check',
       '--disable-background-networking', '--disable-component-update', '--disable-extensions', '--disable-dev-shm-usage',
       '--hide-scrollbars', '--mute-audio', '--ignore-certificate-errors',
-      ...asRoot(), ...graphics, 'about:blank',
+      ...asRoot(), ...graphics, ...options, 'about:blank',
     ], { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
     return new Browser(child, profile);
   }
@@ -144,7 +144,7 @@ export class Tab {
   }
   async press(key) {
     const code = key.length === 1 ? `Key${key.toUpperCase()}` : key;
-    const text = key.length === 1 ? key : undefined;
+    const text = { Enter: '\r' }[key] ?? (key.length === 1 ? key : undefined);
     const windowsVirtualKeyCode = { ArrowLeft: 37, ArrowUp: 38, ArrowRight: 39, ArrowDown: 40, Enter: 13, Escape: 27, Tab: 9 }[key] ?? key.toUpperCase().charCodeAt(0);
     await this.send('Input.dispatchKeyEvent', { type: 'keyDown', key, code, text, windowsVirtualKeyCode });
     await this.send('Input.dispatchKeyEvent', { type: 'keyUp', key, code, windowsVirtualKeyCode });

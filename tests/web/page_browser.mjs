@@ -6,25 +6,15 @@ import { spawn, spawnSync } from 'node:child_process';
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import http from 'node:http';
-import os from 'node:os';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import zlib from 'node:zlib';
-import { Browser, sleep, whyNoBrowser } from './browser.mjs';
+import { sleep } from './browser.mjs';
+import { begin, program, runAll, shots, work } from './served.mjs';
 import { Server, SMALL } from './server.mjs';
 
-const [program, shots] = process.argv.slice(2);
-if (!program) {
-  console.error('usage: node page_browser.mjs strandcast-server [FOLDER]');
-  process.exit(2);
-}
-const missing = whyNoBrowser();
-if (missing) {
-  console.log(`skipped: ${missing}`);
-  process.exit(77);
-}
-const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-page-'));
 const SLIDERS = ['Quality', 'Length', 'Curl', 'Stiffness', 'Friction', 'Wind'];
+const { browser, server } = await begin();
 
 function get(url, headers = {}) {
   return new Promise((done, fail) => {
@@ -35,8 +25,6 @@ function get(url, headers = {}) {
   });
 }
 
-let browser;
-let server;
 const all = {
   async 'strands come, and every state has its hash'() {
     const tab = await browser.open(`${server.url}#mode=strands`, { seesWorkers: true });
@@ -306,27 +294,4 @@ const all = {
   },
 };
 
-const wanted = process.env.STRANDCAST_TEST ?? '';
-const tests = Object.fromEntries(Object.entries(all).filter(([name]) => name.includes(wanted)));
-let failed = 0;
-try {
-  if (shots) fs.mkdirSync(shots, { recursive: true });
-  browser = await Browser.start();
-  server = await Server.start(program, SMALL);
-  for (const [name, test] of Object.entries(tests)) {
-    const begin = Date.now();
-    try {
-      await test();
-      console.log(`passed: ${name} (${((Date.now() - begin) / 1000).toFixed(1)} s)`);
-    } catch (error) {
-      ++failed;
-      console.log(`FAILED: ${name}: ${error.stack}`);
-    }
-  }
-} finally {
-  await browser?.end();
-  await server?.end();
-  fs.rmSync(work, { recursive: true, force: true });
-}
-console.log(`${Object.keys(tests).length - failed} of ${Object.keys(tests).length} passed`);
-process.exit(failed ? 1 : 0);
+await runAll(all, browser, server);

@@ -16,6 +16,7 @@ import {
 const MOST_PICTURE_SIDE = 1280; // of pictures that the server draws for this window
 const SAMPLES = 4;
 const FILLS_WITHIN = 0.05; // of a window's shape
+const WINDOW_MS = 150; // between two sizes that the server hears of
 const QUIET_MS = 1500; // so long a picture may stand without a word about the connection
 
 // The token leaves the address before anything is asked for.
@@ -88,19 +89,19 @@ class Viewer {
   private pictureCount = 0;
   private isConnected = false;
   private sentCamera = '';
+  private windowTimer = 0;
   private retryAtMs = 0;
   private lostAtMs = 0; // 0 while connected
   private readonly panel: Panel;
 
   constructor() {
-    const size = wishes.size ?? this.pictureSize();
     this.canDraw = typeof OffscreenCanvas !== 'undefined' && 'transferControlToOffscreen' in strands;
     const scheme = location.protocol === 'https:' ? 'wss:' : 'ws:';
     const beside = location.pathname.replace(/[^/]*$/, ''); // behind a proxy a session has a folder of its own
     this.asked = {
       url: bundle ? TAPE_URL : `${scheme}//${location.host}${beside}v1`, token: wishes.token, mode: bundle ? Mode.strands : wishes.mode,
       codec: bundle?.codec ?? wishes.codec, head: wishes.head, pictures: wishes.pictures,
-      role: wishes.isViewOnly ? Role.viewer : Role.controller, ...size, drawsStrands: this.canDraw,
+      role: wishes.isViewOnly ? Role.viewer : Role.controller, ...this.pictureSize(), drawsStrands: this.canDraw,
     };
     const sockets = new MessageChannel();
     const { stepCore, wholeCore } = assets();
@@ -147,7 +148,7 @@ class Viewer {
       // What draws is found while the core still comes.
       const canvas = strands.transferControlToOffscreen();
       this.toDraw({ kind: 'start', canvas, wish: wishes.draw, samples: SAMPLES }, [canvas as unknown as Transferable]);
-      this.toDraw({ kind: 'visible', isVisible: this.shown !== Mode.frames });
+      this.tellVisible();
       this.toDraw({ kind: 'camera', camera: this.camera, isMoving: this.isHeld });
       if (this.look) this.showLook();
     } else {
@@ -224,7 +225,6 @@ class Viewer {
     this.welcome = welcome;
     this.reason = welcome.mode_reason;
     this.quality = undefined;
-    document.title = `${welcome.scene_name}: Strandcast`;
     at('simulation-tools').hidden = !this.isController;
     this.sceneLook(welcome.look, welcome.camera);
     this.panel.setRole(this.isController, this.shown !== Mode.frames);
@@ -234,6 +234,7 @@ class Viewer {
     if (this.panel.isOpen) this.panel.ask();
     this.sentCamera = '';
     this.lookFrom(this.camera);
+    if (wishes.codec && wishes.codec !== welcome.codec) warnings.say(`Not by the codec ${wishes.codec}: ${sentence(welcome.codec_reason)}`);
     const isFull = welcome.look?.methods && Object.values(welcome.look.methods).some((name) => name && name !== 'main');
     if (isFull) warnings.say('This look asks for ways to draw that only the server has: strands are drawn here by the usual ones.');
   }
@@ -264,8 +265,10 @@ class Viewer {
     const wasAway = !box.hidden;
     this.lostAtMs = state === 'open' ? 0 : this.lostAtMs || performance.now();
     box.hidden = state === 'open' || (state !== 'ended' && box.hidden && this.isQuiet());
-    at('trouble-title').textContent = state === 'silent' ? 'Not connected' : state === 'ended' ? `No connection to ${location.host}`
+    const title = at('trouble-title');
+    title.textContent = isTokenWanted ? 'Sign in' : state === 'silent' ? 'Not connected' : state === 'ended' ? `No connection to ${location.host}`
       : this.welcome ? `Connection to ${location.host} lost` : `Connecting to ${location.host}`;
+    title.dataset.short = isTokenWanted ? 'Sign in' : state === 'connecting' && !this.welcome ? 'Connecting' : 'Not connected';
     if (reason || state === 'open') at('trouble-why').textContent = sentence(reason);
     this.retryAtMs = state === 'waiting' ? performance.now() + retryMs : 0;
     at('trouble-next').textContent = state === 'connecting' ? 'Waiting for its answer.' : '';
@@ -309,7 +312,7 @@ class Viewer {
     const isFrames = this.shown === Mode.frames;
     pictures.hidden = !isFrames;
     strands.hidden = isFrames;
-    this.toDraw({ kind: 'visible', isVisible: !isFrames });
+    this.tellVisible();
     this.panel.setRole(this.isController, !isFrames);
     this.showHeads();
     this.sentCamera = '';
@@ -346,9 +349,26 @@ class Viewer {
   // ---- what a person does
 
   private pictureSize(): { width: number; height: number } {
+    if (wishes.size) return wishes.size;
     const ratio = Math.min(devicePixelRatio, MOST_PICTURE_SIDE / Math.max(innerWidth, innerHeight, 1));
     const side = (length: number): number => Math.max(64, Math.round((length * ratio) / 16) * 16);
     return { width: side(innerWidth), height: side(innerHeight) };
+  }
+  /** The server draws for this size, and nothing while nobody sees it. */
+  private tellWindow(): void {
+    clearTimeout(this.windowTimer);
+    this.windowTimer = 0;
+    Object.assign(this.asked, this.pictureSize());
+    this.toNet({ kind: 'window', width: this.asked.width, height: this.asked.height, isHidden: document.hidden });
+  }
+  private tellVisible(): void {
+    this.toDraw({ kind: 'visible', isVisible: this.shown !== Mode.frames && !document.hidden });
+  }
+  private followVisibility(): void {
+    this.tellVisible();
+    this.tellWindow();
+    if (!document.hidden) this.toNet({ kind: 'wake' });
+    this.tick();
   }
   private sendSize(): void {
     const ratio = Math.min(devicePixelRatio, 2);
@@ -402,12 +422,22 @@ class Viewer {
     this.panel.toggle();
     at('look').setAttribute('aria-expanded', String(this.panel.isOpen));
     if (this.panel.isOpen) at('panel').querySelector('button')?.focus();
-    else at('look').focus();
+    else this.focusTool('look');
+  }
+  /** Or the menu, where it holds the tools back. */
+  private focusTool(id: string): void {
+    at(id).focus();
+    if (document.activeElement !== at(id)) at('menu').focus();
   }
   private toggleKeys(): void {
     const keys = at('keys');
     keys.hidden = !keys.hidden;
     at('help').setAttribute('aria-expanded', String(!keys.hidden));
+    if (!keys.hidden) at('close-keys').focus();
+    else this.focusTool('help');
+  }
+  private toggleMenu(): void {
+    at('menu').setAttribute('aria-expanded', String(at('tools').classList.toggle('open')));
   }
   private shoot(): void {
     if (this.shown === Mode.frames) pictures.toBlob((blob) => blob && this.save(blob));
@@ -460,7 +490,8 @@ class Viewer {
     at('shot').addEventListener('click', () => this.shoot());
     at('link').addEventListener('click', () => void this.copyLink());
     at('look').addEventListener('click', () => this.togglePanel());
-    at('help').addEventListener('click', () => this.toggleKeys());
+    for (const id of ['help', 'close-keys']) at(id).addEventListener('click', () => this.toggleKeys());
+    at('menu').addEventListener('click', () => this.toggleMenu());
     at('try-now').addEventListener('click', () => this.toNet({ kind: 'reconnect', asked: this.asked }));
     at('token-form').addEventListener('submit', (event) => {
       event.preventDefault();
@@ -470,17 +501,31 @@ class Viewer {
       field.value = '';
       this.toNet({ kind: 'reconnect', asked: this.asked });
     });
-    new ResizeObserver(() => this.sendSize()).observe(stage);
+    new ResizeObserver(() => {
+      this.sendSize();
+      if (!this.isOwnCamera) this.lookFrom(fitted(this.home));
+      this.windowTimer ||= window.setTimeout(() => this.tellWindow(), WINDOW_MS);
+    }).observe(stage);
+    document.addEventListener('visibilitychange', () => this.followVisibility());
+    addEventListener('online', () => this.toNet({ kind: 'wake' }));
+    // The way back to a page is quick where the browser may keep it, and it keeps none with a connection.
+    addEventListener('pagehide', (event) => event.persisted && this.toNet({ kind: 'rest' }));
+    addEventListener('pageshow', (event) => event.persisted && this.toNet({ kind: 'reconnect', asked: this.asked }));
     addEventListener('keydown', (event) => this.key(event, moves));
   }
   private key(event: KeyboardEvent, moves: Parameters<typeof followKey>[1]): void {
     const target = event.target as HTMLElement;
-    if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test(target.tagName)) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || target.tagName === 'SELECT') return;
     if (event.key === 'Escape') {
       if (!at('keys').hidden) this.toggleKeys();
       else if (this.panel.isOpen) this.togglePanel();
+      else if (at('tools').classList.contains('open')) {
+        this.toggleMenu();
+        at('menu').focus();
+      }
       return;
     }
+    if (/^(INPUT|TEXTAREA)$/.test(target.tagName)) return;
     if (event.key === ' ' && target.tagName === 'BUTTON') return;
     if (followKey(event, moves)) return event.preventDefault();
     const actions: { [key: string]: () => void } = {
@@ -499,8 +544,15 @@ class Viewer {
 
   // ---- twice a second
 
+  /** Of the tab: what one wants to know who looks at another one. */
+  private title(): string {
+    const what = at('trouble').hidden ? (this.status?.is_paused ? 'Paused' : '') : at('trouble-title').dataset.short;
+    return [what, this.welcome?.scene_name, 'Strandcast'].filter(Boolean).join(': ');
+  }
   private tick(): void {
     const now = performance.now();
+    const title = this.title();
+    if (document.title !== title) document.title = title;
     if (this.lostAtMs && !this.isQuiet()) at('trouble').hidden = false;
     if (this.retryAtMs) {
       const seconds = Math.max(0, (this.retryAtMs - now) / 1000);
@@ -526,7 +578,7 @@ class Viewer {
   private tellTests(hz: number): void {
     document.documentElement.dataset.strandcast = JSON.stringify({
       isConnected: this.isConnected, mode: ['strands', 'pictures'][this.shown] ?? '', hz, camera: this.camera.offset,
-      states: this.figures?.decodedFrames ?? 0, pictures: this.pictureCount, codec: this.figures?.codec ?? '',
+      states: this.figures?.decodedFrames ?? 0, bytes: this.figures?.receivedBytes ?? 0, pictures: this.pictureCount, codec: this.figures?.codec ?? '',
       decodeMs: this.figures?.decodeMs ?? 0, wholeMs: this.drawFigures?.leastWholeMs ?? 0,
       hash_ok: !this.figures?.rejectedFrames, rejected: this.figures?.lastError ?? '', error: at('trouble').hidden ? '' : at('trouble-why').textContent,
     });

@@ -29,6 +29,7 @@ export interface CoreFunctions {
 
 /** Once for all workers; while it still comes. */
 export async function compileCore(url: string): Promise<WebAssembly.Module> {
+  if (typeof WebAssembly === 'undefined') throw new Error('this browser has no WebAssembly');
   const response = await fetch(url);
   if (!response.ok) throw new Error(`${url}: the server says ${response.status}`);
   return WebAssembly.compileStreaming(response);

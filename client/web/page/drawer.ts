@@ -18,6 +18,7 @@ const TOO_LONG = 1.25;
 const LEAVES_ROOM = 0.8;
 const COST = [1, 0.65, 0.35, 0.18, 0.1, 0.05];
 const STAND_MS = 200;
+const LOST_MS = 3000; // so long a graphics card may be away
 const SOFTWARE = /swiftshader|llvmpipe|lavapipe|softpipe|software|basic render/i;
 
 const post = (message: FromDraw, transfer: Transferable[] = []): void =>
@@ -37,7 +38,11 @@ interface Counts {
 interface Painter {
   readonly device: number;
   readonly drawnBy: string;
+  /** Whether its graphics card was taken away. */
+  readonly isLost: boolean;
   setPicture(picture: StrandPicture): void;
+  /** The same with everything made anew. */
+  again(): Painter;
   /** Resolves when the picture is there, or left because it is unwanted. */
   paint(picture: StrandPicture, camera: Camera, size: Size, share: number, isUnwanted?: () => Promise<boolean>): Promise<Counts | undefined>;
 }
@@ -45,8 +50,14 @@ interface Painter {
 class GlPainter implements Painter {
   private readonly strands: StrandGl;
   constructor(private readonly canvas: OffscreenCanvas, private readonly gl: WebGL2RenderingContext, readonly device: number,
-              readonly drawnBy: string, samples: number) {
+              readonly drawnBy: string, private readonly samples: number) {
     this.strands = new StrandGl(gl, samples);
+  }
+  get isLost(): boolean {
+    return this.gl.isContextLost();
+  }
+  again(): Painter {
+    return new GlPainter(this.canvas, this.gl, this.device, this.drawnBy, this.samples);
   }
   setPicture(picture: StrandPicture): void {
     this.strands.setHead(picture);
@@ -78,6 +89,7 @@ class GlPainter implements Painter {
 
 class TilePainter implements Painter {
   readonly device = Device.software;
+  readonly isLost = false;
   private readonly drawing: OffscreenCanvasRenderingContext2D;
   constructor(private readonly canvas: OffscreenCanvas, readonly drawnBy: string) {
     const drawing = canvas.getContext('2d', { alpha: false });
@@ -85,6 +97,9 @@ class TilePainter implements Painter {
     this.drawing = drawing;
   }
   setPicture(): void {}
+  again(): Painter {
+    return this;
+  }
   async paint(picture: StrandPicture, camera: Camera, size: Size, share: number, isUnwanted?: () => Promise<boolean>): Promise<Counts | undefined> {
     const rgba = await picture.draw(camera, size, share, isUnwanted);
     if (!rgba) return undefined;
@@ -153,12 +168,26 @@ class Drawer {
     this.canvas = message.canvas;
     const { painter, why } = choosePainter(message.canvas, message.wish, message.samples);
     this.painter = painter;
-    message.canvas.addEventListener('webglcontextlost', () => {
-      this.picture = undefined;
-      post({ kind: 'failed', reason: 'the graphics card was taken away' });
-    });
+    this.followCard(message.canvas);
     if (painter.device === Device.software) this.step = 2;
     post({ kind: 'ready', device: painter.device, drawnBy: painter.drawnBy, why });
+  }
+  /** It comes back after sleep or a fault of its driver, without anything that was on it. */
+  private followCard(canvas: OffscreenCanvas): void {
+    let patience = 0;
+    canvas.addEventListener('webglcontextlost', (event) => {
+      event.preventDefault();
+      patience = self.setTimeout(() => {
+        this.picture = undefined;
+        post({ kind: 'failed', reason: 'the graphics card was taken away' });
+      }, LOST_MS);
+    });
+    canvas.addEventListener('webglcontextrestored', () => {
+      clearTimeout(patience);
+      this.painter = this.painter.again();
+      if (this.picture) this.painter.setPicture(this.picture);
+      this.moved();
+    });
   }
   async begin(message: Extract<ToDraw, { kind: 'core' }>): Promise<void> {
     if (!this.painter) return; // said already
@@ -222,7 +251,7 @@ class Drawer {
   }
 
   private async turn(): Promise<void> {
-    if (this.isBusy || !this.picture || !this.hasState || !this.camera || !this.look) return;
+    if (this.isBusy || this.painter.isLost || !this.picture || !this.hasState || !this.camera || !this.look) return;
     const begin = performance.now();
     const isStanding = begin - Math.max(this.lastMovedMs, this.askedMs) > STAND_MS && !this.isCameraMoving;
     const step = isStanding || this.shotAsked ? 0 : this.step;
@@ -257,8 +286,10 @@ class Drawer {
         post({ kind: 'shot', blob });
       }
     } catch (error) {
-      post({ kind: 'failed', reason: (error as Error).message });
-      this.picture = undefined;
+      if (!this.painter.isLost) {
+        post({ kind: 'failed', reason: (error as Error).message });
+        this.picture = undefined;
+      }
     }
     this.isBusy = false;
     this.askNext();

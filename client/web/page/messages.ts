@@ -34,6 +34,9 @@ export type ToNet =
   | { kind: 'reconnect'; asked: Asked }
   | { kind: 'mode'; mode: number }
   | { kind: 'camera'; camera: Camera }
+  | { kind: 'window'; width: number; height: number; isHidden: boolean } // of the server's pictures; nobody sees it
+  | { kind: 'wake' } // it may have slept: is the server still there?
+  | { kind: 'rest' } // until the page is shown again
   | { kind: 'command'; command: number }
   | { kind: 'set'; assignment: string }
   | { kind: 'scene' }

@@ -17,7 +17,7 @@ function configOf(codec: string): VideoDecoderConfig {
 
 /** Bits of PictureCodec that this browser decodes here. */
 export async function decodablePictures(): Promise<number> {
-  let bits = 1 << PictureCodec.jpegTiles;
+  let bits = typeof OffscreenCanvas === 'undefined' ? 0 : 1 << PictureCodec.jpegTiles;
   if (typeof VideoDecoder === 'undefined') return bits;
   const can = async (codec: string): Promise<boolean> => {
     try {

@@ -17,6 +17,8 @@ const QUICK_PING_MS = 20;
 const PING_MS = 1000;
 const KEYFRAME_REQUEST_MS = 1000;
 const CAMERA_MS = 33;
+const WAKE_MS = 1000; // so long an answer may take after sleep
+const SLEPT_MS = 3000; // a timer that is so late has slept
 const REPORT_MS = 1000;
 const MOST_WAITING = 256; // messages for the core, which has not come yet
 const PICTURE_BITS: { [wish: string]: number } = {
@@ -56,6 +58,8 @@ export class Net {
   private patience = 0; // with a server that lets nobody in
   private reports = 0;
   private openedMs = 0;
+  private lookedMs = Date.now();
+  private isHidden = false;
   private wasIn = false; // somebody said Welcome
   drawn = { drawMs: 0, shownHz: 0, device: 0 };
   private wantsState = false;
@@ -79,11 +83,21 @@ export class Net {
     if (this.asked.drawsStrands && this.asked.mode !== Mode.frames) await this.coreAnswer;
     if (this.asked.codec && this.asked.codec !== 'tangent') await this.learnSteps();
     this.connect();
-    this.reports = setInterval(() => this.connection?.report(), 500);
+    this.reports = setInterval(() => this.look(), 500);
   }
   end(): void {
     clearInterval(this.reports);
     this.leave();
+  }
+  private look(): void {
+    if (Date.now() - this.lookedMs > SLEPT_MS) this.wake();
+    this.lookedMs = Date.now();
+    this.connection?.report();
+  }
+  /** After sleep a connection may be dead and not know it, and who waits to come back has waited long enough. */
+  private wake(): void {
+    if (!this.retry) return this.connection?.probe();
+    this.connect();
   }
   async setCore(module: WebAssembly.Module): Promise<void> {
     this.use(await Core.load(module));
@@ -132,6 +146,9 @@ export class Net {
     });
     return true;
   }
+  get window(): { frame_width: number; frame_height: number; is_hidden: boolean } {
+    return { frame_width: this.asked.width, frame_height: this.asked.height, is_hidden: this.isHidden };
+  }
   reconnect(asked: Asked): void {
     this.asked = asked;
     this.leave();
@@ -139,6 +156,7 @@ export class Net {
   }
   private leave(): void {
     clearTimeout(this.retry);
+    this.retry = 0;
     clearTimeout(this.patience);
     if (!this.socket) return;
     this.socket.onclose = undefined;
@@ -148,6 +166,8 @@ export class Net {
   }
 
   private connect(): void {
+    clearTimeout(this.retry);
+    this.retry = 0;
     this.post({ kind: 'state', state: 'connecting', reason: '', retryMs: 0 });
     const socket = this.around.openSocket(this.asked.url, PROTOCOL);
     this.socket = socket;
@@ -194,6 +214,14 @@ export class Net {
         return connection?.send({ mode_request: { mode: message.mode } });
       case 'camera':
         return connection?.lookFrom(message.camera);
+      case 'window':
+        this.asked = { ...this.asked, width: message.width, height: message.height };
+        this.isHidden = message.isHidden;
+        return connection?.tellWindow();
+      case 'wake':
+        return this.wake();
+      case 'rest':
+        return this.leave();
       case 'command':
         return connection?.send({ command: { command: message.command } });
       case 'set':
@@ -333,8 +361,7 @@ class Connection {
     try {
       take();
     } catch (error) {
-      this.goodbye ||= `the server sent what cannot be read: ${(error as Error).message}`;
-      this.socket.drop(GIVEN_UP_CODE, this.goodbye);
+      this.giveUp(`the server sent what cannot be read: ${(error as Error).message}`);
     }
   }
 
@@ -381,15 +408,30 @@ class Connection {
     this.net.post({ kind: 'state', state: 'open', reason: '', retryMs: 0 });
     this.ping();
     this.timers.push(setInterval(() => this.listen(), 500));
+    const { frame_width, frame_height, is_hidden } = this.net.window;
+    if (is_hidden || frame_width !== this.asked.width || frame_height !== this.asked.height) this.tellWindow();
+  }
+  tellWindow(): void {
+    if (this.welcome) this.send({ window: this.net.window });
+  }
+  /** Whether the server still answers. */
+  probe(): void {
+    if (!this.welcome) return; // it has its own patience
+    const sinceMs = this.lastReceivedMs;
+    this.send({ ping: { client_time_ns: nowNs() } });
+    this.timers.push(setTimeout(() => {
+      if (this.lastReceivedMs === sinceMs) this.giveUp('the server did not answer after this machine slept');
+    }, WAKE_MS));
+  }
+  private giveUp(why: string): void {
+    this.goodbye ||= why;
+    this.socket.drop(GIVEN_UP_CODE, this.goodbye);
   }
 
   /** A silent server is shown as away, and after IDLE_MS it is looked for anew. */
   private listen(): void {
     const silentMs = performance.now() - this.lastReceivedMs;
-    if (silentMs > IDLE_MS) {
-      this.goodbye ||= `nothing came from the server for ${IDLE_MS / 1000} s`;
-      return this.socket.drop(GIVEN_UP_CODE, this.goodbye);
-    }
+    if (silentMs > IDLE_MS) return this.giveUp(`nothing came from the server for ${IDLE_MS / 1000} s`);
     const isSilent = silentMs > SILENT_MS;
     if (isSilent === this.isSilent) return;
     this.isSilent = isSilent;

@@ -73,6 +73,10 @@ export const presets: readonly Preset[] = [
   { name: 'near', from: (home) => zoom(home, 6) },
 ];
 
+interface Point {
+  x: number; // pixels
+  y: number;
+}
 interface Moves {
   change(move: (camera: Camera) => Camera): void;
   /** Fingers or buttons went down or up. */
@@ -81,7 +85,7 @@ interface Moves {
 
 /** Mouse, touch and keys over `stage`. */
 export function followPointers(stage: HTMLElement, moves: Moves): void {
-  const pointers = new Map<number, { x: number; y: number }>();
+  const pointers = new Map<number, Point>();
   stage.addEventListener('contextmenu', (event) => event.preventDefault());
   stage.addEventListener('pointerdown', (event) => {
     stage.setPointerCapture(event.pointerId);
@@ -89,25 +93,34 @@ export function followPointers(stage: HTMLElement, moves: Moves): void {
     stage.classList.add('dragging');
     moves.hold(true);
   });
-  const end = (event: PointerEvent): void => {
-    pointers.delete(event.pointerId);
-    if (pointers.size) return;
+  const rest = (): void => {
+    if (pointers.size || !stage.classList.contains('dragging')) return;
     stage.classList.remove('dragging');
     moves.hold(false);
   };
-  stage.addEventListener('pointerup', end);
-  stage.addEventListener('pointercancel', end);
+  const end = (event: PointerEvent): void => {
+    pointers.delete(event.pointerId);
+    rest();
+  };
+  for (const kind of ['pointerup', 'pointercancel', 'lostpointercapture'] as const) stage.addEventListener(kind, end);
+  addEventListener('blur', () => {
+    pointers.clear();
+    rest();
+  });
   stage.addEventListener('pointermove', (event) => {
     const before = pointers.get(event.pointerId);
     if (!before) return;
+    if (!event.buttons) return end(event); // let go of somewhere else
     const now = { x: event.clientX, y: event.clientY };
     const x = (now.x - before.x) / stage.clientHeight;
     const y = (now.y - before.y) / stage.clientHeight;
     const other = [...pointers].find(([id]) => id !== event.pointerId)?.[1];
     pointers.set(event.pointerId, now);
     if (other) {
-      const ratio = Math.hypot(now.x - other.x, now.y - other.y) / Math.max(Math.hypot(before.x - other.x, before.y - other.y), 1);
-      moves.change((camera) => zoom(pan(camera, x / 2, y / 2), -Math.log(ratio) / Math.log(ZOOM_PER_STEP)));
+      const [was, is] = [before, now].map((at) => ({ x: at.x - other.x, y: at.y - other.y })) as [Point, Point];
+      const ratio = Math.hypot(is.x, is.y) / Math.max(Math.hypot(was.x, was.y), 1);
+      const twist = Math.atan2(was.x * is.y - was.y * is.x, was.x * is.x + was.y * is.y);
+      moves.change((camera) => orbit(zoom(pan(camera, x / 2, y / 2), -Math.log(ratio) / Math.log(ZOOM_PER_STEP)), twist / RAD_PER_HEIGHT, 0));
     } else if (event.buttons & 6 || event.shiftKey) moves.change((camera) => pan(camera, x, y));
     else moves.change((camera) => orbit(camera, x, y));
   });
