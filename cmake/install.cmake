@@ -10,6 +10,7 @@ install(TARGETS strandcast-view COMPONENT viewer)
 install(TARGETS strandcast-ctl strandcast-report strandcast-load COMPONENT tools)
 install(DIRECTORY deploy/scenes DESTINATION ${CMAKE_INSTALL_DATADIR}/strandcast COMPONENT server)
 install(DIRECTORY deploy/scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/strandcast COMPONENT tools)
+install(DIRECTORY server/report/truth DESTINATION ${CMAKE_INSTALL_DATADIR}/strandcast COMPONENT tools)
 
 # strandcast-ctl fleet and grid start them.
 install(PROGRAMS deploy/fleet/strandcast-fleet deploy/fleet/strandcast-grid DESTINATION lib/strandcast COMPONENT tools)

@@ -79,7 +79,8 @@ void declare_export(CLI::App& app, ExportCommand& command) {
   app.add_flag(
       "--drawn", command.is_drawn,
       "Strands as viewers draw them, with followers, style and taper, instead of the simulated ones");
-  app.add_flag("--head", command.has_head, "The head, too, as a mesh (.usda, .abc, .ply)");
+  app.add_flag("--head", command.has_head,
+               "The head, too, as a mesh with its neck at rest (.usda, .abc, .ply)");
   const auto seconds = without_nan(CLI::Range(0.0, kMostSeconds));
   app.add_option("--from", command.from_s, "Begin so many seconds after the first state")->check(seconds);
   app.add_option("--to", command.to_s, "End so many seconds after the first state")->check(seconds);

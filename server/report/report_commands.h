@@ -34,6 +34,7 @@ using AddReportCommand = void (*)(CLI::App& app, ReportAction& action);
 void add_work_precision_command(CLI::App& app, ReportAction& action);
 void add_coherence_command(CLI::App& app, ReportAction& action);
 void add_collisions_command(CLI::App& app, ReportAction& action);
+void add_pictures_command(CLI::App& app, ReportAction& action);
 void add_pruning_command(CLI::App& app, ReportAction& action);
 void add_recommend_command(CLI::App& app, ReportAction& action);
 void add_rendering_command(CLI::App& app, ReportAction& action);

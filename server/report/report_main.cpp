@@ -17,9 +17,9 @@ constexpr int kExitBadInput = 2;
 constexpr int kExitFailure = 1;
 
 constexpr AddReportCommand kCommands[] = {
-    add_work_precision_command, add_coherence_command, add_collisions_command, add_pruning_command,
-    add_recommend_command,      add_rendering_command, add_scalp_command,      add_stability_command,
-    add_streaming_command,      add_volume_command};
+    add_work_precision_command, add_coherence_command, add_collisions_command, add_pictures_command,
+    add_pruning_command,        add_recommend_command, add_rendering_command,  add_scalp_command,
+    add_stability_command,      add_streaming_command, add_volume_command};
 
 int run(int argc, const char* const* argv) {
   CLI::App app("Measures strand models and strand codecs.", "strandcast-report");

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/report/collision_study.h"
+#include "server/report/pictures_study.h"
 #include "server/report/pruning.h"
 #include "server/report/recommend.h"
 #include "server/report/rendering.h"
@@ -37,6 +38,13 @@ struct CollisionOptions {
   ExecutorConfig device;
   CollisionStudyDesc desc;  // all but its scene
   bool is_quick = false;
+};
+
+struct PicturesOptions {
+  std::filesystem::path scene_path;
+  std::vector<std::string> overrides;
+  std::filesystem::path out;
+  PicturesDesc desc;  // all but its scratch folder and script
 };
 
 struct PruningOptions {
@@ -82,6 +90,8 @@ struct VolumeReportOptions {
 void declare_coherence(CLI::App& command, CoherenceOptions& options);
 /// Adds the options of strandcast-report collisions.
 void declare_collisions(CLI::App& command, CollisionOptions& options);
+/// Adds the options of strandcast-report pictures.
+void declare_pictures(CLI::App& command, PicturesOptions& options);
 /// Adds the options of strandcast-report pruning.
 void declare_pruning(CLI::App& command, PruningOptions& options);
 /// Adds the options of strandcast-report recommend.

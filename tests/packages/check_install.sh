@@ -19,7 +19,7 @@ for file in share/strandcast/scenes/default.textproto share/strandcast/scenarios
   share/doc/strandcast-doc/examples/python/join.py share/doc/strandcast-doc/conformance/vectors/asset_1.txt \
   share/doc/strandcast-doc/proto/strandcast/v1/session.proto \
   share/strandcast/proto/strandcast/v1/session.proto share/icons/hicolor/scalable/apps/strandcast.svg \
-  lib/strandcast/strandcast-fleet share/mime/packages/strandcast.xml lib/systemd/system/strandcast-server.socket; do
+  share/strandcast/truth/cycles.py lib/strandcast/strandcast-fleet share/mime/packages/strandcast.xml lib/systemd/system/strandcast-server.socket; do
   [ -s "$root/$file" ] || fail "$file is not installed"
 done
 for program in server view ctl report load; do

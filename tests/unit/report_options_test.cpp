@@ -28,6 +28,16 @@ inline void tell(FieldTexts& told, const std::string& where, const CollisionStud
 inline void tell(FieldTexts& told, const std::string& where, const CollisionOptions& all) {
   OPTION_FIELDS(all, scene_path, overrides, out, device, desc, is_quick);
 }
+inline void tell(FieldTexts& told, const std::string& where, const CyclesSettings& all) {
+  OPTION_FIELDS(all, program, script, samples, threads);
+}
+inline void tell(FieldTexts& told, const std::string& where, const PicturesDesc& all) {
+  OPTION_FIELDS(all, truths, scratch, scene, only, rounds, has_methods, has_blender, is_keeping, cycles,
+                gl_device, on_progress);
+}
+inline void tell(FieldTexts& told, const std::string& where, const PicturesOptions& all) {
+  OPTION_FIELDS(all, scene_path, overrides, out, desc);
+}
 inline void tell(FieldTexts& told, const std::string& where, const PruningOptions& all) {
   OPTION_FIELDS(all, scenes, only, shares, out, device, steps, has_pictures);
 }
@@ -147,6 +157,24 @@ TEST(ReportOptionTable, OfCollisions) {
                         {"--no-pictures", {}, {{"desc.has_pictures", "false"}}}},
                        motion_file_rows("desc.clip_options"),
                        device_rows("lanes")}),
+               kOut);
+}
+
+TEST(ReportOptionTable, OfPictures) {
+  expect_table(declare_pictures,
+               {kScene,
+                kSet,
+                {"--only", {"a", "--only", "b"}, {{"desc.only", "a b"}}},
+                {"--methods", {}, {{"desc.has_methods", "true"}}},
+                {"--truths", {"t"}, {{"desc.truths", "t"}}},
+                {"--blender", {}, {{"desc.has_blender", "true"}}},
+                {"--blender-program", {"b"}, {{"desc.cycles.program", "b"}}},
+                {"--samples", {"17"}, {{"desc.cycles.samples", "17"}}},
+                {"--threads", {"7"}, {{"desc.cycles.threads", "7"}}},
+                {"--keep", {}, {{"desc.is_keeping", "true"}}},
+                {"--rounds", {"7"}, {{"desc.rounds", "7"}}},
+                {"--gpu", {"software"}, {{"desc.gl_device", "software"}}},
+                {"--gl-device", {"software"}, {{"desc.gl_device", "software"}}}},
                kOut);
 }
 
