@@ -1,7 +1,7 @@
-// Light that a strand sends to the eye. The lobes are the fits of Karis 2016 (Physically based hair shading in Unreal) to
-// Marschner et al. 2003: R from the surface, TT through the strand, TRT back from its far side; the light that comes
-// through other strands falls more slowly than the direct light. No inverse trigonometry, no branches: also compiled
-// for the CPU, over lanes (common/simd). Directions are unit vectors away from the strand.
+// Light that a strand sends to the eye: R from its surface, TT through it, TRT back from its far side, with the shapes of
+// Karis 2016 (Physically based hair shading in Unreal) and the energy of Chiang et al. 2016 for its colour; and light that
+// other strands sent on (Zinke et al. 2008). No inverse trigonometry, no branches: also compiled for the CPU, over lanes
+// (common/simd). Directions are unit vectors away from the strand.
 #pragma once
 #include "lib/hash.glsl"
 #include "lib/select.glsl"
@@ -68,87 +68,149 @@ LAW HairStrand hair_strand(uint strand, uint lock, HairLook look) {
 
 LAW vec3 hair_color(HairLook look, HairStrand hair, float along) {
   const float kDarkRoots = 0.25;  // of the length
+  const float kRootShare = 0.3;   // of the darkening; shadow does the rest
   float blend = along * along * (3.0 - 2.0 * along);
-  float dark = 1.0 - look.root_darkening * (1.0 - min(along / kDarkRoots, 1.0));
-  // Water between the scales takes light out (Jensen et al. 1999): wet hair is darker and fuller in colour.
-  float wet = 1.0 - 0.45 * look.wetness;
-  vec3 color = mix(look.root_color, look.tip_color, blend) * (hair.brightness * dark * wet);
+  float dark = 1.0 - kRootShare * look.root_darkening * (1.0 - min(along / kDarkRoots, 1.0));
+  vec3 color = mix(look.root_color, look.tip_color, blend) * (hair.brightness * dark);
   return clamp(color * vec3(1.0 + hair.warmth, 1.0, 1.0 - hair.warmth), 0.0, 1.0);
 }
 
-// Light of one lamp that leaves towards the eye, per unit of light: direct terms only.
-LAW vec3 hair_lobes(HairLook look, float tilt, vec3 color, vec3 tangent, vec3 to_light, vec3 to_eye) {
-  const float kNorm = 0.39894228;       // of a unit Gaussian
-  const float kFresnel = 0.0465;        // at normal incidence, index 1.55
+// What a strand does with the light that falls on it, by its colour.
+struct StrandShares {
+  vec3 through;   // TT
+  vec3 returned;  // TRT
+  vec3 backward;  // all that goes back to where it came from
+  vec3 around;    // comes back from the strands behind, after any number of ways
+};
+
+LAW StrandShares strand_shares(vec3 color, float wetness) {
+  // Absorption from colour as Chiang et al. 2016 have it for azimuthal roughness 0.3. The exponent makes the shares those
+  // of their fibre; light that is returned has gone through twice.
+  const float kPerLog2 = 0.69314718 / 5.8884;
+  const float kAbsorbed = 1.87;
+  const float kThrough = 0.85;
+  const float kReturned = 0.067;
+  // Under water the index changes by 1.165 instead of 1.55: less is reflected within and at the surface (Fresnel).
+  const float kReturnedWet = 0.2;
+  const float kSurface = 0.050;
+  const float kSurfaceWet = 0.022;
+  const float kLeastColor = 1e-3;
+  vec3 least = max(color, vec3(kLeastColor));
+  vec3 root = kPerLog2 * vec3(log2(least.x), log2(least.y), log2(least.z));
+  vec3 passed = exp(-kAbsorbed * root * root);
+  StrandShares shares;
+  shares.through = kThrough * passed;
+  shares.returned = (kReturned * mix(1.0, kReturnedWet, wetness)) * passed * passed;
+  shares.backward = shares.returned + vec3(mix(kSurface, kSurfaceWet, wetness));
+  // Zinke et al. 2008, equations 13 to 15: one and three ways back.
+  vec3 twice = shares.through * shares.through;
+  vec3 lost = vec3(1.0) / (vec3(1.0) - twice);
+  vec3 once = shares.backward * twice * lost;
+  vec3 turned = shares.backward * lost;
+  shares.around = once * (vec3(1.0) + turned * turned);
+  return shares;
+}
+
+// How a strand lies between light and eye.
+struct StrandAngles {
+  float sum;      // of the sines of both inclinations
+  float cos_in;   // of the light's inclination
+  float cos_phi;  // of the azimuth between both
+  float facing;   // 0 away from the light .. 1 towards it, across the strand
+};
+
+LAW StrandAngles strand_angles(vec3 tangent, vec3 to_light, vec3 to_eye) {
   float sin_in = clamp(dot(tangent, to_light), -1.0, 1.0);
   float sin_out = clamp(dot(tangent, to_eye), -1.0, 1.0);
-  float cos_in = sqrt(max(1.0 - sin_in * sin_in, 1e-4));
+  StrandAngles angles;
+  angles.sum = sin_in + sin_out;
+  angles.cos_in = sqrt(max(1.0 - sin_in * sin_in, 1e-4));
   float cos_out = sqrt(max(1.0 - sin_out * sin_out, 1e-4));
-  float cos_phi = clamp((dot(to_light, to_eye) - sin_in * sin_out) / (cos_in * cos_out), -1.0, 1.0);
-  float cos_half = sqrt(max(0.5 + 0.5 * cos_phi, 0.0));
+  float across = dot(to_light, to_eye) - sin_in * sin_out;
+  angles.cos_phi = clamp(across / (angles.cos_in * cos_out), -1.0, 1.0);
+  angles.facing = 0.5 + 0.5 * across / cos_out;
+  return angles;
+}
 
-  // Longitudinal: Gaussians of the sum of sines, shifted by the tilt of the scales (Karis 2016).
-  float dry = 1.0 - 0.5 * look.wetness;
-  float width_r = 2.0 * look.width * dry;
-  float width_tt = 0.5 * width_r;
-  float width_trt = 2.0 * width_r;
-  float sum = sin_in + sin_out;
-  float r = (sum + 2.0 * tilt) / width_r;
-  float tt = (sum - tilt) / width_tt;
-  float trt = (sum - 4.0 * tilt) / width_trt;
-  float m_r = exp(-0.5 * r * r) * kNorm / width_r;
-  float m_tt = exp(-0.5 * tt * tt) * kNorm / width_tt;
-  float m_trt = exp(-0.5 * trt * trt) * kNorm / width_trt;
+// Of a Gaussian of area 1.
+LAW float longitudinal(float x, float width) {
+  const float kNorm = 0.39894228;
+  float steps = x / width;
+  return exp(-0.5 * steps * steps) * kNorm / width;
+}
 
-  // Azimuthal.
-  float graze = 1.0 - sqrt(clamp(0.5 + 0.5 * dot(to_light, to_eye), 0.0, 1.0));
-  float graze2 = graze * graze;
-  float n_r = 0.25 * cos_half * (kFresnel + (1.0 - kFresnel) * graze2 * graze2 * graze);
-  float n_tt = exp(-3.65 * cos_phi - 3.98);
-  float n_trt = exp(17.0 * cos_phi - 16.78) + 0.12 * cos_half;
-
-  // R keeps the light's colour; TT and TRT went through the strand once and twice.
+// Light of one lamp that leaves towards the eye, per unit of light. Where all weights of the look are 1, no more leaves in
+// all directions than came.
+LAW vec3 hair_lobes(HairLook look, float tilt, StrandShares shares, StrandAngles angles, float cos_light_eye) {
   const float kPi = 3.14159265;
-  const float kBright = 2.2;      // by eye, beside the diffuse term
-  const float kTrtShare = 0.35;
-  float sharp = 1.0 + look.wetness;
-  float highlight = kBright * kPi * sharp * look.highlight * m_r * n_r;
-  vec3 through = sqrt(color);
-  float transmitted = kBright * look.transmission * m_tt * n_tt;
-  float second = kBright * kTrtShare * kPi * look.second_highlight * m_trt * n_trt;
-  // Between the fibre's own facing and that of the tuft it lies in.
-  vec3 across = to_eye - tangent * sin_out;
-  float facing = 0.5 + 0.5 * dot(across, to_light) / cos_out;
-  float diffuse = look.diffuse * (1.0 - 0.5 * look.wetness) * (0.55 * cos_in + 0.45 * facing);
-  return vec3(highlight) + through * transmitted + color * (second + diffuse);
+  // Longitudinal: Gaussians of the sum of sines, shifted by the tilt of the scales (Karis 2016).
+  float width = 2.0 * look.width * (1.0 - 0.5 * look.wetness);
+  float m_r = longitudinal(angles.sum + 2.0 * tilt, width);
+  float m_tt = longitudinal(angles.sum - tilt, 0.5 * width);
+  float m_trt = longitudinal(angles.sum - 4.0 * tilt, 2.0 * width);
+
+  // Azimuthal; those of TT and TRT have area 1.
+  const float kFresnel = 0.0465;     // at normal incidence, index 1.55
+  const float kFresnelWet = 0.0201;  // of water's surface, index 1.33
+  const float kMirror = 0.30;        // 1/4, and what wide lobes lose at their ends
+  float fresnel = mix(kFresnel, kFresnelWet, look.wetness);
+  float graze = 1.0 - sqrt(clamp(0.5 + 0.5 * cos_light_eye, 0.0, 1.0));
+  float graze2 = graze * graze;
+  float n_r = kMirror * sqrt(max(0.5 + 0.5 * angles.cos_phi, 0.0)) * (fresnel + (1.0 - fresnel) * graze2 * graze2 * graze);
+  float n_tt = exp(-3.65 * angles.cos_phi - 3.98);
+  float n_trt = exp(11.5 * angles.cos_phi - 11.209);
+
+  // Gaussians of sines give back more than comes in along the strand.
+  float energy = angles.cos_in * inversesqrt(0.22 + 0.75 * angles.cos_in * angles.cos_in);
+  return (kPi * energy) * (vec3(look.highlight * m_r * n_r) + shares.through * (look.transmission * m_tt * n_tt) +
+                           shares.returned * (look.second_highlight * m_trt * n_trt));
+}
+
+// Likewise, with what comes to the strand through others. `depth`: as the lattices have it.
+LAW vec3 hair_lit(HairLook look, float tilt, StrandShares shares, vec3 tangent, vec3 to_light, vec3 to_eye, float depth) {
+  const float kCrossedPerDepth = 1.25;
+  // Of scattered light: how wide its lobe is at the surface and how it widens on its way, and what goes on and comes back.
+  const float kWide2 = 0.04;
+  const float kWiden2 = 0.76;
+  const float kMostCrossed = 8.0;
+  const float kOnward = 1.95;
+  const float kBack = 9.3;
+  StrandAngles angles = strand_angles(tangent, to_light, to_eye);
+  float crossed = kCrossedPerDepth * depth;
+  float direct = exp(-crossed);
+  // Each strand passed on the way has let through its share, colour by colour.
+  vec3 indirect = max(exp(-crossed * (vec3(1.0) - shares.through)) - vec3(direct), vec3(0.0));
+  vec3 around = shares.around * (look.diffuse * 2.0 * angles.facing * angles.cos_in);
+  float m = longitudinal(angles.sum - tilt, sqrt(kWide2 + kWiden2 * min(crossed, kMostCrossed)));
+  float back = 0.5 + 0.5 * angles.cos_phi;
+  vec3 spread = (look.scatter * m) * (shares.through * (kOnward * (1.0 - back)) + shares.backward * (kBack * back));
+  return direct * (hair_lobes(look, tilt, shares, angles, dot(to_light, to_eye)) + around) + indirect * (spread + around);
 }
 
 // Of all that reaches a point of a strand.
 LAW vec3 hair_radiance(HairLook look, HairStrand hair, HairLights lights, LightDepth depth, float along, vec3 tangent,
                    vec3 to_eye) {
-  // Light scattered forward by other strands goes on: its depth counts less, and never all is lost (Zinke et al. 2008
-  // give the reason; the numbers are by eye, against pictures of 96^3 volumes).
-  const float kScatterReach = 0.28;
-  const float kScatterFloor = 0.05;
-  const float kSkyReach = 0.14;
-  const float kSkyFloor = 0.15;
-  const float kGroundLight = 0.35;
-  const float kSkySheen = 0.06;  // what the surfaces of strands send on of the sky, in its own colour
+  const float kRimShare = 0.80;  // of its depth: its lattice is coarse
+  const float kGroundLight = 0.52;
+  const float kSkyReach = 0.55;
+  // Of the sky: hair's colour, brighter where it is dark, and a sheen in the sky's own colour.
+  const float kSkyColor = 2.5;
+  const float kSkyFull = 1.5;
+  const float kSkyWet = 0.55;
+  const float kSkySheen = 0.18;
+  const float kSheenReach = 0.48;
   vec3 color = hair_color(look, hair, along);
+  StrandShares shares = strand_shares(color, look.wetness);
   float tilt = look.tilt + hair.tilt;
-  vec3 scattered_color = color * sqrt(color) * look.scatter;
-
-  vec3 key = exp(-depth.key) * hair_lobes(look, tilt, color, tangent, lights.to_key, to_eye) +
-             mix(kScatterFloor, 1.0, exp(-kScatterReach * depth.key)) * scattered_color;
+  vec3 key = hair_lit(look, tilt, shares, tangent, lights.to_key, to_eye, depth.key);
   vec3 rim = vec3(0.0);
-  if (lights.has_rim)
-    rim = exp(-depth.rim) * hair_lobes(look, tilt, color, tangent, lights.to_rim, to_eye) +
-          mix(kScatterFloor, 1.0, exp(-kScatterReach * depth.rim)) * scattered_color;
+  if (lights.has_rim) rim = hair_lit(look, tilt, shares, tangent, lights.to_rim, to_eye, kRimShare * depth.rim);
   vec3 across = to_eye - tangent * dot(tangent, to_eye);
   float facing = 0.5 + 0.5 * dot(across, lights.up);
-  float open_sky = mix(kSkyFloor, 1.0, exp(-kSkyReach * depth.sky));
-  float sky = lights.ambient * mix(kGroundLight, 1.0, facing) * open_sky;
-  return lights.key_color * key + lights.rim_color * rim + (color + vec3(kSkySheen)) * sky;
+  vec3 body = (kSkyColor * mix(1.0, kSkyWet, look.wetness)) * color / (vec3(1.0) + kSkyFull * color);
+  vec3 sky = exp(-(kSkyReach * depth.sky) * (vec3(1.0) - shares.through)) * body +
+             (kSkySheen * exp(-kSheenReach * depth.sky)) * (vec3(1.0) - color);
+  return lights.key_color * key + lights.rim_color * rim + (lights.ambient * mix(kGroundLight, 1.0, facing)) * sky;
 }
 
 // How much of its width a strand covers at `along`: it comes out of the skin over its first part and fades out over its
