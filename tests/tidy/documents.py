@@ -24,7 +24,7 @@ LONG_WORDS, LONG_SENTENCES = 40, 5
 WORDS = ["what is told", "whoever", "likewise", "so many", "as they are", "behind"]
 MAX_INVARIANTS = 25
 # What commands name besides our own programs and scripts.
-OTHER_PROGRAMS = {"apt", "cd", "chmod", "cmake", "cpack", "ctest", "export", "openssl", "podman", "systemctl"}
+OTHER_PROGRAMS = {"apt", "cd", "chmod", "cmake", "cpack", "ctest", "export", "npm", "openssl", "podman", "systemctl"}
 SCRIPTS = ["deploy/run.sh", "deploy/fleet/strandcast-fleet", "deploy/fleet/strandcast-grid", "tests/nightly.sh"]
 PROGRAMS = ["server", "view", "ctl", "report", "load", "chaos"]
 # Options in prose that are others' or a bench's own.
