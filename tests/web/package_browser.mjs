@@ -55,6 +55,21 @@ const PAGES = {
     scene.add(hair);
     const { camera: { offset, target, fov } } = await connection.opened;
     const camera = new THREE.PerspectiveCamera(fov * 180 / Math.PI, innerWidth / innerHeight, 0.05, 20);
+    // How many colours a wall before the left half has.
+    window.wall = (opacity) => {
+      const wall = new THREE.Mesh(new THREE.PlaneGeometry(1, 2), new THREE.MeshBasicMaterial({ color: 0xff0000, opacity, transparent: opacity < 1 }));
+      wall.quaternion.copy(camera.quaternion);
+      wall.position.copy(camera.position).add(new THREE.Vector3(-0.5, 0, -0.3).applyQuaternion(camera.quaternion));
+      scene.add(wall);
+      renderer.render(scene, camera);
+      scene.remove(wall);
+      const gl = renderer.getContext();
+      const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+      const pixels = new Uint32Array((width / 2 - 8) * height);
+      gl.readPixels(0, 0, width / 2 - 8, height, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(pixels.buffer));
+      wall.geometry.dispose();
+      return new Set(pixels).size;
+    };
     window.end = () => {
       const held = { ...renderer.info.memory };
       hair.dispose();
@@ -118,6 +133,8 @@ const tests = {
   },
   async 'three shows what the page shows'() {
     const alike = psnr(page, await shownBy(`${site.origin}/hair.html`, 'hair', picturesOf, async (tab) => {
+      assert.equal(await tab.evaluate('wall(1)'), 1, 'what is opaque hides hair');
+      assert.ok((await tab.evaluate('wall(0.5)')) > 100, 'one sees through the rest');
       const [held, left] = await tab.evaluate('end()');
       assert.ok(held.geometries >= 3 && held.textures >= 7, JSON.stringify(held));
       assert.deepEqual([left.geometries, left.textures], [0, 0], 'what dispose() leaves on the graphics card');

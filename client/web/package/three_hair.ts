@@ -86,6 +86,7 @@ export class StrandcastHair extends THREE.Object3D {
   private readonly own = new THREE.Scene(); // of what goes into half floats
   private readonly target = new Target(1, 1, { type: THREE.HalfFloatType, minFilter: THREE.NearestFilter, magFilter: THREE.NearestFilter });
   private readonly depthOnly = new THREE.MeshBasicMaterial({ colorWrite: false });
+  private readonly eye = Object.assign(new THREE.PerspectiveCamera(), { matrixAutoUpdate: false });
   private readonly over: THREE.Mesh;
   private readonly size = new THREE.Vector2();
   private readonly matrix4 = new THREE.Matrix4();
@@ -233,19 +234,11 @@ export class StrandcastHair extends THREE.Object3D {
     const { autoClear } = renderer;
     const alpha = renderer.getClearAlpha();
     const color = new THREE.Color().copy(renderer.getClearColor(new THREE.Color())); // some versions return their own
-    const override = scene.overrideMaterial;
-    const background = scene.background;
     renderer.setRenderTarget(this.target);
     renderer.setClearColor(new THREE.Color(0), 0);
     renderer.clear();
     renderer.autoClear = false;
-    this.visible = false;
-    scene.overrideMaterial = this.depthOnly;
-    scene.background = null;
-    renderer.render(scene, camera);
-    scene.overrideMaterial = override;
-    scene.background = background;
-    this.visible = true;
+    this.drawDepths(renderer, scene, camera);
     renderer.setRenderTarget(into); // three 111 leaves another framebuffer bound than it thinks
     renderer.setRenderTarget(this.target);
     renderer.render(this.own, camera);
@@ -253,6 +246,29 @@ export class StrandcastHair extends THREE.Object3D {
     renderer.setClearColor(color, alpha);
     renderer.setRenderTarget(into);
     this.drawMs = performance.now() - begin;
+  }
+  /** Of what hides hair: what is opaque. */
+  private drawDepths(renderer: THREE.WebGLRenderer, scene: THREE.Scene, camera: THREE.PerspectiveCamera): void {
+    const { overrideMaterial, background } = scene;
+    const { autoUpdate } = renderer.shadowMap;
+    const through: { object: THREE.Object3D; mask: number }[] = [];
+    scene.traverse((object) => {
+      const { material } = object as THREE.Mesh;
+      if (material && [material].flat().every((one) => one.transparent)) through.push({ object, mask: object.layers.mask });
+    });
+    for (const { object } of through) object.layers.mask = 0;
+    renderer.shadowMap.autoUpdate = false;
+    this.visible = false;
+    Object.assign(scene, { overrideMaterial: this.depthOnly, background: null });
+    // A camera of its own: three 111 keeps what it draws by scene and camera, and is drawing by this one.
+    this.eye.matrixWorld.copy(camera.matrixWorld);
+    this.eye.projectionMatrix.copy(camera.projectionMatrix);
+    this.eye.layers.mask = camera.layers.mask;
+    renderer.render(scene, this.eye);
+    Object.assign(scene, { overrideMaterial, background });
+    this.visible = true;
+    renderer.shadowMap.autoUpdate = autoUpdate;
+    for (const { object, mask } of through) object.layers.mask = mask;
   }
   /** The block's part that follows the camera of this very picture. */
   private look(camera: THREE.PerspectiveCamera, width: number, height: number): void {
