@@ -50,6 +50,7 @@ declare module 'three' {
     frustumCulled: boolean;
     readonly layers: { mask: number };
     traverse(look: (object: Object3D) => void): void;
+    updateMatrixWorld(isForced: boolean): void;
     onBeforeRender: (renderer: WebGLRenderer, scene: Object3D, camera: Object3D) => void;
     add(...objects: Object3D[]): this;
     remove(...objects: Object3D[]): this;

@@ -91,12 +91,17 @@ export class StrandcastHair extends THREE.Object3D {
   private readonly size = new THREE.Vector2();
   private readonly matrix4 = new THREE.Matrix4();
   private readonly vector = new THREE.Vector3();
-  private state?: State; // newest, not yet with the worker
+  private next?: State; // newest, not yet with the worker
+  private asked?: State; // with the worker
+  private answered?: State; // back from it
+  private isDisposed = false;
   private rotation: readonly number[] = [1, 0, 0, 0];
   private prepared: Prepared[] = [];
   private isReady = false; // the worker has an asset and a state
   private isBusy = false;
   private viewed = '';
+  /** The one that is shown. */
+  state?: State;
   /** Main thread's time of the newest picture, ms. */
   drawMs = 0;
 
@@ -117,11 +122,12 @@ export class StrandcastHair extends THREE.Object3D {
     void compileCore(new URL('strand_page.wasm', files).href).then((core) => this.begin(core), (error: Error) => this.fail(error.message));
   }
   private begin(core: WebAssembly.Module): void {
+    if (this.isDisposed) return;
     this.tell({ kind: 'core', core });
     this.ends.push(
       this.connection.on('asset', (asset) => {
         this.isReady = false;
-        this.state = undefined; // of the one before
+        this.next = undefined; // of the one before
         this.tell({ kind: 'asset', asset });
       }),
       this.connection.on('look', (look) => {
@@ -129,14 +135,13 @@ export class StrandcastHair extends THREE.Object3D {
         this.viewed = '';
       }),
       this.connection.on('state', (state) => {
-        this.state = state;
-        if (this.options.followsPose) this.follow(state);
+        this.next = state;
         if (!this.isReady) this.ask({ offset: [0, 0, 1], target: [0, 0, 0], fov: 0.6 }, 640, 360); // nothing is seen yet
       }));
   }
   /** There is something that no picture has shown. */
   get isDirty(): boolean {
-    return this.prepared.length > 0 || (this.state !== undefined && !this.isBusy);
+    return this.prepared.length > 0 || (this.next !== undefined && !this.isBusy);
   }
   private tell(message: ToPrepare): void {
     this.worker.postMessage(message);
@@ -147,6 +152,7 @@ export class StrandcastHair extends THREE.Object3D {
   private follow({ pose: { position, rotation: [w, x, y, z] } }: State): void {
     this.position.set(...position);
     this.quaternion.set(x, y, z, w);
+    this.updateMatrixWorld(true);
   }
 
   // ---- with the worker: one state or view at a time
@@ -154,13 +160,13 @@ export class StrandcastHair extends THREE.Object3D {
   private ask(camera: Camera, width: number, height: number): void {
     if (this.isBusy) return;
     const view = JSON.stringify([camera, width, height]);
-    if (!this.state && view === this.viewed) return;
+    if (!this.next && view === this.viewed) return;
     this.viewed = view;
-    if (this.state) {
-      const { positions, pose: { rotation }, bust } = this.state;
+    if (this.next) {
+      const { positions, pose: { rotation }, bust } = (this.asked = this.next);
       this.tell({ kind: 'state', state: { positions, rotation, bust } });
       this.rotation = rotation;
-      this.state = undefined;
+      this.next = undefined;
       this.isReady = true;
     }
     this.isBusy = true;
@@ -170,9 +176,11 @@ export class StrandcastHair extends THREE.Object3D {
     this.isBusy = false;
     if (message.kind === 'failed') return this.fail(message.reason);
     this.prepared.push(message.prepared);
+    this.answered = this.asked;
     this.over.visible = true;
   }
   private upload(made: Prepared): void {
+    this.state = this.answered;
     const { uniforms } = this;
     uniforms.u_frame.value = frameOf(made.block);
     if (made.points) {
@@ -227,6 +235,7 @@ export class StrandcastHair extends THREE.Object3D {
     const { x: width, y: height } = this.size;
     this.ask(this.viewOf(camera), width, height);
     for (const made of this.prepared.splice(0)) this.upload(made);
+    if (this.options.followsPose && this.state) this.follow(this.state);
     (this.over.material as THREE.RawShaderMaterial).uniforms.u_is_screen!.value = !into;
     if (this.target.width !== width || this.target.height !== height) this.target.setSize(width, height);
     this.look(camera, width, height);
@@ -302,6 +311,7 @@ export class StrandcastHair extends THREE.Object3D {
   }
 
   dispose(): void {
+    this.isDisposed = true;
     for (const end of this.ends.splice(0)) end();
     this.worker.terminate();
     this.target.dispose();
