@@ -25,7 +25,7 @@ FORMULA_WORDS = 40  # in WIRE.md, where a sentence may be a formula
 WORDS = ["what is told", "whoever", "likewise", "so many", "as they are", "behind"]
 MAX_INVARIANTS = 25
 # What commands name besides our own programs and scripts.
-OTHER_PROGRAMS = {"apt", "cd", "chmod", "cmake", "cpack", "ctest", "export", "openssl", "podman", "systemctl"}
+OTHER_PROGRAMS = {"apt", "cd", "chmod", "cmake", "cpack", "ctest", "export", "npm", "openssl", "podman", "systemctl"}
 SCRIPTS = ["deploy/run.sh", "deploy/fleet/strandcast-fleet", "deploy/fleet/strandcast-grid", "tests/nightly.sh"]
 PROGRAMS = ["server", "view", "ctl", "report", "load", "chaos"]
 # Options in prose that are others' or a bench's own.

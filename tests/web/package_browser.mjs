@@ -20,6 +20,7 @@ if (missing) {
   process.exit(77);
 }
 const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-package-'));
+const Socket = globalThis.WebSocket ?? NodeSocket;
 const LEAST_DB = 40;
 const SIZE = { width: 640, height: 360 };
 const address = () => `ws://127.0.0.1:${server.port}`;
@@ -30,6 +31,16 @@ const PAGES = {
     let pictures = 0;
     document.querySelector('strandcast-view').addEventListener('picture', () =>
       (document.documentElement.dataset.strandcast = JSON.stringify({ pictures: ++pictures })));</script>`,
+  // The state as the page has it, its sessions in workers, and as a worker has it that is one itself.
+  '/states.html': () => `${HEAD}<script type="module">
+    import { connect } from 'strandcast';
+    const hash = new Promise((done) => (new Worker('/in_worker.js', { type: 'module' }).onmessage = ({ data }) => done(data)));
+    for await (const state of connect('${address()}', { codec: 'tangent' })) {
+      document.documentElement.dataset.strandcast = JSON.stringify({ here: state.hash, there: await hash, floats: state.positions.length });
+      break;
+    }</script>`,
+  '/in_worker.js': () => `import { connect } from '/node_modules/strandcast/strandcast.js';
+    for await (const { hash } of connect('${address()}', { codec: 'tangent' })) postMessage(hash);`,
   // The page's camera about a head that turns, before the page's background.
   '/hair.html': () => `${HEAD}<canvas></canvas><script type="module">
     import * as THREE from 'three';
@@ -44,6 +55,26 @@ const PAGES = {
     scene.add(hair);
     const { camera: { offset, target, fov } } = await connection.opened;
     const camera = new THREE.PerspectiveCamera(fov * 180 / Math.PI, innerWidth / innerHeight, 0.05, 20);
+    // How many colours a wall before the left half has.
+    window.wall = (opacity) => {
+      const wall = new THREE.Mesh(new THREE.PlaneGeometry(1, 2), new THREE.MeshBasicMaterial({ color: 0xff0000, opacity, transparent: opacity < 1 }));
+      wall.quaternion.copy(camera.quaternion);
+      wall.position.copy(camera.position).add(new THREE.Vector3(-0.5, 0, -0.3).applyQuaternion(camera.quaternion));
+      scene.add(wall);
+      renderer.render(scene, camera);
+      scene.remove(wall);
+      const gl = renderer.getContext();
+      const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+      const pixels = new Uint32Array((width / 2 - 8) * height);
+      gl.readPixels(0, 0, width / 2 - 8, height, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(pixels.buffer));
+      wall.geometry.dispose();
+      return new Set(pixels).size;
+    };
+    window.end = () => {
+      const held = { ...renderer.info.memory };
+      hair.dispose();
+      return [held, { ...renderer.info.memory }];
+    };
     let states = 0;
     connection.on('state', () => ++states);
     let quiet = 0; // pictures since the worker was last busy
@@ -76,19 +107,20 @@ let strandcast; // in this Node
 let pausing; // stays, so that the state does
 const picturesOf = (tab) => tab.state().then(({ pictures = 0 }) => pictures, () => 0);
 /** Once it stands. */
-async function shownBy(url, name, count) {
+async function shownBy(url, name, count, beforeEnd = () => undefined) {
   const tab = await browser.open(url, SIZE);
   const end = Date.now() + 30_000;
-  for (let before = -1, quiet = 0; quiet < 3; await sleep(400)) {
+  for (let last = -1, quiet = 0; quiet < 3; await sleep(400)) {
     if (Date.now() > end) throw new Error(`${url} does not come to stand: ${tab.errors}`);
     const pictures = await count(tab);
-    quiet = pictures > 0 && pictures === before ? quiet + 1 : 0;
-    before = pictures;
+    quiet = pictures > 0 && pictures === last ? quiet + 1 : 0;
+    last = pictures;
   }
   await tab.evaluate('for (const card of document.querySelectorAll(".card, #warnings")) card.hidden = true');
   await sleep(100);
   const picture = readPng(await tab.screenshot(shots && path.join(shots, `${name}.png`)));
   assert.deepEqual(tab.errors.filter((error) => !error.includes('favicon')), []);
+  await beforeEnd(tab);
   await tab.close();
   return picture;
 }
@@ -100,9 +132,24 @@ const tests = {
     assert.equal(psnr(page, seen), Infinity);
   },
   async 'three shows what the page shows'() {
-    const alike = psnr(page, await shownBy(`${site.origin}/hair.html`, 'hair', picturesOf));
+    const alike = psnr(page, await shownBy(`${site.origin}/hair.html`, 'hair', picturesOf, async (tab) => {
+      assert.equal(await tab.evaluate('wall(1)'), 1, 'what is opaque hides hair');
+      assert.ok((await tab.evaluate('wall(0.5)')) > 100, 'one sees through the rest');
+      const [held, left] = await tab.evaluate('end()');
+      assert.ok(held.geometries >= 3 && held.textures >= 7, JSON.stringify(held));
+      assert.deepEqual([left.geometries, left.textures], [0, 0], 'what dispose() leaves on the graphics card');
+    }));
     console.log(`  ${alike.toFixed(2)} dB`);
     assert.ok(alike >= LEAST_DB, `${alike} dB`);
+  },
+  async 'a page, a worker and Node have the same state'() {
+    const tab = await browser.open(`${site.origin}/states.html`, SIZE);
+    const { here, there, floats } = await tab.until((now) => now.here, 'a state');
+    await tab.close();
+    const node = strandcast.connect(server.url, { WebSocket: Socket, codec: 'tangent' });
+    const { value: { hash } } = await node[Symbol.asyncIterator]().next();
+    node.close();
+    assert.deepEqual([here, there, floats], [hash, hash, 3 * 400 * 12]);
   },
   async 'the example has hair on its head'() {
     fs.copyFileSync(path.join(root, 'examples/three/head.mjs'), path.join(work, 'head.mjs'));
@@ -139,7 +186,7 @@ try {
   server = await Server.start(program, [...SMALL, '--allow-origin', site.origin]);
   browser = await Browser.start();
   strandcast = await import(pathToFileURL(path.join(work, 'node_modules/strandcast/node.js')));
-  pausing = strandcast.connect(server.url, { WebSocket: globalThis.WebSocket ?? NodeSocket });
+  pausing = strandcast.connect(server.url, { WebSocket: Socket });
   await pausing.opened;
   for await (const { tick } of pausing) if (tick > 60) break; // some hair has moved
   pausing.pause();

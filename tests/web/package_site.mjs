@@ -32,7 +32,7 @@ export class PackageSite {
         : [work, path.join(root, 'examples/three')].map((folder) => path.join(folder, name)).find((one) => fs.existsSync(one));
       const page = pages[name]?.();
       if (!page && !file) return answer.writeHead(404).end();
-      answer.writeHead(200, { 'content-type': page ? 'text/html' : TYPES[path.extname(name)] ?? 'text/plain' });
+      answer.writeHead(200, { 'content-type': TYPES[path.extname(name)] ?? 'text/plain' });
       answer.end(page ?? fs.readFileSync(file));
     });
     await new Promise((done) => site.files.listen(0, '127.0.0.1', done));

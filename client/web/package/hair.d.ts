@@ -1,6 +1,6 @@
 // strandcast/three: a stream as an object of three.js (111 or later, WebGL2).
 import type { Object3D } from 'three';
-import type { Connection } from './strandcast';
+import type { Connection, State } from './strandcast';
 
 export interface HairOptions {
   /** Draws the server's own head as well. Without, yours is expected where that is: the joint of the head in the origin, the
@@ -16,6 +16,8 @@ export interface HairOptions {
 export class StrandcastHair extends Object3D {
   constructor(connection: Connection, options?: HairOptions);
   readonly connection: Connection;
+  /** The state that is shown: some time behind the newest one, which a worker makes ready. */
+  readonly state?: State;
   /** There is something that no picture has shown: for pages that draw only then. */
   readonly isDirty: boolean;
   /** What the newest picture took of the thread that draws, ms. */

@@ -48,6 +48,9 @@ declare module 'three' {
     parent: Object3D | null;
     visible: boolean;
     frustumCulled: boolean;
+    readonly layers: { mask: number };
+    traverse(look: (object: Object3D) => void): void;
+    updateMatrixWorld(isForced: boolean): void;
     onBeforeRender: (renderer: WebGLRenderer, scene: Object3D, camera: Object3D) => void;
     add(...objects: Object3D[]): this;
     remove(...objects: Object3D[]): this;
@@ -80,6 +83,7 @@ declare module 'three' {
     dispose(): void;
   }
   export class Material {
+    transparent: boolean;
     dispose(): void;
   }
   export class MeshBasicMaterial extends Material {
@@ -111,6 +115,7 @@ declare module 'three' {
   }
   export class WebGLRenderer {
     autoClear: boolean;
+    readonly shadowMap: { autoUpdate: boolean };
     getRenderTarget(): WebGLRenderTarget | null;
     setRenderTarget(target: WebGLRenderTarget | null): void;
     getDrawingBufferSize(into: Vector2): Vector2;

@@ -86,16 +86,22 @@ export class StrandcastHair extends THREE.Object3D {
   private readonly own = new THREE.Scene(); // of what goes into half floats
   private readonly target = new Target(1, 1, { type: THREE.HalfFloatType, minFilter: THREE.NearestFilter, magFilter: THREE.NearestFilter });
   private readonly depthOnly = new THREE.MeshBasicMaterial({ colorWrite: false });
+  private readonly eye = Object.assign(new THREE.PerspectiveCamera(), { matrixAutoUpdate: false });
   private readonly over: THREE.Mesh;
   private readonly size = new THREE.Vector2();
   private readonly matrix4 = new THREE.Matrix4();
   private readonly vector = new THREE.Vector3();
-  private state?: State; // newest, not yet with the worker
+  private next?: State; // newest, not yet with the worker
+  private asked?: State; // with the worker
+  private answered?: State; // back from it
+  private isDisposed = false;
   private rotation: readonly number[] = [1, 0, 0, 0];
   private prepared: Prepared[] = [];
   private isReady = false; // the worker has an asset and a state
   private isBusy = false;
   private viewed = '';
+  /** The one that is shown. */
+  state?: State;
   /** Main thread's time of the newest picture, ms. */
   drawMs = 0;
 
@@ -116,11 +122,12 @@ export class StrandcastHair extends THREE.Object3D {
     void compileCore(new URL('strand_page.wasm', files).href).then((core) => this.begin(core), (error: Error) => this.fail(error.message));
   }
   private begin(core: WebAssembly.Module): void {
+    if (this.isDisposed) return;
     this.tell({ kind: 'core', core });
     this.ends.push(
       this.connection.on('asset', (asset) => {
         this.isReady = false;
-        this.state = undefined; // of the one before
+        this.next = undefined; // of the one before
         this.tell({ kind: 'asset', asset });
       }),
       this.connection.on('look', (look) => {
@@ -128,14 +135,13 @@ export class StrandcastHair extends THREE.Object3D {
         this.viewed = '';
       }),
       this.connection.on('state', (state) => {
-        this.state = state;
-        if (this.options.followsPose) this.follow(state);
+        this.next = state;
         if (!this.isReady) this.ask({ offset: [0, 0, 1], target: [0, 0, 0], fov: 0.6 }, 640, 360); // nothing is seen yet
       }));
   }
   /** There is something that no picture has shown. */
   get isDirty(): boolean {
-    return this.prepared.length > 0 || (this.state !== undefined && !this.isBusy);
+    return this.prepared.length > 0 || (this.next !== undefined && !this.isBusy);
   }
   private tell(message: ToPrepare): void {
     this.worker.postMessage(message);
@@ -146,6 +152,7 @@ export class StrandcastHair extends THREE.Object3D {
   private follow({ pose: { position, rotation: [w, x, y, z] } }: State): void {
     this.position.set(...position);
     this.quaternion.set(x, y, z, w);
+    this.updateMatrixWorld(true);
   }
 
   // ---- with the worker: one state or view at a time
@@ -153,13 +160,13 @@ export class StrandcastHair extends THREE.Object3D {
   private ask(camera: Camera, width: number, height: number): void {
     if (this.isBusy) return;
     const view = JSON.stringify([camera, width, height]);
-    if (!this.state && view === this.viewed) return;
+    if (!this.next && view === this.viewed) return;
     this.viewed = view;
-    if (this.state) {
-      const { positions, pose: { rotation }, bust } = this.state;
+    if (this.next) {
+      const { positions, pose: { rotation }, bust } = (this.asked = this.next);
       this.tell({ kind: 'state', state: { positions, rotation, bust } });
       this.rotation = rotation;
-      this.state = undefined;
+      this.next = undefined;
       this.isReady = true;
     }
     this.isBusy = true;
@@ -169,9 +176,11 @@ export class StrandcastHair extends THREE.Object3D {
     this.isBusy = false;
     if (message.kind === 'failed') return this.fail(message.reason);
     this.prepared.push(message.prepared);
+    this.answered = this.asked;
     this.over.visible = true;
   }
   private upload(made: Prepared): void {
+    this.state = this.answered;
     const { uniforms } = this;
     uniforms.u_frame.value = frameOf(made.block);
     if (made.points) {
@@ -226,6 +235,7 @@ export class StrandcastHair extends THREE.Object3D {
     const { x: width, y: height } = this.size;
     this.ask(this.viewOf(camera), width, height);
     for (const made of this.prepared.splice(0)) this.upload(made);
+    if (this.options.followsPose && this.state) this.follow(this.state);
     (this.over.material as THREE.RawShaderMaterial).uniforms.u_is_screen!.value = !into;
     if (this.target.width !== width || this.target.height !== height) this.target.setSize(width, height);
     this.look(camera, width, height);
@@ -233,19 +243,11 @@ export class StrandcastHair extends THREE.Object3D {
     const { autoClear } = renderer;
     const alpha = renderer.getClearAlpha();
     const color = new THREE.Color().copy(renderer.getClearColor(new THREE.Color())); // some versions return their own
-    const override = scene.overrideMaterial;
-    const background = scene.background;
     renderer.setRenderTarget(this.target);
     renderer.setClearColor(new THREE.Color(0), 0);
     renderer.clear();
     renderer.autoClear = false;
-    this.visible = false;
-    scene.overrideMaterial = this.depthOnly;
-    scene.background = null;
-    renderer.render(scene, camera);
-    scene.overrideMaterial = override;
-    scene.background = background;
-    this.visible = true;
+    this.drawDepths(renderer, scene, camera);
     renderer.setRenderTarget(into); // three 111 leaves another framebuffer bound than it thinks
     renderer.setRenderTarget(this.target);
     renderer.render(this.own, camera);
@@ -253,6 +255,29 @@ export class StrandcastHair extends THREE.Object3D {
     renderer.setClearColor(color, alpha);
     renderer.setRenderTarget(into);
     this.drawMs = performance.now() - begin;
+  }
+  /** Of what hides hair: what is opaque. */
+  private drawDepths(renderer: THREE.WebGLRenderer, scene: THREE.Scene, camera: THREE.PerspectiveCamera): void {
+    const { overrideMaterial, background } = scene;
+    const { autoUpdate } = renderer.shadowMap;
+    const through: { object: THREE.Object3D; mask: number }[] = [];
+    scene.traverse((object) => {
+      const { material } = object as THREE.Mesh;
+      if (material && [material].flat().every((one) => one.transparent)) through.push({ object, mask: object.layers.mask });
+    });
+    for (const { object } of through) object.layers.mask = 0;
+    renderer.shadowMap.autoUpdate = false;
+    this.visible = false;
+    Object.assign(scene, { overrideMaterial: this.depthOnly, background: null });
+    // A camera of its own: three 111 keeps what it draws by scene and camera, and is drawing by this one.
+    this.eye.matrixWorld.copy(camera.matrixWorld);
+    this.eye.projectionMatrix.copy(camera.projectionMatrix);
+    this.eye.layers.mask = camera.layers.mask;
+    renderer.render(scene, this.eye);
+    Object.assign(scene, { overrideMaterial, background });
+    this.visible = true;
+    renderer.shadowMap.autoUpdate = autoUpdate;
+    for (const { object, mask } of through) object.layers.mask = mask;
   }
   /** The block's part that follows the camera of this very picture. */
   private look(camera: THREE.PerspectiveCamera, width: number, height: number): void {
@@ -286,6 +311,7 @@ export class StrandcastHair extends THREE.Object3D {
   }
 
   dispose(): void {
+    this.isDisposed = true;
     for (const end of this.ends.splice(0)) end();
     this.worker.terminate();
     this.target.dispose();
