@@ -8,7 +8,7 @@ export const POINTS_PER_ROW = 2048; // of hair.vert.glsl
 export const STRANDS_PER_ROW = 1024; // of strand_point.glsl
 
 const CORNERS = [0, 1, 2, 2, 1, 3];
-const roomFor = (count: number): number => 2 * POINTS_PER_ROW * Math.ceil((count * 1.1) / (2 * POINTS_PER_ROW)); // whole rows of pairs
+const roomFor = (count: number): number => 2 * POINTS_PER_ROW * Math.ceil(count / (2 * POINTS_PER_ROW)); // whole rows of pairs
 
 export type ToPrepare =
   | { kind: 'core'; core: WebAssembly.Module }
@@ -60,7 +60,7 @@ class Preparing {
 
   private prepare(picture: StrandPicture, { camera, width, height }: Extract<ToPrepare, { kind: 'view' }>): Prepared {
     const parts = picture.prepare(camera, { width, height }, 1);
-    const made: Prepared = { block: picture.bytes(parts.block, parts.blockBytes).slice().buffer, ...this.order(picture.uints(parts.corners, parts.cornerCount)) };
+    const made: Prepared = { block: picture.bytes(parts.block, parts.blockBytes).slice().buffer, ...this.order(picture.uints(parts.corners, parts.cornerCount), parts.pointCount) };
     if (this.seen.light !== parts.lightNumber) {
       this.seen.light = parts.lightNumber;
       made.points = this.points(picture.floats(parts.points, 3 * (parts.pointCount + 2)));
@@ -83,10 +83,11 @@ class Preparing {
     }
     return made;
   }
-  private order(corners: Uint32Array): Pick<Prepared, 'order' | 'segmentCount' | 'corners'> {
+  /** Room for all that the points can have: what is near the eye leaves some out. */
+  private order(corners: Uint32Array, pointCount: number): Pick<Prepared, 'order' | 'segmentCount' | 'corners'> {
     const segmentCount = corners.length / CORNERS.length;
-    const isGrown = segmentCount > this.segmentRoom;
-    if (isGrown) this.segmentRoom = roomFor(segmentCount);
+    const isGrown = pointCount > this.segmentRoom;
+    if (isGrown) this.segmentRoom = roomFor(pointCount);
     const order = new Float32Array(this.segmentRoom);
     for (let i = 0; i < segmentCount; ++i) order[i] = corners[CORNERS.length * i]! >> 1;
     if (!isGrown) return { order, segmentCount };
