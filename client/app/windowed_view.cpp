@@ -298,9 +298,10 @@ class WindowedView {
   /// The server's pictures are as large as the window, and none come while it is minimised.
   void tell_window() {
     const int64_t time_ns = now_ns();
-    if (!state_->is_connected || time_ns - window_told_ns_ < kWindowSendNs) return;
+    if (!state_->is_connected) return;
     WindowChange window = told_window_;
     window.is_hidden = !is_visible();
+    if (window.is_hidden == told_window_.is_hidden && time_ns - window_told_ns_ < kWindowSendNs) return;
     if (is_visible()) {
       const RenderSize size = window_->framebuffer_size();
       window.frame_width = std::clamp(size.width, kMinPictureSide, kMaxPictureWidth);

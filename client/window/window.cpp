@@ -52,6 +52,7 @@ struct Window::State {
   bool is_help_visible = false;
   bool is_form_visible = false;
   bool has_timeline = false;  // in the newest picture
+  bool is_minimised = false;
   glm::dvec2 cursor{0.0};
   WindowActions actions;
   GLuint picture = 0;  // plain OpenGL 3.3: it must work where nothing better is to be had
@@ -191,6 +192,12 @@ struct Window::State {
     glfwSetWindowRefreshCallback(window, [](GLFWwindow* source) {
       static_cast<State*>(glfwGetWindowUserPointer(source))->actions.is_touched = true;
     });
+    // Minimised, it keeps its size on X11.
+    glfwSetWindowIconifyCallback(window, [](GLFWwindow* source, int minimised) {
+      State& state = *static_cast<State*>(glfwGetWindowUserPointer(source));
+      state.is_minimised = minimised == GLFW_TRUE;
+      state.actions.is_touched = true;
+    });
     glfwSetFramebufferSizeCallback(window, [](GLFWwindow* source, int, int) {
       static_cast<State*>(glfwGetWindowUserPointer(source))->actions.is_touched = true;
     });
@@ -264,7 +271,7 @@ void Window::wake() {
 RenderSize Window::framebuffer_size() const {
   int width = 0;
   int height = 0;
-  glfwGetFramebufferSize(state_->window, &width, &height);
+  if (!state_->is_minimised) glfwGetFramebufferSize(state_->window, &width, &height);
   return {static_cast<uint32_t>(std::max(width, 0)), static_cast<uint32_t>(std::max(height, 0))};
 }
 

@@ -380,6 +380,8 @@ void SessionDesk::follow_window(SessionId session, const WindowChange& window) {
   if (!why && was_hidden) return net_->close(session, CloseCode::TryLater, why.error().to_string());
   if (!why) return net_->send(session, Notice{true, why.error().to_string()});
   const RenderSize now = viewers_.picture_size(session);
+  log_debug("net", "session {}: a window of {} x {}{}", session, now.width, now.height,
+            window.is_hidden ? ", hidden" : "");
   if (now.width == before.width && now.height == before.height) return;
   if (const auto pictures = viewers_.pictures(session)) tell_quality(session, *pictures, *why);
 }

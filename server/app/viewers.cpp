@@ -62,6 +62,7 @@ PictureView make_scene_view(const SceneDesc& scene, const RenderSize& size, Pict
 /// What the viewer gets, and during a change what it is about to get as well.
 Demand Viewers::demand_of(const Viewer& viewer, const Subscription& wanted, const PictureView& view) {
   Demand demand;
+  demand.awaits_picture = wanted.is_hidden() && wanted.gets(StreamMode::Frames);
   if (wanted.is_hidden()) return demand;
   demand.hair_px = viewer.report.hair_px;
   if (wanted.gets(StreamMode::Strands)) demand.strand_stream = stream_id_of(wanted.strands);

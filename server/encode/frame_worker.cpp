@@ -75,10 +75,11 @@ void FrameWorker::offer(EncodedFramePtr strand_frame) {
   changed_.notify_all();
 }
 
-void FrameWorker::set_views(std::map<uint32_t, PictureView> views) {
+void FrameWorker::set_views(std::map<uint32_t, PictureView> views, int64_t painter_rest_ns) {
   {
     const std::lock_guard lock(mutex_);
     views_ = std::move(views);
+    painter_rest_ns_ = painter_rest_ns;
     has_new_views_ = true;
     if (views_.empty()) {
       pending_.clear();
@@ -156,7 +157,7 @@ void FrameWorker::run() {
     if (job.is_stopping) break;
     if (job.look) take_look(*job.look);
     if (job.views.empty()) {
-      rest();
+      rest(job.painter_rest_ns);
       continue;
     }
     if (!is_active_) begin();
@@ -180,7 +181,7 @@ FrameWorker::Job FrameWorker::wait_for_job() {
     const auto due = is_active_ ? next_due() : std::nullopt;
     std::optional<int64_t> due_ns;
     if (due) due_ns = due->wait.due_ns;
-    if (!is_active_ && painter_ != nullptr) due_ns = resting_since_ns_ + config_.painter_rest_ns;
+    if (!is_active_ && painter_ != nullptr) due_ns = resting_since_ns_ + painter_rest_ns_;
     const int64_t wait_ns = due_ns ? *due_ns - now_ns() : 1;
     if (has_news || wait_ns <= 0) break;
     if (due_ns)
@@ -192,6 +193,7 @@ FrameWorker::Job FrameWorker::wait_for_job() {
   pending_bytes_ = 0;
   Job job{std::exchange(pending_, {}),
           {},
+          painter_rest_ns_,
           std::exchange(wanted_wholes_, {}),
           std::exchange(new_look_, std::nullopt),
           std::exchange(is_redraw_wanted_, false),
@@ -206,9 +208,9 @@ void FrameWorker::begin() {
   hooks_.request_keyframe();
 }
 
-void FrameWorker::rest() {
+void FrameWorker::rest(int64_t painter_rest_ns) {
   if (std::exchange(is_active_, false)) resting_since_ns_ = now_ns();
-  if (failure() || now_ns() - resting_since_ns_ >= config_.painter_rest_ns) painter_.reset();
+  if (failure() || now_ns() - resting_since_ns_ >= painter_rest_ns) painter_.reset();
   snapshot_.reset();
   drawn_.clear();
   const std::lock_guard lock(mutex_);

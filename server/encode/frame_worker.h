@@ -48,14 +48,13 @@ struct FrameCounters {
 /// Number of periods without change after which a picture is sent once more at the finest quality.
 inline constexpr uint32_t kStillPeriods = 5;
 
-/// Time for which a server keeps the painter of pictures that nobody watches, so that a viewer who looks away
-/// for a while sees the next one at once.
+/// Time for which a painter without views is kept for a viewer who looks away, and sees the next picture at
+/// once.
 inline constexpr int64_t kPainterRestNs = 300'000'000'000;
 
 struct FrameWorkerConfig {
   double rate_hz = 15.0;                   // at most so many frames of each view in a second
   uint32_t still_periods = kStillPeriods;  // 0 = no stills
-  int64_t painter_rest_ns = 0;             // without views the painter is destroyed after that
 };
 
 class FrameWorker {
@@ -90,9 +89,9 @@ class FrameWorker {
   /// Offers every strand frame, in the order of the chain. Returns at once; frames are dropped while there
   /// are no views.
   void offer(EncodedFramePtr strand_frame);
-  /// Sets what is drawn from now on, by picture class. Without views the painter rests, and strand frames are
-  /// not needed.
-  void set_views(std::map<uint32_t, PictureView> views);
+  /// Sets what is drawn from now on, by picture class. Without views the painter is destroyed after
+  /// `painter_rest_ns`, and strand frames are not needed.
+  void set_views(std::map<uint32_t, PictureView> views, int64_t painter_rest_ns = 0);
   /// Sets the look from now on and redraws current pictures. Before the first call it is that of the painter.
   void set_look(const LookDesc& look);
   /// Sends the newest picture of a class again, for viewers that have none; for video, at the next permitted
@@ -132,6 +131,7 @@ class FrameWorker {
   struct Job {
     std::deque<EncodedFramePtr> strand_frames;
     std::map<uint32_t, PictureView> views;
+    int64_t painter_rest_ns = 0;
     std::set<uint32_t> wholes;
     std::optional<LookDesc> look;
     bool is_redrawn = false;
@@ -148,7 +148,7 @@ class FrameWorker {
   Job wait_for_job();
   bool can_draw() const { return !views_.empty() && !failure_; }  // mutex_ is held
   void begin();
-  void rest();
+  void rest(int64_t painter_rest_ns);
   void take_look(LookDesc look);
   void update_views(const std::map<uint32_t, PictureView>& views);
   void decode(const std::deque<EncodedFramePtr>& strand_frames);
@@ -184,6 +184,7 @@ class FrameWorker {
   std::deque<EncodedFramePtr> pending_;
   size_t pending_bytes_ = 0;
   std::map<uint32_t, PictureView> views_;
+  int64_t painter_rest_ns_ = 0;
   bool has_new_views_ = false;
   std::set<uint32_t> wanted_wholes_;
   std::optional<LookDesc> new_look_;

@@ -19,6 +19,7 @@ struct Demand {
   std::optional<uint16_t>
       strand_stream;                   // strand frames of this stream_id: a class by a codec (stream_id_of)
   std::optional<PictureView> picture;  // frames rendered so
+  bool awaits_picture = false;         // none now, but it will want them at once when its window is seen
   double hair_px = 0.0;     // of strands: how high the hair is on the reader's screen; 0 = not told
   bool has_states = false;  // every published state, with its hash if it wants (state_hash)
   bool has_inputs = false;  // motion and wind as they come in

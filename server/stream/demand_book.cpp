@@ -35,6 +35,11 @@ Demand DemandBook::demand_of(ReaderId reader) const {
   return found != readers_.end() ? found->second.demand : Demand{};
 }
 
+bool DemandBook::awaits_pictures() const {
+  return std::any_of(readers_.begin(), readers_.end(),
+                     [](const auto& entry) { return entry.second.demand.awaits_picture; });
+}
+
 uint32_t DemandBook::strand_readers(uint16_t stream_id) const {
   return static_cast<uint32_t>(std::count_if(readers_.begin(), readers_.end(), [&](const auto& entry) {
     return entry.second.demand.strand_stream == stream_id;

@@ -51,6 +51,8 @@ class DemandBook : public DemandDesk {
   Demand demand_of(ReaderId reader) const;
   PictureClass picture_class_of(ReaderId reader) const { return views_.class_of(reader); }
   std::map<uint32_t, PictureView> picture_views() const { return views_.views(); }
+  /// Returns whether a reader's pictures are soon wanted again.
+  bool awaits_pictures() const;
   uint32_t strand_readers(uint16_t stream_id) const;
   /// Returns the streams to be encoded: those that readers want, and the one that pictures are drawn from.
   std::set<uint16_t> strand_streams() const;

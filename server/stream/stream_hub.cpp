@@ -88,9 +88,8 @@ Result<std::unique_ptr<FrameWorker>> StreamHub::make_frames() {
   hooks.on_failure = [this](const Error& error) {
     give([](const Entry&) { return true; }, [&](StreamReader& reader) { reader.on_pictures_failed(error); });
   };
-  return std::make_unique<FrameWorker>(
-      std::move(decoder), make_painter_,
-      FrameWorkerConfig{stream_.frame_rate_hz, kStillPeriods, kPainterRestNs}, std::move(hooks));
+  return std::make_unique<FrameWorker>(std::move(decoder), make_painter_,
+                                       FrameWorkerConfig{stream_.frame_rate_hz}, std::move(hooks));
 }
 
 /// Gives something to every reader with a demand for it, once.
@@ -161,7 +160,7 @@ void StreamHub::follow_demand() {
   {
     const std::lock_guard lock(mutex_);
     if (has_stopped_ || is_reshaping_) return;
-    frames_->set_views(book_.picture_views());
+    frames_->set_views(book_.picture_views(), book_.awaits_pictures() ? kPainterRestNs : 0);
     const std::set<uint16_t> wanted = book_.strand_streams();
     for (const uint16_t stream_id : wanted)
       encoder(stream_id).set_listeners(book_.strand_readers(stream_id) > 0 ? StrandListeners::All

@@ -210,6 +210,10 @@ TEST_F(ServerCost, PicturesByOpenGlTakeAContextWhileTheyAreWatched) {
     ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->has_picture(); }));
     EXPECT_EQ(gl::object_counts().contexts, unwatched.contexts + 1);
     EXPECT_GT(gl::object_counts().of(ObjectKind::Program), unwatched.of(ObjectKind::Program));
+    // Who only looks away finds it as it was.
+    ASSERT_TRUE(viewer->client().send(WindowChange{0, 0, true}));
+    ASSERT_TRUE(pump_until({viewer.get()}, [&] { return server_->counters().frame_viewers == 0; }));
+    EXPECT_EQ(gl::object_counts().contexts, unwatched.contexts + 1);
   }
   ASSERT_TRUE(eventually([&] { return gl::object_counts().contexts == unwatched.contexts; }));
   ObjectCounts after = gl::object_counts();

@@ -116,8 +116,7 @@ class FrameWork : public testing::Test {
  protected:
   FrameWork() : encoder_(std::move(*make_strand_encoder("delta"))) {}
 
-  std::unique_ptr<FrameWorker> start(double rate_hz, uint32_t still_periods = 0,
-                                     int64_t painter_rest_ns = 0) {
+  std::unique_ptr<FrameWorker> start(double rate_hz, uint32_t still_periods = 0) {
     FrameWorker::Hooks hooks;
     hooks.sink = [this](uint32_t picture_class, PicturePtr picture) {
       const std::lock_guard lock(mutex_);
@@ -143,7 +142,7 @@ class FrameWork : public testing::Test {
           if (has_no_gl_) return make_error(ErrorCode::Unavailable, "no OpenGL");
           return std::unique_ptr<PicturePainter>(std::make_unique<FakePainter>(studio_));
         },
-        FrameWorkerConfig{rate_hz, still_periods, painter_rest_ns}, std::move(hooks));
+        FrameWorkerConfig{rate_hz, still_periods}, std::move(hooks));
   }
   std::vector<std::pair<uint32_t, EncodedFramePtr>> frames() {
     const std::lock_guard lock(mutex_);
@@ -307,26 +306,34 @@ TEST_F(FrameWork, AnotherLookDrawsTheSameStateAgainWithoutANewPainterOrAKeyframe
 }
 
 // Without that time each painter ends with the last view, as above.
-TEST_F(FrameWork, APainterRestsForAWhileBeforeItEnds) {
-  for (const int64_t rest_ns : {kPainterRestNs, int64_t{1'000'000}}) {
-    const auto worker = start(kFastHz, 0, rest_ns);
-    for (int round = 0; round < 2; ++round) {
-      const size_t before = frame_count();
-      worker->set_views(one_view());
-      ASSERT_TRUE(eventually([&] {
-        next_delta();
-        worker->offer(keyframe());
-        return frame_count() > before;
-      }));
-      worker->set_views({});
-      give_time_to_misbehave();
-    }
-    if (rest_ns == kPainterRestNs) {
-      EXPECT_EQ(studio_.get([](Studio& s) { return s.painters_made; }), 1) << "both viewers had the same";
-    } else {
-      EXPECT_TRUE(eventually([&] { return studio_.get([](Studio& s) { return s.painters_alive; }) == 0; }));
-    }
+TEST_F(FrameWork, APainterRestsForWhoLooksAway) {
+  const auto alive = [&] { return studio_.get([](Studio& s) { return s.painters_alive; }); };
+  const auto worker = start(kFastHz);
+  for (int round = 0; round < 2; ++round) {
+    const size_t before = frame_count();
+    worker->set_views(one_view());
+    ASSERT_TRUE(eventually([&] {
+      next_delta();
+      worker->offer(keyframe());
+      return frame_count() > before;
+    }));
+    worker->set_views({}, kPainterRestNs);
+    give_time_to_misbehave();
   }
+  EXPECT_EQ(studio_.get([](Studio& s) { return s.painters_made; }), 1) << "the second time it is the same";
+  EXPECT_EQ(alive(), 1);
+  worker->set_views({});
+  EXPECT_TRUE(eventually([&] { return alive() == 0; })) << "nobody is awaited any more";
+}
+
+TEST_F(FrameWork, APainterRestsForAWhileOnly) {
+  const auto worker = start(kFastHz);
+  next_delta();
+  worker->set_views(one_view());
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 1; }));
+  worker->set_views({}, 1'000'000);
+  EXPECT_TRUE(eventually([&] { return studio_.get([](Studio& s) { return s.painters_alive; }) == 0; }));
 }
 
 TEST_F(FrameWork, ALookThatCannotBeDrawnIsToldAndTheOneBeforeStays) {
