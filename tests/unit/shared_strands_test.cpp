@@ -24,13 +24,13 @@ SceneDesc scene_of(const std::string& quality) {
 }
 
 /// A head that walks and shakes, at 60 Hz.
-InputFrame shaken(int frame) {
+InputFrame shaken(int frame, double most_rad = 0.96) {
   const double t_s = frame / 60.0;
   InputFrame input;
   input.has_motion = true;
   input.world_from_head = walking_head(t_s);
   input.world_from_head.rotation =
-      glm::angleAxis(0.96 * std::sin(2.0 * std::numbers::pi * 2.2 * t_s), glm::dvec3(0.0, 1.0, 0.0)) *
+      glm::angleAxis(most_rad * std::sin(2.0 * std::numbers::pi * 2.2 * t_s), glm::dvec3(0.0, 1.0, 0.0)) *
       input.world_from_head.rotation;
   return input;
 }
@@ -58,6 +58,7 @@ class Stream {
       const JoinFrames frames = encoder_->encode_for_join(state_.snapshot);
       take(frames.frame);
       joiner_ = new_viewer();
+      joined_bytes_ = frames.keyframe->message.size();
       const auto joined = joiner_->decode(frames.keyframe->message);
       EXPECT_TRUE(joined) << joined.error().to_string();
       EXPECT_EQ(state_hash(**joined), state_hash(*seen_));
@@ -76,13 +77,14 @@ class Stream {
     return update != nullptr;
   }
   /// Frames of `count` that were corrected, from frame `first` on.
-  int corrected(int first, int count) {
+  int corrected(int first, int count, double most_rad = 0.96) {
     int result = 0;
-    for (int i = first; i < first + count; ++i) result += send(shaken(i)) ? 1 : 0;
+    for (int i = first; i < first + count; ++i) result += send(shaken(i, most_rad)) ? 1 : 0;
     return result;
   }
   size_t bytes() const { return frame_->message.size(); }  // of the last frame
   const EncodedFrame& frame() const { return *frame_; }
+  size_t joined_bytes() const { return joined_bytes_; }  // of the last keyframe
   /// Has it look at every frame before the viewer does.
   void look(std::function<void(const EncodedFrame&, StrandDecoder&)> at) { look_ = std::move(at); }
   /// Farthest that a vertex of the viewer is from the simulation's, m.
@@ -121,6 +123,7 @@ class Stream {
   SteppedState state_;
   std::shared_ptr<const Snapshot> seen_;
   EncodedFramePtr frame_;
+  size_t joined_bytes_ = 0;
   std::function<void(const EncodedFrame&, StrandDecoder&)> look_;
 };
 
@@ -204,6 +207,19 @@ TEST_P(SharedStrands, GoOnFromWhatAJoinerIsTold) {
     EXPECT_LT(stream.worst_error_m(), SteppedHair::kBoundM);
     EXPECT_EQ(stream.corrected(first + 1, 19), 0) << join;
   }
+}
+
+/// Besides the head's field, of which every keyframe tells. `TellsRodsBesideTheirWeight` has the rods.
+TEST(JoiningStrands, TakesFewBitsAVertexInFullQuality) {
+  constexpr double kMostBits = 44.0;
+  SceneDesc scene = scene_of("full");
+  scene.head.collider = "spheres";
+  Stream stream(scene, true);
+  stream.corrected(0, 2 * kSettledFrames, 0.0);
+  stream.send(shaken(2 * kSettledFrames, 0.0), true);
+  const double vertices = static_cast<double>(stream.hair().strand_count()) * stream.hair().vertex_count();
+  const double bits = 8.0 * static_cast<double>(stream.joined_bytes()) / vertices;
+  EXPECT_LT(bits, kMostBits);
 }
 
 /// An encoder takes its time: the simulation repeats the steps that it took meanwhile.

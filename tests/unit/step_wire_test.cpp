@@ -7,6 +7,7 @@
 #include <cstring>
 #include <functional>
 
+#include "common/scene/scene_file.h"
 #include "tests/support/sim_scene.h"
 #include "tests/support/stepped_hair.h"
 
@@ -222,6 +223,30 @@ TEST(StepWire, WhatIsReadIsWhatWasWritten) {
     EXPECT_LT(glm::distance(glm::vec3(model->rod_strand[i]), glm::vec3(trail.model->rod_strand[i])), 2e-4f);
   for (size_t i = 2 * kStrands; i < 4 * kStrands; ++i)
     EXPECT_NEAR(model->rod_strand[i].w / trail.model->rod_strand[i].w, 1.0f, 1e-3f);
+}
+
+// Joints of a rod whose rest shape carries its weight follow from that weight.
+TEST(StepWire, TellsRodsBesideTheirWeight) {
+  constexpr size_t kMostBytesAStrand = 24;  // of 14 joints and a clamp
+  SceneDesc scene = built_in_scene_with({"quality=full"}).value();
+  std::get<ProceduralGroomDesc>(scene.groom).strand_count = 400;
+  SteppedHair hair(scene);
+  const StepTrail trail = *hair.step().snapshot.trail;
+  StepModel model = *trail.model;
+  model.field = nullptr;
+  ASSERT_NE(trail.scene->groom_gravity_in_head_mps2, glm::dvec3(0.0));
+  std::vector<std::byte> told, apart;
+  step::write_model(model, hair.rest_in_head_m(), 400, told, trail.scene->groom_gravity_in_head_mps2);
+  step::write_model(model, hair.rest_in_head_m(), 400, apart);
+  EXPECT_LT(told.size(), 400 * kMostBytesAStrand / 4);
+  EXPECT_GT(apart.size(), 400 * kMostBytesAStrand);
+  for (const auto* bytes : {&told, &apart}) {
+    ByteReader reader(*bytes);
+    const auto read = step::read_model(reader, hair.rest_in_head_m(), 400, hair.vertex_count());
+    ASSERT_TRUE(read) << read.error().to_string();
+    for (size_t i = 0; i < read->rod_edge.size(); ++i)
+      ASSERT_LT(glm::distance(glm::vec3(read->rod_edge[i]), glm::vec3(model.rod_edge[i])), 2e-4f);
+  }
 }
 
 }  // namespace

@@ -278,10 +278,6 @@ STRANDCAST_LANES void settle_blocks_lanes(const SettleWork& work) {
         float* row = work.vectors.row(block, v, 0) + lane;
         LaneVectors about{};
         if (work.about != nullptr) about = load_vector(work.about->row(block, v, 0) + lane);
-        if (work.less != nullptr) {
-          const LaneVectors less = load_vector(work.less->row(block, v, 0) + lane);
-          for (size_t i = 0; i < 3; ++i) about.axis[i] = about.axis[i] - 0.5f * less.axis[i];
-        }
         for (size_t i = 0; i < 3; ++i) {
           const Lanes expected = seconds * about.axis[i];
           const Lanes value = load_lanes(row + i * kBlockStrands);

@@ -99,7 +99,6 @@ void axes_blocks(simd::InstructionSet set, const AxesWork& work);
 struct SettleWork {
   StrandBlocks& vectors;
   const StrandBlocks* about = nullptr;    // null: 0
-  const StrandBlocks* less = nullptr;     // half of which is taken off; null: 0
   const StrandBlocks* seconds = nullptr;  // w of whose first row that is multiplied with; null: 1
   float step = 1.0f;
   float w_step = 0.0f;  // of w, from the second row on; 0: w becomes 0

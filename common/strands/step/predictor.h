@@ -122,12 +122,13 @@ class Predictor {
   void begin_body(const StepInput& first);
   void put_positions(const tangent::Planes<int32_t>& decoded, float quantum_m);
   void find_axes(StrandBlocks& axes) const;
+  template <class StepsOfAxis>
+  void twist(StepsOfAxis steps_of_axis);
   void turn(const glm::dquat& by);
   void run(const StepInput& input);
   StrandBlocks* moving(PlaneRole role) const;
   std::vector<StatePlane> state_planes() const;
   float share_history();
-  float way_velocity(size_t place, uint32_t v, uint32_t axis) const;
   void write_slice(uint32_t slice, ValueWriter& writer) const;
   void read_slice(uint32_t slice, float history_s, ValueReader& reader);
   uint32_t block_count() const;
@@ -150,8 +151,8 @@ class Predictor {
   State state_;
   State saved_;
   // By settle(), for write_state().
-  std::unique_ptr<StrandBlocks> found_axes_;
-  float history_s_ = 0.0f;  // last substep of strands that remember it
+  std::vector<int32_t> twist_steps_;  // (places x vertex_count)
+  float history_s_ = 0.0f;            // last substep of strands that remember it
   std::optional<LaneProgram> program_;
   std::optional<LaneProgram> follicle_program_;
   // Where the model tells of a volume.

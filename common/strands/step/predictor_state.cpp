@@ -11,60 +11,76 @@
 namespace strandcast::step {
 namespace {
 
-// What joiners are told is rounded to these steps, and those who watch pay for what was lost: on a walk 2.6
-// (dftl) and 4.4 (direct_rod) bits a vertex in all. Twice as fine takes 3 to 6 bits more of a keyframe and
+// What joiners are told is rounded to these steps, and those who watch pay for what was lost: on a walk 2.4
+// (dftl) and 4.9 (direct_rod) bits a vertex in all. Twice as fine takes 3 to 6 bits more of a keyframe and
 // saves half a bit of that.
 constexpr float kVelocityStepMps = 1.0f / 512.0f;
-constexpr float kChangeStepMps = 1.0f / 256.0f;
-constexpr float kWayStepM = 1.0f / 8192.0f;  // beside velocity times the last substep
+constexpr float kChangeStepMps = 1.0f / 64.0f;  // in four times as many steps watchers pay a third less
+constexpr float kWayStepM = 1.0f / 6144.0f;  // beside velocity times the last substep; a third moves strands
 constexpr float kOffsetStepM = 1.0f / 16384.0f;
-constexpr float kAxisStep = 1.0f / 16.0f;  // beside axes without twist
+constexpr float kTwistStep = 1.0f / 32.0f;  // of the tangent of half of it
+constexpr int32_t kMostTwistSteps = 256;
+constexpr float kTiniestEdgeM2 = 1e-14f;
 constexpr float kTensionStepM2ps2 = 1.0f / 8.0f;
 constexpr double kMostTurnPerS = 1e6;
 constexpr double kMostHistoryS = kMaxSubstepS;
 
-/// One component of the strands of a slice, in steps, told beside what the vertex before has and how the
-/// strand before went on from there.
+/// One component of the strands of a slice, in steps, told beside what the vertex before has and how the two
+/// neighbours (in the first block the strand before, alone) go on from there.
 class Component {
  public:
-  explicit Component(uint32_t vertex_count) : strand_(vertex_count) {}
+  Component(const tangent::Layout& layout, uint32_t slice, uint32_t vertex_count)
+      : layout_(layout),
+        begin_(layout.slice_begin[slice]),
+        vertex_count_(vertex_count),
+        values_(size_t{layout.strands_in[slice] + 1} * vertex_count) {}  // the first strand follows zeros
 
   /// One strand; value_at(v) gives what it has there.
   template <class ValueAt>
-  void put_strand(ValueWriter& writer, ValueAt value_at) {
-    SymbolStep* next = writer.begin_run(strand_.size());
-    for (uint32_t v = 0; v < strand_.size(); ++v) {
+  void put_strand(size_t place, ValueWriter& writer, ValueAt value_at) {
+    SymbolStep* next = writer.begin_run(vertex_count_);
+    visit(place, [&](uint32_t v, int32_t expected) {
       const int32_t value = value_at(v);
-      tables_.put(wrapping_difference(value, expected(v)), writer, next);
-      remember(v, value);
-    }
+      tables_.put(wrapping_difference(value, expected), writer, next);
+      return value;
+    });
     writer.end_run(next);
   }
   template <class Give>
-  void take_strand(ValueReader& reader, Give give) {
-    SymbolCursor cursor = reader.begin_run(strand_.size());
-    for (uint32_t v = 0; v < strand_.size(); ++v) {
-      const int32_t value = wrapping_sum(expected(v), tables_.take(reader, cursor));
-      remember(v, value);
+  void take_strand(size_t place, ValueReader& reader, Give give) {
+    SymbolCursor cursor = reader.begin_run(vertex_count_);
+    visit(place, [&](uint32_t v, int32_t expected) {
+      const int32_t value = wrapping_sum(expected, tables_.take(reader, cursor));
       give(v, value);
-    }
+      return value;
+    });
     reader.end_run(cursor);
   }
 
  private:
-  int32_t expected(uint32_t v) const {
-    if (v == 0) return strand_[0];
-    return wrapping_sum(last_, wrapping_difference(strand_[v], before_) / 2);
+  const int32_t* strand_at(size_t place) const {
+    return values_.data() + (place + 1 - begin_) * vertex_count_;
   }
-  void remember(uint32_t v, int32_t value) {
-    before_ = strand_[v];
-    last_ = value;
-    strand_[v] = value;
+  template <class Code>
+  void visit(size_t place, Code code) {
+    std::array<const int32_t*, 2> beside;
+    for (size_t i = 0; i < beside.size(); ++i) {
+      const size_t near = layout_.neighbour[i][place];
+      beside[i] = near == layout_.no_neighbour() ? strand_at(place) - vertex_count_ : strand_at(near);
+    }
+    int32_t* const own = values_.data() + (place + 1 - begin_) * vertex_count_;
+    for (uint32_t v = 0; v < vertex_count_; ++v) {
+      int64_t way = int64_t{beside[0][v]} + beside[1][v];
+      if (v > 0) way -= int64_t{beside[0][v - 1]} + beside[1][v - 1];
+      const auto expected = static_cast<int32_t>(way / 2 + (v == 0 ? 0 : own[v - 1]));
+      own[v] = code(v, expected);
+    }
   }
 
-  std::vector<int32_t> strand_;  // the one before, from vertex v on
-  int32_t before_ = 0;           // of the strand before, at the vertex before
-  int32_t last_ = 0;
+  const tangent::Layout& layout_;
+  size_t begin_;
+  uint32_t vertex_count_;
+  std::vector<int32_t> values_;
   NumberTables tables_;
 };
 
@@ -73,6 +89,12 @@ float at(const StrandBlocks& blocks, size_t place, uint32_t v, uint32_t axis) {
 }
 float& at(StrandBlocks& blocks, size_t place, uint32_t v, uint32_t axis) {
   return blocks.row(static_cast<uint32_t>(place / kBlockStrands), v, axis)[place % kBlockStrands];
+}
+glm::vec3 vector_at(const StrandBlocks& blocks, size_t place, uint32_t v) {
+  return {at(blocks, place, v, 0), at(blocks, place, v, 1), at(blocks, place, v, 2)};
+}
+float dot(const glm::vec3& a, const glm::vec3& b) {
+  return (a.x * b.x + a.y * b.y) + a.z * b.z;
 }
 int32_t steps_of(float value, float step) {
   return static_cast<int32_t>(std::lrint(value * (1.0f / step)));
@@ -85,11 +107,9 @@ std::vector<Predictor::StatePlane> Predictor::state_planes() const {
   std::vector<StatePlane> planes = {
       {PlaneRole::Velocity, kVelocityStepMps, kernel_.carries_way ? kTensionStepM2ps2 : 0.0f}};
   for (const PlaneRole role : kernel_.moving) {
-    if (moving(role) == nullptr) continue;
+    if (role == PlaneRole::VelocityChange) planes.push_back({role, kChangeStepMps});
     if (role == PlaneRole::Displacement)
       planes.push_back({role, kernel_.carries_way ? kWayStepM : kOffsetStepM, 0.0f, kernel_.carries_way});
-    else
-      planes.push_back({role, role == PlaneRole::RodAxis ? kAxisStep : kChangeStepMps});
   }
   return planes;
 }
@@ -116,25 +136,49 @@ void Predictor::settle(const tangent::Planes<int32_t>& decoded, float quantum_m)
   history_s_ = share_history();
   for (const StatePlane& plane : state_planes()) {
     StrandBlocks& vectors = *moving(plane.role);
-    const StrandBlocks* about = nullptr;
-    if (plane.role == PlaneRole::RodAxis) {
-      if (found_axes_ == nullptr) found_axes_ = std::make_unique<StrandBlocks>(places_, vectors.row_count());
-      find_axes(*found_axes_);
-      about = found_axes_.get();
-    } else if (plane.is_way) {
-      about = moving(PlaneRole::Velocity);
-    }
+    const StrandBlocks* about = plane.is_way ? moving(PlaneRole::Velocity) : nullptr;
     for_blocks([&](uint32_t begin, uint32_t end) {
-      settle_blocks(ground_.set, {vectors, about, plane.is_way ? moving(PlaneRole::VelocityChange) : nullptr,
-                                  plane.is_way ? about : nullptr, plane.step, plane.w_step, begin, end});
+      settle_blocks(ground_.set, {vectors, about, about, plane.step, plane.w_step, begin, end});
     });
   }
+  if (moving(PlaneRole::RodAxis) == nullptr) return;
+  twist_steps_.resize(size_t{block_count()} * kBlockStrands * model_.vertex_count);
+  twist([](const glm::vec3& axis, const glm::vec3& found, const glm::vec3& side, int32_t) {
+    const float turned = 1.0f + dot(axis, found);
+    const float tangent = turned > 1e-3f ? dot(axis, side) / turned : 0.0f;
+    return std::clamp(steps_of(tangent, kTwistStep), -kMostTwistSteps, kMostTwistSteps);
+  });
 }
 
-/// Of order 2 the way lags behind the velocity by half of what that changed by.
-float Predictor::way_velocity(size_t place, uint32_t v, uint32_t axis) const {
-  return at(*moving(PlaneRole::Velocity), place, v, axis) -
-         0.5f * at(*moving(PlaneRole::VelocityChange), place, v, axis);
+/// Turns axes without twist about the strands as they lie; steps_of_axis(axis, found, side) gives by how
+/// much.
+template <class StepsOfAxis>
+void Predictor::twist(StepsOfAxis steps_of_axis) {
+  StrandBlocks& axes = *moving(PlaneRole::RodAxis);
+  const StrandBlocks& position = *moving(PlaneRole::Position);
+  StrandBlocks found_axes(places_, axes.row_count());
+  find_axes(found_axes);
+  for_blocks([&](uint32_t block_begin, uint32_t block_end) {
+    for (size_t place = size_t{block_begin} * kBlockStrands; place < size_t{block_end} * kBlockStrands;
+         ++place) {
+      glm::vec3 along(0.0f);
+      for (uint32_t v = 1; v < axes.row_count(); ++v) {
+        const glm::vec3 edge = vector_at(position, place, v) - vector_at(position, place, v - 1);
+        const float squared = dot(edge, edge);
+        if (squared > kTiniestEdgeM2) along = edge * (1.0f / std::sqrt(squared));
+        const glm::vec3 found = vector_at(found_axes, place, v);
+        const glm::vec3 side(along.y * found.z - along.z * found.y, along.z * found.x - along.x * found.z,
+                             along.x * found.y - along.y * found.x);
+        int32_t& steps = twist_steps_[place * axes.row_count() + v];
+        steps = steps_of_axis(vector_at(axes, place, v), found, side, steps);
+        const float t = kTwistStep * static_cast<float>(steps);
+        const float scale = 1.0f / (1.0f + t * t);
+        for (int axis = 0; axis < 3; ++axis)
+          at(axes, place, v, axis) = ((1.0f - t * t) * found[axis] + (2.0f * t) * side[axis]) * scale;
+        at(axes, place, v, 3) = 0.0f;
+      }
+    }
+  });
 }
 
 void Predictor::write_slice(uint32_t slice, ValueWriter& writer) const {
@@ -145,25 +189,29 @@ void Predictor::write_slice(uint32_t slice, ValueWriter& writer) const {
     const StrandBlocks& vectors = *moving(plane.role);
     const StrandBlocks& velocity = *moving(PlaneRole::Velocity);
     for (uint32_t axis = 0; axis < 3; ++axis) {
-      Component component(vectors.row_count());
+      Component component(layout, slice, vectors.row_count());
       for (size_t place = begin; place < end; ++place) {
         const float seconds = at(velocity, place, 0, 3);
-        component.put_strand(writer, [&](uint32_t v) {
+        component.put_strand(place, writer, [&](uint32_t v) {
           float value = at(vectors, place, v, axis);
-          if (plane.is_way) value -= seconds * way_velocity(place, v, axis);
-          if (plane.role == PlaneRole::RodAxis) value -= at(*found_axes_, place, v, axis);
+          if (plane.is_way) value -= seconds * at(velocity, place, v, axis);
           return steps_of(value, plane.step);
         });
       }
     }
     if (plane.w_step == 0.0f) continue;
-    Component component(vectors.row_count());
+    Component component(layout, slice, vectors.row_count());
     for (size_t place = begin; place < end; ++place)
-      component.put_strand(writer, [&](uint32_t v) {
+      component.put_strand(place, writer, [&](uint32_t v) {
         const float w = at(vectors, place, v, 3);
         return v == 0 ? static_cast<int32_t>(w > 0.0f) : steps_of(w, plane.w_step);
       });
   }
+  if (moving(PlaneRole::RodAxis) == nullptr) return;
+  Component component(layout, slice, model_.vertex_count);
+  for (size_t place = begin; place < end; ++place)
+    component.put_strand(place, writer,
+                         [&](uint32_t v) { return twist_steps_[place * model_.vertex_count + v]; });
 }
 
 void Predictor::write_state(std::vector<std::byte>& bytes) const {
@@ -199,16 +247,16 @@ void Predictor::read_slice(uint32_t slice, float history_s, ValueReader& reader)
   for (const StatePlane& plane : state_planes()) {
     StrandBlocks& vectors = *moving(plane.role);
     for (uint32_t axis = 0; axis < 3; ++axis) {
-      Component component(vectors.row_count());
+      Component component(layout, slice, vectors.row_count());
       for (size_t place = begin; place < end; ++place)
-        component.take_strand(reader, [&](uint32_t v, int32_t value) {
+        component.take_strand(place, reader, [&](uint32_t v, int32_t value) {
           at(vectors, place, v, axis) = in_steps(value, plane.step);
         });
     }
     if (plane.w_step == 0.0f) continue;
-    Component component(vectors.row_count());
+    Component component(layout, slice, vectors.row_count());
     for (size_t place = begin; place < end; ++place)
-      component.take_strand(reader, [&](uint32_t v, int32_t value) {
+      component.take_strand(place, reader, [&](uint32_t v, int32_t value) {
         at(vectors, place, v, 3) = v > 0 ? in_steps(value, plane.w_step) : value > 0 ? history_s : 0.0f;
       });
   }
@@ -220,11 +268,17 @@ void Predictor::read_slice(uint32_t slice, float history_s, ValueReader& reader)
       const float seconds = at(velocity, place, 0, 3);
       for (uint32_t v = 0; v < way.row_count(); ++v)
         for (uint32_t axis = 0; axis < 3; ++axis) {
-          const float expected = seconds * way_velocity(place, v, axis);
+          const float expected = seconds * at(velocity, place, v, axis);
           at(way, place, v, axis) = expected + at(way, place, v, axis);
         }
     }
   }
+  if (moving(PlaneRole::RodAxis) == nullptr) return;
+  Component component(layout, slice, model_.vertex_count);
+  for (size_t place = begin; place < end; ++place)
+    component.take_strand(place, reader, [&](uint32_t v, int32_t value) {
+      twist_steps_[place * model_.vertex_count + v] = std::clamp(value, -kMostTwistSteps, kMostTwistSteps);
+    });
 }
 
 Status Predictor::read_state(ByteReader& bytes, const Pose& pose) {
@@ -242,6 +296,7 @@ Status Predictor::read_state(ByteReader& bytes, const Pose& pose) {
   are_usable &= history_s_ >= 0.0f && history_s_ <= static_cast<float>(kMostHistoryS);
   if (!bytes.ok() || !are_usable)
     return make_error(ErrorCode::BadInput, "the state that steps go on from is cut off or no numbers");
+  twist_steps_.assign(size_t{block_count()} * kBlockStrands * model_.vertex_count, 0);
   std::vector<ValueReader> readers(ground_.layout.slice_count());
   for (ValueReader& reader : readers) {
     ASSIGN_OR_RETURN(const auto rest, reader.open(bytes.rest()));
@@ -257,11 +312,8 @@ Status Predictor::read_state(ByteReader& bytes, const Pose& pose) {
 
 void Predictor::place(const tangent::Planes<int32_t>& decoded, float quantum_m) {
   put_positions(decoded, quantum_m);
-  StrandBlocks* axes = moving(PlaneRole::RodAxis);
-  if (axes == nullptr) return;
-  if (found_axes_ == nullptr) found_axes_ = std::make_unique<StrandBlocks>(places_, axes->row_count());
-  find_axes(*found_axes_);
-  for (size_t i = 0; i < axes->size(); ++i) axes->data()[i] = found_axes_->data()[i] + axes->data()[i];
+  if (moving(PlaneRole::RodAxis) == nullptr) return;
+  twist([](const glm::vec3&, const glm::vec3&, const glm::vec3&, int32_t steps) { return steps; });
 }
 
 }  // namespace strandcast::step

@@ -1,6 +1,6 @@
-// RodPlanes: inputs of direct_rod's kernel for a rod at rest, derived from the rest shape of a strand that
-// bends to it without external forces. Models are coded as differences from them. Pure functions; private to
-// common/strands/step.
+// RodPlanes: inputs of direct_rod's kernel for a rod that is at rest in the rest shape under a weight. Models
+// are coded as differences from them. Pure functions with only + - * / and roots of doubles: the same bits on
+// every machine. Private to common/strands/step.
 #pragma once
 
 #include <cstdint>
@@ -23,6 +23,11 @@ struct RodShapes {
   uint32_t pinned_root_count;
   uint32_t pinned_tail_count;
   bool has_twist;
+  // Weight that the rest shape carries; none without stiffness.
+  glm::vec3 weight_mps2{0.0f};
+  double tip_length_m = 0.0;               // of hair that weighs as much as what hangs at the tip
+  double twist_over_bend = 0.0;            // stiffness
+  std::span<const float> bend_m4ps2 = {};  // (strand_count) stiffness
 };
 RodPlanes natural_rods(const RodShapes& shapes);
 

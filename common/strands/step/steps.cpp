@@ -123,7 +123,7 @@ bool EncoderSteps::take_model(const std::shared_ptr<const StepModel>& model, con
   if (model == nullptr || rest_in_head_m_.size() != size_t{layout.strand_count} * layout.vertex_count ||
       model->vertex_count != layout.vertex_count || model->strand_count < layout.strand_count)
     return false;
-  write_model(*model, rest_in_head_m_, layout.strand_count, model_bytes_);
+  write_model(*model, rest_in_head_m_, layout.strand_count, model_bytes_, scene_.groom_gravity_in_head_mps2);
   ByteReader reader(model_bytes_);
   Result<StepModel> read = read_model(reader, rest_in_head_m_, layout.strand_count, layout.vertex_count);
   if (!read) return false;

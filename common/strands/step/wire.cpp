@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "common/base/check.h"
@@ -21,6 +22,7 @@ constexpr size_t kMostNameBytes = 40;
 constexpr float kDirectionStep = 1.0f / 8192.0f;  // of what a rod is told beside its rest shape
 constexpr uint32_t kDroppedBits = 12;             // of a stiffness
 constexpr float kMostStiffness = 1e12f;
+constexpr double kMostTipLengthM = 1e3;
 constexpr double kLargest = 1e20;  // of parameters and constants
 constexpr uint8_t kVolume = 0x80;  // beside a kernel's number
 constexpr uint8_t kPasses = 0x40;
@@ -114,58 +116,115 @@ float of_first_bits(int32_t bits) {
   return value >= 0.0f && value < kMostStiffness ? value : 0.0f;
 }
 
-RodPlanes natural_rods_of(const StepModel& model, std::span<const glm::vec3> rest_in_head_m,
-                          uint32_t strand_count) {
-  const bool has_twist = model.kernel.variant_of("HAS_TWIST") != 0;
-  return natural_rods({rest_in_head_m, strand_count, model.vertex_count, model.pinned_root_count,
-                       model.pinned_tail_count, has_twist});
+/// What tells how the rods of a model lie in their rest shape.
+struct RodsTold {
+  std::span<const glm::vec3> rest_in_head_m;
+  uint32_t strand_count;
+  double twist_over_bend = 0.0;
+  glm::vec3 weight_mps2{0.0f};
+  std::vector<float> bend_m4ps2 = {};
+};
+RodPlanes natural_rods_of(const StepModel& model, const RodsTold& told) {
+  RodShapes shapes{told.rest_in_head_m,     told.strand_count,
+                   model.vertex_count,      model.pinned_root_count,
+                   model.pinned_tail_count, model.kernel.variant_of("HAS_TWIST") != 0};
+  shapes.weight_mps2 = told.weight_mps2;
+  shapes.twist_over_bend = told.twist_over_bend;
+  shapes.bend_m4ps2 = told.bend_m4ps2;
+  const auto tip = model.kernel.constants.find("u_tip_length");
+  if (tip != model.kernel.constants.end() && std::holds_alternative<double>(tip->second))
+    shapes.tip_length_m = std::clamp(std::get<double>(tip->second), 0.0, kMostTipLengthM);
+  return natural_rods(shapes);
 }
 
-/// Directions of clamps and joints; then how stiff strands are.
-void write_rods(StepModel model, std::span<const glm::vec3> rest_in_head_m, uint32_t strand_count,
+/// The weight that rods carry in their rest shape: the sixteenths of gravity that foretell a few of them
+/// best.
+glm::vec3 carried_weight(const StepModel& model, const RodsTold& told, const glm::dvec3& gravity_mps2) {
+  constexpr uint32_t kSample = 16;
+  constexpr int kShares = 16;
+  const uint32_t count = std::min(told.strand_count, kSample);
+  std::vector<glm::vec3> rest_in_head_m(size_t{count} * model.vertex_count);
+  RodsTold sample{rest_in_head_m, count, told.twist_over_bend};
+  const auto strand_of = [&](uint32_t i) { return i * (told.strand_count / count); };
+  for (uint32_t i = 0; i < count; ++i) {
+    sample.bend_m4ps2.push_back(told.bend_m4ps2[strand_of(i)]);
+    for (uint32_t v = 0; v < model.vertex_count; ++v)
+      rest_in_head_m[size_t{v} * count + i] =
+          told.rest_in_head_m[size_t{v} * told.strand_count + strand_of(i)];
+  }
+  glm::vec3 best(0.0f);
+  float least = std::numeric_limits<float>::infinity();
+  for (int share = 0; share <= kShares; ++share) {
+    sample.weight_mps2 = glm::vec3(gravity_mps2 * (static_cast<double>(share) / kShares));
+    const RodPlanes natural = natural_rods_of(model, sample);
+    float apart = 0.0f;
+    for (uint32_t i = 0; i < count; ++i)
+      for (uint32_t v = model.pinned_root_count + 1; v < model.vertex_count; ++v)
+        apart += glm::distance(glm::vec3(model.rod_edge[size_t{v} * model.strand_count + strand_of(i)]),
+                               glm::vec3(natural.edge[size_t{v} * count + i]));
+    if (apart < least) best = sample.weight_mps2;
+    least = std::min(apart, least);
+  }
+  return best;
+}
+
+/// How stiff strands are; then directions of clamps and joints beside those of rods that carry a weight.
+void write_rods(StepModel model, RodsTold told, const glm::dvec3& gravity_mps2,
                 std::vector<std::byte>& bytes) {
-  const RodPlanes natural = natural_rods_of(model, rest_in_head_m, strand_count);
   ByteWriter to(bytes);
   const size_t stride = model.strand_count;
   const glm::vec4* const bend = model.rod_strand.data() + 2 * stride;
   const glm::vec4* const twist = model.rod_strand.data() + 3 * stride;
-  to.put(strand_count > 0 && bend->w > 0.0f ? twist->w / bend->w : 0.0f);
+  const float twist_over_bend = told.strand_count > 0 && bend->w > 0.0f ? twist->w / bend->w : 0.0f;
+  to.put(twist_over_bend);
+  told.twist_over_bend = static_cast<double>(twist_over_bend);
   ValueWriter writer;
-  std::array<NumberTables, 3> tables;
-  code_rods(model, strand_count, natural, [&](float& value, float expected, int axis) {
-    const float steps = (std::clamp(value, -1.0f, 1.0f) - expected) / kDirectionStep;
-    tables[static_cast<size_t>(axis)].put(static_cast<int32_t>(std::lrint(steps)), writer);
-  });
   NumberTables stiffness;
   int32_t before = 0;
-  for (uint32_t s = 0; s < strand_count; ++s) {
+  for (uint32_t s = 0; s < told.strand_count; ++s) {
     const int32_t bits = first_bits(bend[s].w);
     stiffness.put(bits - before, writer);
     before = bits;
+    told.bend_m4ps2.push_back(of_first_bits(bits));
   }
+  told.weight_mps2 = carried_weight(model, told, gravity_mps2);
+  put_vector(told.weight_mps2, to);
+  const RodPlanes natural = natural_rods_of(model, told);
+  std::array<NumberTables, 3> tables;
+  code_rods(model, told.strand_count, natural, [&](float& value, float expected, int axis) {
+    const float steps = (std::clamp(value, -1.0f, 1.0f) - expected) / kDirectionStep;
+    tables[static_cast<size_t>(axis)].put(static_cast<int32_t>(std::lrint(steps)), writer);
+  });
   writer.finish(bytes);
 }
 
 Status read_rods(ByteReader& bytes, std::span<const glm::vec3> rest_in_head_m, StepModel& model) {
-  RodPlanes natural = natural_rods_of(model, rest_in_head_m, model.strand_count);
-  model.rod_edge = natural.edge;
-  model.rod_strand = natural.strand;
-  const auto twist_over_bend = bytes.take<float>();
-  if (!bytes.ok() || !(twist_over_bend >= 0.0f && twist_over_bend < kMostStiffness))
-    return make_error(ErrorCode::BadInput, "the rods of a step are cut off or have no stiffness");
+  Numbers from{bytes};
+  RodsTold told{rest_in_head_m, model.strand_count};
+  const auto twist_over_bend = from.take<float>(static_cast<double>(kMostStiffness));
+  told.weight_mps2 = from.vector<float, glm::vec3>(kMaxGravityMps2);
+  from.are_usable &= twist_over_bend >= 0.0f;
+  RETURN_IF_ERROR(from.status("the rods"));
+  told.twist_over_bend = static_cast<double>(twist_over_bend);
   ValueReader reader;
   ASSIGN_OR_RETURN(const auto rest, reader.open(bytes.rest()));
   bytes.take_bytes(bytes.rest().size() - rest.size());
+  NumberTables stiffness;
+  int32_t before = 0;
+  for (uint32_t s = 0; s < model.strand_count; ++s) {
+    before = wrapping_sum(before, stiffness.take(reader));
+    told.bend_m4ps2.push_back(of_first_bits(before));
+  }
+  RodPlanes natural = natural_rods_of(model, told);
+  model.rod_edge = natural.edge;
+  model.rod_strand = natural.strand;
   std::array<NumberTables, 3> tables;
   code_rods(model, model.strand_count, natural, [&](float& value, float expected, int axis) {
     const auto steps = static_cast<float>(tables[static_cast<size_t>(axis)].take(reader));
     value = std::clamp(expected + kDirectionStep * steps, -1.0f, 1.0f);
   });
-  NumberTables stiffness;
-  int32_t before = 0;
   for (uint32_t s = 0; s < model.strand_count; ++s) {
-    before = wrapping_sum(before, stiffness.take(reader));
-    const float bend = of_first_bits(before);
+    const float bend = told.bend_m4ps2[s];
     model.rod_strand[size_t{2} * model.strand_count + s].w = bend;
     model.rod_strand[size_t{3} * model.strand_count + s].w = bend * twist_over_bend;
   }
@@ -450,7 +509,7 @@ bool tells_body(const StepTick& tick, const StepScene& scene) {
 }  // namespace
 
 void write_model(const StepModel& model, std::span<const glm::vec3> rest_in_head_m, uint32_t strand_count,
-                 std::vector<std::byte>& bytes) {
+                 std::vector<std::byte>& bytes, const glm::dvec3& gravity_mps2) {
   ByteWriter to(bytes);
   const StepKernel* kernel = find_step_kernel(model.kernel.shader_path);
   to.put(static_cast<uint8_t>(kernel->number | (tells_volume(model) ? kVolume : 0) |
@@ -468,7 +527,7 @@ void write_model(const StepModel& model, std::span<const glm::vec3> rest_in_head
   }
   if (tells_volume(model)) write_volume(model.volume, to);
   if (model.has_passes()) write_passes(model, bytes);
-  if (!kernel->fixed.empty()) write_rods(model, rest_in_head_m, strand_count, bytes);
+  if (!kernel->fixed.empty()) write_rods(model, {rest_in_head_m, strand_count}, gravity_mps2, bytes);
 }
 
 Result<StepModel> read_model(ByteReader& bytes, std::span<const glm::vec3> rest_in_head_m,

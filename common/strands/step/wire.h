@@ -22,9 +22,9 @@ inline constexpr uint64_t kMostVertexRounds = uint64_t{1} << 28;
 uint64_t vertex_rounds(const StepModel& model, const StepScene& scene, size_t tick_count);
 
 /// Appends the model for the first `strand_count` strands, whose rest shape has (vertex_count x strand_count)
-/// points, strand fastest.
+/// points, strand fastest. Rods may carry their weight under this gravity of the head space.
 void write_model(const StepModel& model, std::span<const glm::vec3> rest_in_head_m, uint32_t strand_count,
-                 std::vector<std::byte>& bytes);
+                 std::vector<std::byte>& bytes, const glm::dvec3& gravity_mps2 = glm::dvec3(0.0));
 /// Reads a model for these counts from untrusted bytes. BadInput for an unknown kernel, for values that are
 /// not finite, and for counts that no kernel may run with.
 Result<StepModel> read_model(ByteReader& bytes, std::span<const glm::vec3> rest_in_head_m,

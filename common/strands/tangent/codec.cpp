@@ -26,7 +26,7 @@ namespace strandcast::tangent {
 namespace {
 
 constexpr uint8_t kTangentNumber = 5;
-constexpr uint8_t kStepNumber = 11;
+constexpr uint8_t kStepNumber = 12;
 constexpr int kTableLevel = 3;
 constexpr uint8_t kAnchorFlag = 1;
 
