@@ -1,7 +1,10 @@
 #include "server/report/truth_views.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 
 #include "common/base/file.h"
