@@ -75,6 +75,6 @@ inline constexpr double kStepActiveBits = 0.17;
 inline constexpr double kStepViolentBits = 0.36;
 /// Of the median half second of the walk kStreamClip.
 inline constexpr double kStepClipBits = 0.29;
-inline constexpr double kStepTimesFewerThanTemporal = 35.0;
+inline constexpr double kStepTimesFewerThanTemporal = 34.0;
 
 }  // namespace strandcast::claims

@@ -169,7 +169,7 @@ std::vector<double> chest_headings(double rate_hz, double seconds, Heading headi
     input.has_motion = true;
     input.world_from_head.rotation = glm::angleAxis(glm::radians(heading(i / rate_hz)), kUp);
     const SceneStep& step = builder.build(input, {}, i / rate_hz);
-    const BustTurn turn = bust_turn(builder.bust(), input.world_from_head.rotation);
+    const BustTurn turn = bust_turn(builder.bust(), step.world_from_head.rotation);
     const double w = std::sqrt(1.0 - glm::dot(turn, turn));
     headings.push_back(heading_deg(input.world_from_head.rotation * glm::dquat(w, turn.x, turn.y, turn.z)));
     if (has_bust) {
