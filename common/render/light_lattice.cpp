@@ -289,7 +289,8 @@ void LightLattice::find_solid(int y, int z, std::vector<float>& share) const {
 std::vector<float> LightLattice::halved_with(float solid_depth) const {
   std::vector<float> all = halved_;
   solid_depth *= view_.cell_m / view_.soft_m;
-  for (size_t i = 0; i < halved_solid_.size(); ++i) all[i] += solid_depth * halved_solid_[i];
+  for (size_t i = 0; i < halved_solid_.size(); ++i)
+    all[i] += solid_depth * std::max(2.0f * halved_solid_[i] - 2.0f, 0.0f);
   return all;
 }
 

@@ -77,7 +77,8 @@ inline constexpr int kSolidBorderCells = 2;
 /// as the ramp.
 inline constexpr float kSolidDepth = 12.0f;
 /// Optical depth of the head per LatticeFrame::soft_m for rim light and sky, which sum it up. The sky's is
-/// small, because each way stands for a part of the sky that is wide.
+/// small, because each way stands for a part of the sky that is wide. Halved cells of which less than half is
+/// head have none, or skin would shade itself in rings.
 inline constexpr float kSolidRimDepth = 2.0f;
 inline constexpr float kSolidSkyDepth = 0.2f;
 /// The sky's depth is that of the mean light of its ways, when each loses exp(-this * depth) of it.

@@ -9,8 +9,8 @@ LAW vec3 skin_radiance(vec3 skin_color, vec3 root_color, HairLights lights, Ligh
                    float cover) {
   // Light scattered inside skin reaches past the terminator, red furthest (Green 2004, wrap lighting).
   const vec3 kWrap = vec3(0.12, 0.05, 0.03);
-  // Short hair and roots that are not drawn tint the skin between those that are.
-  const float kScalpTint = 0.85;
+  // Roots that are not drawn tint the skin between those that are; where hair parts, skin shines.
+  const float kScalpTint = 0.30;
   const float kShine = 0.10;
   const float kGroundLight = 0.45;
   const float kSkyReach = 0.18;

@@ -1,5 +1,5 @@
 // Optical depth across cells twice as wide: the sum of two in their length, the mean over four across. To each light the
-// head is as opaque as the light says.
+// head is as opaque as the light says, from half a cell of it on.
 #include "render/tile_frame.glsl"
 
 layout(local_size_x = 32, local_size_y = 2) in;
@@ -23,5 +23,5 @@ void main() {
     sum += unpackHalf2x16(uint(b_sums.cell[(corner.z * size.y + corner.y) * size.x + corner.x]));
   }
   b_halved.depth[(at.z * u_frame.half_size.y + at.y) * u_frame.half_size.x + at.x] =
-      0.25 * (sum.x + u_solid_depth * sum.y);
+      0.25 * sum.x + u_solid_depth * max(0.5 * sum.y - 2.0, 0.0);
 }
