@@ -17,7 +17,7 @@ import sys
 # Bytes at most: a document, or a folder's documents.
 SIZES = {"README.md": 8000, "CONTRIBUTING.md": 8000, "ARCHITECTURE.md": 16000, "SECURITY.md": 16000,
          "CHANGELOG.md": 12000, "docs/use/*.md": 5000, "docs/internals/*.md": 8000}
-ALL_BYTES = 171500
+ALL_BYTES = 170000
 PLAIN = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"]
 MEAN_WORDS = 15
 LONG_WORDS, LONG_SENTENCES = 25, 15
