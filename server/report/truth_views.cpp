@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -60,6 +61,25 @@ const NamedFields& light_fields() {
   return kFields;
 }
 
+/// Colours of root and tip that the truths were made with: presets may change, and these do not.
+const NamedFields& color_fields() {
+  static const auto custom = [](const std::array<float, 6>& rgb) {
+    std::vector<std::string> fields = {"look.hair_color=custom"};
+    const char* names[] = {"root_color.r", "root_color.g", "root_color.b",
+                           "tip_color.r",  "tip_color.g",  "tip_color.b"};
+    for (size_t i = 0; i < rgb.size(); ++i) fields.push_back(fmt::format("look.{}={}", names[i], rgb[i]));
+    return fields;
+  };
+  static const NamedFields kFields = {
+      {"black", custom({0.010f, 0.008f, 0.007f, 0.019f, 0.015f, 0.013f})},
+      {"brown", custom({0.070f, 0.033f, 0.016f, 0.190f, 0.092f, 0.040f})},
+      {"blond", custom({0.360f, 0.225f, 0.100f, 0.640f, 0.455f, 0.240f})},
+      {"red", custom({0.230f, 0.058f, 0.018f, 0.430f, 0.130f, 0.038f})},
+      {"grey", custom({0.300f, 0.300f, 0.310f, 0.500f, 0.500f, 0.510f})},
+  };
+  return kFields;
+}
+
 // Fitted or held out in turn, so that both have every kind of hair, light and place.
 constexpr bool kFitted = true;
 constexpr bool kHeldOut = false;
@@ -93,7 +113,8 @@ std::vector<std::string> TruthView::overrides() const {
   const std::vector<std::string>& of_light = light_fields().at(light);
   fields.insert(fields.end(), of_light.begin(), of_light.end());
   const bool is_wet = color.starts_with(kWet);
-  fields.push_back("look.hair_color=" + (is_wet ? color.substr(kWet.size()) : color));
+  const std::vector<std::string>& of_color = color_fields().at(is_wet ? color.substr(kWet.size()) : color);
+  fields.insert(fields.end(), of_color.begin(), of_color.end());
   if (is_wet) fields.emplace_back("look.shading.wetness=1");
   return fields;
 }
