@@ -419,8 +419,12 @@ export function readFrameHeader(message: Uint8Array): FrameHeader {
   };
 }
 
-const STATE_HASH_AT = kFrameHeaderBytes + 88;
+// Of the payload: in the fixed part, or after the codec of an exact frame, which has no such part.
+const STATE_HASH_AT = 88;
+const EXACT_BIT = 128;
+const EXACT_HASH_AT = 1;
 /** Of a strand frame that was decoded, and thereby compared with its state. */
 export function readStateHash(message: Uint8Array): bigint {
-  return new DataView(message.buffer, message.byteOffset, message.length).getBigUint64(STATE_HASH_AT, true);
+  const payload = new DataView(message.buffer, message.byteOffset + kFrameHeaderBytes, message.length - kFrameHeaderBytes);
+  return payload.getBigUint64(payload.getUint8(0) & EXACT_BIT ? EXACT_HASH_AT : STATE_HASH_AT, true);
 }
