@@ -7,14 +7,14 @@
 namespace strandcast {
 namespace {
 
-// Chosen by eye under the built-in scene's light; tips are bleached by the sun.
+// Chosen by eye under the built-in scene's light, which shows them as a path tracer does; tips are bleached by the sun.
 constexpr std::array<HairColorPreset, 6> kPresets{{
-    {"black", {{0.010f, 0.008f, 0.007f}, {0.019f, 0.015f, 0.013f}}},
-    {"brown", {{0.070f, 0.033f, 0.016f}, {0.190f, 0.092f, 0.040f}}},
-    {"blond", {{0.360f, 0.225f, 0.100f}, {0.640f, 0.455f, 0.240f}}},
-    {"red", {{0.230f, 0.058f, 0.018f}, {0.430f, 0.130f, 0.038f}}},
+    {"black", {{0.006f, 0.0045f, 0.0038f}, {0.012f, 0.009f, 0.0075f}}},
+    {"brown", {{0.042f, 0.018f, 0.008f}, {0.115f, 0.050f, 0.020f}}},
+    {"blond", {{0.330f, 0.190f, 0.080f}, {0.620f, 0.420f, 0.205f}}},
+    {"red", {{0.150f, 0.033f, 0.010f}, {0.310f, 0.082f, 0.024f}}},
     {"grey", {{0.300f, 0.300f, 0.310f}, {0.500f, 0.500f, 0.510f}}},
-    {"dyed", {{0.060f, 0.020f, 0.200f}, {0.250f, 0.060f, 0.520f}}},
+    {"dyed", {{0.038f, 0.012f, 0.140f}, {0.170f, 0.038f, 0.400f}}},
 }};
 
 const glm::dvec3 kEumelaninAbsorption(0.419, 0.697, 1.37);

@@ -166,8 +166,8 @@ struct HairShadingDesc {
 struct LookDesc {
   // "custom": root_color and tip_color; "melanin": eumelanin and pheomelanin; or a preset: black, brown, ...
   std::string hair_color = "custom";
-  glm::vec3 root_color{0.075f, 0.036f, 0.017f};  // linear RGB, 0..1
-  glm::vec3 tip_color{0.26f, 0.125f, 0.05f};
+  glm::vec3 root_color{0.045f, 0.019f, 0.008f};  // linear RGB, 0..1
+  glm::vec3 tip_color{0.125f, 0.054f, 0.021f};
   float eumelanin = 1.3f;  // concentrations; brown to black
   float pheomelanin = 0.0f;  // yellow to red
   float strand_radius_m = 0.00012f;  // as drawn: a drawn strand stands for several real ones

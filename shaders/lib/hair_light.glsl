@@ -191,6 +191,7 @@ LAW vec3 hair_lit(HairLook look, float tilt, StrandShares shares, vec3 tangent, 
 LAW vec3 hair_radiance(HairLook look, HairStrand hair, HairLights lights, LightDepth depth, float along, vec3 tangent,
                    vec3 to_eye) {
   const float kRimShare = 0.80;  // of its depth: its lattice is coarse
+  const vec3 kBySkin = vec3(1.06, 0.985, 0.965);  // some light comes by way of skin, which sends back red
   const float kGroundLight = 0.52;
   const float kSkyReach = 0.55;
   // Of the sky: hair's colour, brighter where it is dark, and a sheen in the sky's own colour.
@@ -210,7 +211,8 @@ LAW vec3 hair_radiance(HairLook look, HairStrand hair, HairLights lights, LightD
   vec3 body = (kSkyColor * mix(1.0, kSkyWet, look.wetness)) * color / (vec3(1.0) + kSkyFull * color);
   vec3 sky = exp(-(kSkyReach * depth.sky) * (vec3(1.0) - shares.through)) * body +
              (kSkySheen * exp(-kSheenReach * depth.sky)) * (vec3(1.0) - color);
-  return lights.key_color * key + lights.rim_color * rim + (lights.ambient * mix(kGroundLight, 1.0, facing)) * sky;
+  vec3 light = lights.key_color * key + lights.rim_color * rim + (lights.ambient * mix(kGroundLight, 1.0, facing)) * sky;
+  return kBySkin * light;
 }
 
 // How much of its width a strand covers at `along`: it comes out of the skin over its first part and fades out over its
