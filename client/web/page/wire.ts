@@ -420,7 +420,10 @@ export function readFrameHeader(message: Uint8Array): FrameHeader {
 }
 
 const STATE_HASH_AT = kFrameHeaderBytes + 88;
+const EXACT_BIT = 128; // of a payload's first byte: the hash comes next
 /** Of a strand frame that was decoded, and thereby compared with its state. */
 export function readStateHash(message: Uint8Array): bigint {
-  return new DataView(message.buffer, message.byteOffset, message.length).getBigUint64(STATE_HASH_AT, true);
+  const isExact = (message[kFrameHeaderBytes]! & EXACT_BIT) !== 0;
+  const view = new DataView(message.buffer, message.byteOffset, message.length);
+  return view.getBigUint64(isExact ? kFrameHeaderBytes + 1 : STATE_HASH_AT, true);
 }
