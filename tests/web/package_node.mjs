@@ -36,6 +36,21 @@ const until = async (condition, what, ms = 20_000) => {
     if (await condition()) return;
   throw new Error(`${what}: not within ${ms} ms`);
 };
+/** The same socket; see(bytes) gets each message before it is taken. */
+const socketThat = (see) => class extends Socket {
+  set onmessage(take) {
+    this.taken = take;
+    const seen = (event) => {
+      see(new Uint8Array(event.data));
+      take(event);
+    };
+    if (Socket === NodeSocket) Object.defineProperty(this, 'onmessage', { value: seen, writable: true });
+    else super.onmessage = seen;
+  }
+  get onmessage() {
+    return this.taken;
+  }
+};
 /** So many states. */
 async function take(connection, count) {
   const states = [];
@@ -102,24 +117,24 @@ const tests = {
     connection.close();
     assert.deepEqual(await take(connection, 1), []);
   },
+  async 'exact frames are states like others'() {
+    // A head that stands still: soon every vertex is where the steps lead.
+    let exact = 0;
+    const Counting = socketThat((bytes) => (exact += bytes[0] === 0x21 && bytes[32] >= 128 ? 1 : 0));
+    const links = [];
+    const connection = open(server, { WebSocket: Counting, codec: 'step' });
+    connection.on('link', ({ state, reason }) => links.push(state === 'waiting' ? reason : ''));
+    await until(() => exact >= 5 || links.some(Boolean), 'exact frames');
+    assert.match((await take(connection, 1))[0].hash, /^[0-9a-f]{16}$/);
+    assert.deepEqual(links.filter(Boolean), []);
+    connection.close();
+  },
   async 'a frame that was changed on its way is no state'() {
     // The same socket with a bit of every frame turned over after the first few: without that, frames go on (above).
     let frames = 0;
-    class Turning extends Socket {
-      set onmessage(take) {
-        this.taken = take;
-        const turned = (event) => {
-          const bytes = new Uint8Array(event.data);
-          if (bytes[0] >= 0x20 && bytes[0] < 0x30 && ++frames > 3) bytes[bytes.length - 1] ^= 1;
-          take(event);
-        };
-        if (Socket === NodeSocket) Object.defineProperty(this, 'onmessage', { value: turned, writable: true });
-        else super.onmessage = turned;
-      }
-      get onmessage() {
-        return this.taken;
-      }
-    }
+    const Turning = socketThat((bytes) => {
+      if (bytes[0] >= 0x20 && bytes[0] < 0x30 && ++frames > 3) bytes[bytes.length - 1] ^= 1;
+    });
     const connection = open(server, { WebSocket: Turning });
     let states = 0;
     connection.on('state', () => ++states);

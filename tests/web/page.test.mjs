@@ -142,6 +142,16 @@ check('media header', () => {
   assert.equal(header.sendTimeNs, -2);
   assert.throws(() => page.readFrameHeader(bytes.subarray(0, 34)));
 });
+check('state hash of every kept frame, exact ones too', () => {
+  let exact = 0;
+  const folder = 'tests/conformance/vectors';
+  for (const file of fs.readdirSync(path.join(root, folder)).filter((name) => name.startsWith('strands_step_12_')))
+    for (const [, hash, hex] of read(`${folder}/${file}`).matchAll(/^step \w+ (\w+) (\w+)/gm)) {
+      if (hex.startsWith('8', 2 * page.kFrameHeaderBytes)) ++exact;
+      assert.equal(page.readStateHash(Uint8Array.from(Buffer.from(hex, 'hex'))).toString(16).padStart(16, '0'), hash, file);
+    }
+  assert.ok(exact >= 3, `${exact} exact frames`);
+});
 
 // ---- copies of what C++ has
 

@@ -434,16 +434,23 @@ TEST(StrandBytes, BombsInPlaceOfSymbolTablesAreRefused) {
     ASSERT_FALSE(decoded);
     EXPECT_EQ(decoded.error().place, "symbol tables");
   }
-  // Tables that do not rise would make a share of nothing or less.
-  const Bytes flat = compressed(Bytes(sizeof(Tables)), ContentSize::Declared);
-  Bytes message(key->message.begin(), key->message.begin() + kTablesAt);
-  ByteWriter writer(message);
-  writer.put(static_cast<uint32_t>(flat.size()));
-  writer.put_bytes(flat);
-  message.resize(message.size() + weight_bytes);
-  const auto decoded = stream.decoder->decode(with_length(message));
-  ASSERT_FALSE(decoded);
-  EXPECT_THAT(decoded.error().message, testing::HasSubstr("does not rise"));
+  // Tables that do not rise would make a share of nothing or less. Shares of falling ones wrap around.
+  Bytes falling(sizeof(Tables));
+  for (size_t i = 0; i < falling.size() / sizeof(int16_t); ++i) {
+    const auto start = static_cast<int16_t>(-static_cast<int>(i % kSymbolCount));
+    std::memcpy(falling.data() + i * sizeof start, &start, sizeof start);
+  }
+  for (const Bytes& tables : {Bytes(sizeof(Tables)), falling}) {
+    const Bytes content = compressed(tables, ContentSize::Declared);
+    Bytes message(key->message.begin(), key->message.begin() + kTablesAt);
+    ByteWriter writer(message);
+    writer.put(static_cast<uint32_t>(content.size()));
+    writer.put_bytes(content);
+    message.resize(message.size() + weight_bytes);
+    const auto decoded = stream.decoder->decode(with_length(message));
+    ASSERT_FALSE(decoded);
+    EXPECT_THAT(decoded.error().message, testing::HasSubstr("does not rise"));
+  }
   EXPECT_TRUE(stream.decoder->decode(key->message));
 }
 

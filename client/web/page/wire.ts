@@ -419,12 +419,11 @@ export function readFrameHeader(message: Uint8Array): FrameHeader {
   };
 }
 
-// Of the payload: in the fixed part, or after the codec of an exact frame, which has no such part.
-const STATE_HASH_AT = 88;
-const EXACT_BIT = 128;
-const EXACT_HASH_AT = 1;
+const STATE_HASH_AT = kFrameHeaderBytes + 88;
+const EXACT_BIT = 128; // of a payload's first byte: the hash comes next
 /** Of a strand frame that was decoded, and thereby compared with its state. */
 export function readStateHash(message: Uint8Array): bigint {
-  const payload = new DataView(message.buffer, message.byteOffset + kFrameHeaderBytes, message.length - kFrameHeaderBytes);
-  return payload.getBigUint64(payload.getUint8(0) & EXACT_BIT ? EXACT_HASH_AT : STATE_HASH_AT, true);
+  const isExact = (message[kFrameHeaderBytes]! & EXACT_BIT) !== 0;
+  const view = new DataView(message.buffer, message.byteOffset, message.length);
+  return view.getBigUint64(isExact ? kFrameHeaderBytes + 1 : STATE_HASH_AT, true);
 }
