@@ -187,10 +187,26 @@ LAW vec3 hair_lit(HairLook look, float tilt, StrandShares shares, vec3 tangent, 
   return direct * (hair_lobes(look, tilt, shares, angles, dot(to_light, to_eye)) + around) + indirect * (spread + around);
 }
 
+// Depth in front of a strand that is seen. `own`: what a lattice finds within the strand's own lock, of which the strands
+// that are seen have less in front of them than those behind.
+LAW float depth_of_seen(float depth, float own) { return depth * depth / (depth + own); }
+
+LAW float key_depth_of_seen(float depth) {
+  const float kOwn = 0.5;
+  const float kShare = 1.17;  // keeps depths of about 3 as they are
+  return kShare * depth_of_seen(depth, kOwn);
+}
+
+// Likewise; this lattice is twice as coarse.
+LAW float rim_depth_of_seen(float depth) {
+  const float kOwn = 1.5;
+  const float kShare = 1.15;
+  return kShare * depth_of_seen(depth, kOwn);
+}
+
 // Of all that reaches a point of a strand.
 LAW vec3 hair_radiance(HairLook look, HairStrand hair, HairLights lights, LightDepth depth, float along, vec3 tangent,
                    vec3 to_eye) {
-  const float kRimShare = 0.80;  // of its depth: its lattice is coarse
   const vec3 kBySkin = vec3(1.06, 0.985, 0.965);  // some light comes by way of skin, which sends back red
   const float kGroundLight = 0.52;
   const float kSkyReach = 0.55;
@@ -203,9 +219,9 @@ LAW vec3 hair_radiance(HairLook look, HairStrand hair, HairLights lights, LightD
   vec3 color = hair_color(look, hair, along);
   StrandShares shares = strand_shares(color, look.wetness);
   float tilt = look.tilt + hair.tilt;
-  vec3 key = hair_lit(look, tilt, shares, tangent, lights.to_key, to_eye, depth.key);
+  vec3 key = hair_lit(look, tilt, shares, tangent, lights.to_key, to_eye, key_depth_of_seen(depth.key));
   vec3 rim = vec3(0.0);
-  if (lights.has_rim) rim = hair_lit(look, tilt, shares, tangent, lights.to_rim, to_eye, kRimShare * depth.rim);
+  if (lights.has_rim) rim = hair_lit(look, tilt, shares, tangent, lights.to_rim, to_eye, rim_depth_of_seen(depth.rim));
   vec3 across = to_eye - tangent * dot(tangent, to_eye);
   float facing = 0.5 + 0.5 * dot(across, lights.up);
   vec3 body = (kSkyColor * mix(1.0, kSkyWet, look.wetness)) * color / (vec3(1.0) + kSkyFull * color);

@@ -128,6 +128,32 @@ TEST(HairLight, DepthTakesMoreOfTheDarkerColours) {
   EXPECT_NEAR(left(grey_deep.x, grey_near.x), left(grey_deep.z, grey_near.z), 1e-6);
 }
 
+// Of a lock of depth D, all within a cell, the lattice says D / 2 at every strand. Seen from where the light
+// is, a strand with n in front of it counts exp(-n), so that seen strands get (1 + exp(-D)) / 2 of the light
+// on average.
+TEST(HairLight, StrandsThatAreSeenStandInFrontOfTheirLock) {
+  constexpr double kCrossedPerDepth = 1.25;
+  for (const double lock_depth : {1.0, 1.5, 2.0}) {
+    const double expected = 0.5 + 0.5 * std::exp(-kCrossedPerDepth * lock_depth);
+    const auto error = [&](double depth) { return std::abs(std::exp(-kCrossedPerDepth * depth) - expected); };
+    const double mean_depth = 0.5 * lock_depth;
+    const law::Float seen = law::key_depth_of_seen(static_cast<float>(mean_depth));
+    EXPECT_LT(error(double{seen.v[0]}), 0.65 * error(mean_depth)) << lock_depth;
+  }
+  // What lies deep has all of the hair in front of it.
+  for (const float depth : {3.0f, 4.0f, 5.0f})
+    EXPECT_NEAR(law::key_depth_of_seen(depth).v[0], depth, 0.08f * depth);
+  EXPECT_EQ(law::key_depth_of_seen(0.0f).v[0], 0.0f);
+}
+
+// A rim light from behind leaves a bright edge and dark hair inside: more of the light is lost between a
+// depth of 1 and of 4 than a depth that counts whole would take.
+TEST(HairLight, ARimIsBrightAtTheEdge) {
+  const auto left = [](float depth) { return std::exp(-double{law::rim_depth_of_seen(depth).v[0]}); };
+  EXPECT_GT(left(1.0f), 1.5 * std::exp(-1.0));
+  EXPECT_LT(left(4.0f) / left(1.0f), std::exp(-2.6));
+}
+
 TEST(HairLight, WaterTakesLightOut) {
   const law::StrandShares dry = law::strand_shares(law::vec3(0.19f, 0.092f, 0.04f), 0.0f);
   const law::StrandShares wet = law::strand_shares(law::vec3(0.19f, 0.092f, 0.04f), 1.0f);
