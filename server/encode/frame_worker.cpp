@@ -82,6 +82,7 @@ void FrameWorker::set_views(std::map<uint32_t, PictureView> views, int64_t paint
     painter_rest_ns_ = painter_rest_ns;
     has_new_views_ = true;
     if (views_.empty()) {
+      has_gap_ = true;
       pending_.clear();
       pending_bytes_ = 0;
     }
@@ -160,7 +161,8 @@ void FrameWorker::run() {
       rest(job.painter_rest_ns);
       continue;
     }
-    if (!is_active_) begin();
+    // Who looks away and back within a drawing was never seen to be gone.
+    if (!is_active_ || job.has_gap) begin();
     update_views(job.views);
     decode(job.strand_frames);
     if (job.is_redrawn) ++decode_count_;
@@ -194,6 +196,7 @@ FrameWorker::Job FrameWorker::wait_for_job() {
   Job job{std::exchange(pending_, {}),
           {},
           painter_rest_ns_,
+          std::exchange(has_gap_, false),
           std::exchange(wanted_wholes_, {}),
           std::exchange(new_look_, std::nullopt),
           std::exchange(is_redraw_wanted_, false),

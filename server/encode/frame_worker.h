@@ -132,6 +132,7 @@ class FrameWorker {
     std::deque<EncodedFramePtr> strand_frames;
     std::map<uint32_t, PictureView> views;
     int64_t painter_rest_ns = 0;
+    bool has_gap = false;
     std::set<uint32_t> wholes;
     std::optional<LookDesc> look;
     bool is_redrawn = false;
@@ -186,6 +187,7 @@ class FrameWorker {
   std::map<uint32_t, PictureView> views_;
   int64_t painter_rest_ns_ = 0;
   bool has_new_views_ = false;
+  bool has_gap_ = false;  // strand frames came by while nobody watched
   std::set<uint32_t> wanted_wholes_;
   std::optional<LookDesc> new_look_;
   bool is_redraw_wanted_ = false;

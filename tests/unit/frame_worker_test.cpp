@@ -336,6 +336,26 @@ TEST_F(FrameWork, APainterRestsForAWhileOnly) {
   EXPECT_TRUE(eventually([&] { return studio_.get([](Studio& s) { return s.painters_alive; }) == 0; }));
 }
 
+TEST_F(FrameWork, WhoLooksAwayAndBackWithinADrawingJoinsTheChainAnew) {
+  const auto worker = start(kFastHz);
+  next_delta();
+  worker->set_views(one_view());
+  studio_.hold(true);
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return studio_.get([](Studio& s) { return s.is_inside; }); }));
+  worker->set_views({}, kPainterRestNs);
+  worker->offer(next_delta());  // nobody wants it
+  worker->set_views(one_view());
+  worker->offer(next_delta());
+  studio_.hold(false);
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] {
+    const auto given = frames();
+    return !given.empty() && given.back().second->header.sim_time_ns == 3000;
+  }));
+  EXPECT_EQ(worker->counters().chain_losses, 0u) << "it is no fault, and nothing is logged";
+}
+
 TEST_F(FrameWork, ALookThatCannotBeDrawnIsToldAndTheOneBeforeStays) {
   studio_.worst_look = 5.0f;
   const auto worker = start(kFastHz);
