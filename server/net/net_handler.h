@@ -97,8 +97,9 @@ class NetHandler {
   /// TryLater, Unsupported as Refused, Unauthorized and NotFound as such, else Policy.
   virtual Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) = 0;
   /// Handles what a session says after its Hello, when its role may say it. The network answers Ping,
-  /// FrameAck and KeyframeRequest itself, and AdminCommand except ShutDown. A CameraChange or WindowChange may
-  /// change the class of the subscription's pictures, a WindowChange whether it is hidden; after a ModeRequest on_link() follows immediately.
+  /// FrameAck and KeyframeRequest itself, and AdminCommand except ShutDown. A CameraChange or WindowChange
+  /// may change the class of the subscription's pictures, a WindowChange whether it is hidden. After a
+  /// ModeRequest on_link() follows immediately.
   virtual void on_message(SessionId session, const ClientMessage& message, int64_t arrival_ns) = 0;
   virtual void on_need(SessionId session, const StreamNeed& need) = 0;
   virtual void on_change(SessionId, SubscriptionChange) {}

@@ -1,5 +1,5 @@
-// Which planted fault is on (plant.py): STRANDCAST_MUTANT names its number. With STRANDCAST_MUTANTS_REACHED the process writes the
-// numbers that it came by to that file when it ends, a line each. Any thread may ask.
+// Which planted fault is on (plant.py): STRANDCAST_MUTANT names its number. With STRANDCAST_MUTANTS_REACHED
+// the process writes the numbers that it came by to that file when it ends, a line each. Any thread may ask.
 #pragma once
 
 #include <cstdio>
