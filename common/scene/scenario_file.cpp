@@ -434,7 +434,7 @@ Result<Scenario> parse_scenario(const std::string& text, const std::string& plac
 
 Result<Scenario> load_scenario(const std::filesystem::path& path) {
   ASSIGN_OR_RETURN(const std::string text, load_text(path, kMaxScenarioFileBytes));
-  return parse_scenario(text, path.string(), path.parent_path());
+  return parse_scenario(text, path.string(), std::filesystem::absolute(path).parent_path());
 }
 
 }  // namespace strandcast

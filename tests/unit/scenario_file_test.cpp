@@ -1,7 +1,9 @@
 // Scenario files: what is read, and how wrong ones are told.
+#include <fstream>
 #include <set>
 
 #include "common/scene/scenario_file.h"
+#include "tests/support/temporary_folder.h"
 
 namespace strandcast::scenario_file_test {
 namespace {
@@ -141,6 +143,18 @@ TEST(ScenarioFile, IsBounded) {
   EXPECT_THAT(parse(many).error().to_string(), HasSubstr("do has 1001 entries, the limit is 1000"));
   const std::string long_text = "name: \"x\"\n" + std::string(kMaxScenarioFileBytes, '#');
   EXPECT_EQ(parse(long_text).error().code, ErrorCode::LimitExceeded);
+}
+
+/// Pictures that it writes are held to the folder, and a folder without a name holds nothing.
+TEST(ScenarioFile, HasAWholeFolderWhereItIsNamedAlone) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.path() / "mine.textproto") << "name: \"mine\"\ndo { step: 1 }\n";
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder.path());
+  const auto scenario = load_scenario("mine.textproto");
+  std::filesystem::current_path(before);
+  ASSERT_TRUE(scenario) << scenario.error().to_string();
+  EXPECT_EQ(scenario->folder, std::filesystem::canonical(folder.path()));
 }
 
 // One promise each, and none that a person could not run: every picture to compare with is there.
