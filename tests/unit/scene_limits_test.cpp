@@ -38,8 +38,8 @@ wind.gust_intensity 0 3 0
 wind.gust_length_m 0.1 1000 9
 wind.seed 0 4.294967e+09 1
 wind.along_share 0 1 1
-look.root_color 0 1 { r: 0.075 g: 0.036 b: 0.017 }
-look.tip_color 0 1 { r: 0.26 g: 0.125 b: 0.05 }
+look.root_color 0 1 { r: 0.045 g: 0.019 b: 0.008 }
+look.tip_color 0 1 { r: 0.125 g: 0.054 b: 0.021 }
 look.eumelanin 0 10 1.3
 look.pheomelanin 0 10 0
 look.strand_radius_m 1e-06 0.01 0.00012
