@@ -103,6 +103,6 @@ export const simulationSections: readonly Section[] = [
 
 /** Hair colours by name, with roots and tips as a screen shows them (common/scene/hair_color.cpp). */
 export const hairColors: readonly [string, string, string][] = [
-  ['black', '#191614', '#26211e'], ['brown', '#4b3322', '#795638'], ['blond', '#a28259', '#d1b486'],
-  ['red', '#844424', '#af6537'], ['grey', '#959597', '#bcbcbd'], ['dyed', '#45277c', '#8945bf'],
+  ['black', '#120e0c', '#1d1815'], ['brown', '#3a2416', '#5f3f27'], ['blond', '#9b7950', '#cead7d'],
+  ['red', '#6c3319', '#97512b'], ['grey', '#959597', '#bcbcbd'], ['dyed', '#371d69', '#7337aa'],
 ];
