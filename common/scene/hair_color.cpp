@@ -7,7 +7,8 @@
 namespace strandcast {
 namespace {
 
-// Chosen by eye under the built-in scene's light, which shows them as a path tracer does; tips are bleached by the sun.
+// Chosen by eye under the built-in scene's light, which shows them as a path tracer does; tips are bleached
+// by the sun.
 constexpr std::array<HairColorPreset, 6> kPresets{{
     {"black", {{0.006f, 0.0045f, 0.0038f}, {0.012f, 0.009f, 0.0075f}}},
     {"brown", {{0.042f, 0.018f, 0.008f}, {0.115f, 0.050f, 0.020f}}},
