@@ -117,14 +117,14 @@ function(strandcast_program name)
   target_precompile_headers(${name} REUSE_FROM ${ARG_PCH})
 endfunction()
 
-# strandcast_test(NAME LABEL unit SOURCES ... LIBS ... [ALONE] [OFFLINE] [SERIAL suite ...] [PATIENT suite ...] [TIMEOUT s]
+# strandcast_test(NAME LABEL unit SOURCES ... LIBS ... [ALONE] [OFFLINE] [BUSY suite ...] [PATIENT suite ...] [TIMEOUT s]
 # [ENVIRONMENT VARIABLE=value ...]): a GoogleTest program. Every
 # suite in it is one CTest test, NAME.Suite; with ALONE every TEST is, NAME.Suite.Test, in a process of its own. Tests of
 # the label `integration` run alone and get the label `network` too, which allows a second try (tests/run.sh), unless
-# they are OFFLINE. SERIAL: suites that never run beside another test (they load both cores). PATIENT: suites that wait
-# for most of their time; they run beside others, one of them at a time. TIMEOUT: of one CTest test.
+# they are OFFLINE; two of them run at once, beside tests that compute (list_tests.cmake). BUSY: suites that load both
+# cores: one other test runs beside them. PATIENT: suites of which one runs at a time. TIMEOUT: of one CTest test.
 function(strandcast_test name)
-  cmake_parse_arguments(ARG "ALONE;OFFLINE" "LABEL;TIMEOUT" "SOURCES;LIBS;SERIAL;PATIENT;ENVIRONMENT" ${ARGN})
+  cmake_parse_arguments(ARG "ALONE;OFFLINE" "LABEL;TIMEOUT" "SOURCES;LIBS;BUSY;PATIENT;ENVIRONMENT" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE strandcast_flags ${ARG_LIBS} strandcast_test_main GTest::gmock)
   target_compile_definitions(${name} PRIVATE
@@ -155,7 +155,7 @@ function(strandcast_test name)
   add_custom_command(TARGET ${name} POST_BUILD BYPRODUCTS ${list_file}
     COMMAND ${CMAKE_COMMAND} -DNAME=${name} -DPROGRAM=$<TARGET_FILE:${name}> -DOUTPUT=${list_file} -DMODE=${mode}
       -DRESULTS=${CMAKE_BINARY_DIR}/test_results -DLISTS=${CMAKE_BINARY_DIR}/test_lists
-      "-DLABELS=${labels}" -DTIMEOUT_S=${timeout_s} "-DSERIAL=${ARG_SERIAL}" "-DPATIENT=${ARG_PATIENT}"
+      "-DLABELS=${labels}" -DTIMEOUT_S=${timeout_s} "-DBUSY=${ARG_BUSY}" "-DPATIENT=${ARG_PATIENT}"
       "-DENVIRONMENT=${environment}" -P ${CMAKE_SOURCE_DIR}/cmake/list_tests.cmake
     VERBATIM)
   # What is not built must not look as if it had passed.

@@ -26,5 +26,5 @@ STRANDCAST_BUILD_PROCESSOR_S=$(awk -f tests/processor_s.awk "$cost")
 export STRANDCAST_BUILD_PROCESSOR_S
 rm -f "$cost"
 echo "Grids of long tests: ${STRANDCAST_TEST_GRID:-small} (tests/support/test_grid.h)"
-# A process of its own, whose children are the tests alone; three at once, since those with sockets mostly wait.
-bash tests/run_preset.sh ci build/ci 3 "$@"
+# A process of its own, whose children are the tests alone; four at once, since two of them have sockets and mostly wait.
+bash tests/run_preset.sh ci build/ci 4 "$@"
