@@ -12,6 +12,9 @@ Status make_report_folder(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder, error);
   if (error || !std::filesystem::is_directory(folder, error))
     return at(folder.string(), make_error(ErrorCode::BadInput, "cannot be made as a folder"));
+  const std::filesystem::path probe = folder / "report.probe";
+  RETURN_IF_ERROR(save_text(probe, "may a file be written here?\n"));
+  std::filesystem::remove(probe, error);
   return {};
 }
 

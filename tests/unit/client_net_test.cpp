@@ -11,6 +11,7 @@
 #include "common/client/outbox.h"
 #include "common/client/reconnect_policy.h"
 #include "common/wire/close_code.h"
+#include "common/wire/messages.h"
 
 namespace strandcast::client_net_test {
 namespace {
@@ -297,6 +298,8 @@ TEST(ReconnectPolicy, ThePageHasTheSameNumbers) {
   const ClientConfig config;
   EXPECT_EQ(number("IDLE_MS"), ms(config.idle_timeout));
   EXPECT_EQ(number("WELCOME_MS"), ms(config.connect_timeout + config.welcome_timeout));
+  EXPECT_EQ(number("TOKEN_BYTES"), static_cast<double>(kMaxTokenBytes));
+  EXPECT_EQ(number("NAME_BYTES"), static_cast<double>(kMaxNameChars));
   const size_t begin = text->find("FINAL_CODES = [") + 15;
   std::istringstream codes(text->substr(begin, text->find(']', begin) - begin));
   std::set<uint16_t> of_page;

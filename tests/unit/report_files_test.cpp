@@ -150,5 +150,16 @@ TEST(ReportFolder, IsMadeOrRefusedInOneSentence) {
   EXPECT_THAT(status.error().to_string(), HasSubstr((nested / "file").string()));
 }
 
+TEST(ReportFolder, WhereNoFileMayBeWrittenIsSaidBeforeTheWork) {
+  const std::filesystem::path folder = "/proc/self";  // nobody writes there
+  const Status status = make_report_folder(folder);
+  ASSERT_FALSE(status);
+  EXPECT_THAT(status.error().to_string(), HasSubstr(folder.string()));
+
+  const TemporaryFolder fine;
+  ASSERT_TRUE(make_report_folder(fine.path()));
+  EXPECT_TRUE(std::filesystem::is_empty(fine.path()));
+}
+
 }  // namespace
 }  // namespace strandcast::report_files_test

@@ -179,6 +179,7 @@ const tests = {
     const strict = await Server.start(program, [...SMALL, '--token-file', file, '--distrust-loopback']);
     await assert.rejects(open(strict, { token: 'wrong-0123456789abcdef' }).opened, /token/);
     await assert.rejects(take(open(strict), 1), /token/);
+    await assert.rejects(open(strict, { token: 'x'.repeat(257) }).opened, /longer than 256 bytes/);
     const right = open(strict, { token: 'right-0123456789abcdef' });
     assert.equal((await right.opened).role, 'viewer');
     right.close();

@@ -262,6 +262,14 @@ check('reconnections wait longer and longer', () => {
   assert.ok(page.mayComeBack(4005, true) && !page.mayComeBack(4005, false));
 });
 
+check('a Hello that every server refuses is never sent', () => {
+  const asked = { token: 'a'.repeat(256), head: 'h'.repeat(64), codec: '', name: 'n' };
+  assert.equal(page.faultOf(asked), '');
+  assert.equal(page.faultOf({ ...asked, token: 'a'.repeat(257) }), 'the token is longer than 256 bytes');
+  assert.equal(page.faultOf({ ...asked, token: '\u00e4'.repeat(129) }), 'the token is longer than 256 bytes');
+  assert.equal(page.faultOf({ ...asked, head: 'h'.repeat(65) }), 'the head is longer than 64 bytes');
+});
+
 check('a dead link is left at once, without the closing handshake', () => {
   const asked = [];
   const port = { postMessage: (wish) => asked.push(wish) };

@@ -52,6 +52,7 @@ export class UserConnection implements Connection {
       step: new URL('strand_step.wasm', files).href, whole: new URL('strand_core.wasm', files).href,
       tell: (message) => this.hear(message), give: (state) => this.take(state), states,
     });
+    if (this.isClosed) this.session.end(); // refused before a connection was tried
     if (!states) this.ask();
   }
 

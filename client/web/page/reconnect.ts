@@ -17,6 +17,19 @@ const UNKNOWN_CODE = 4005;
 /** The page's own: the connection was given up. */
 export const GIVEN_UP_CODE = 4000;
 
+/** Longest texts of a Hello, in bytes of UTF-8. */
+const TOKEN_BYTES = 256;
+const NAME_BYTES = 64;
+
+/** What is wrong with a Hello that every server refuses, in a sentence; empty when nothing is. */
+export function faultOf(asked: { token: string; head: string; codec: string; name?: string }): string {
+  const isLonger = (text: string, limit: number) => new TextEncoder().encode(text).length > limit;
+  if (isLonger(asked.token, TOKEN_BYTES)) return `the token is longer than ${TOKEN_BYTES} bytes`;
+  for (const [word, text] of [['head', asked.head], ['codec', asked.codec], ['own name', asked.name ?? '']] as const)
+    if (isLonger(text, NAME_BYTES)) return `the ${word} is longer than ${NAME_BYTES} bytes`;
+  return '';
+}
+
 /** What a person reads where the server said nothing. */
 export function wordsFor(code: number, wasOpen: boolean): string {
   switch (code) {

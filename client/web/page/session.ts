@@ -4,7 +4,7 @@ import { ClockOffset, nowNs, Recent } from './clock';
 import { compileCore, Core, StrandDecoder } from './core';
 import type { Asked, Camera, FromNet, NetFigures, State, StatePort, ToNet } from './messages';
 import { decodablePictures, PictureDecoder, type Decoded } from './pictures';
-import { GIVEN_UP_CODE, IDLE_MS, mayComeBack, ReconnectPolicy, SILENT_MS, WELCOME_MS, wordsFor } from './reconnect';
+import { faultOf, GIVEN_UP_CODE, IDLE_MS, mayComeBack, ReconnectPolicy, SILENT_MS, WELCOME_MS, wordsFor } from './reconnect';
 import { DistantSocket, type ServerSocket } from './socket';
 import {
   ClientMessage, decodeServerMessage, encodeClientMessage, FrameHeader, kControl, kFrameHeaderBytes, Mode, Opcode,
@@ -168,6 +168,8 @@ export class Net {
   private connect(): void {
     clearTimeout(this.retry);
     this.retry = 0;
+    const fault = faultOf(this.asked);
+    if (fault) return this.post({ kind: 'state', state: 'ended', reason: fault, retryMs: 0 });
     this.post({ kind: 'state', state: 'connecting', reason: '', retryMs: 0 });
     const socket = this.around.openSocket(this.asked.url, PROTOCOL);
     this.socket = socket;
