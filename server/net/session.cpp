@@ -15,6 +15,8 @@ namespace {
 /// How much waits unsent in the kernel, so that a late frame is dropped here and not queued there.
 constexpr int kUnsentBytes = 128 << 10;
 constexpr int64_t kProbeIntervalNs = 1'000 * kMsInNs;
+/// Between two messages about the state to a hidden window: one a second, however unevenly they come.
+constexpr int64_t kHiddenStatusIntervalNs = 950 * kMsInNs;
 /// Longest sentence of ours put into a Goodbye.
 constexpr size_t kMaxReasonCharacters = 500;
 
@@ -118,8 +120,9 @@ void Session::on_read(const beast::error_code& error) {
 void Session::send(ServerMessage message) {
   if (state_ != State::Joined) return;
   if (auto* status = std::get_if<ServerStatus>(&message)) {
-    is_status_left_out_ = subscription_.is_hidden() && !is_status_left_out_;
-    if (is_status_left_out_) return;
+    const int64_t time_ns = now_ns();
+    if (subscription_.is_hidden() && time_ns - status_sent_ns_ < kHiddenStatusIntervalNs) return;
+    status_sent_ns_ = time_ns;
     status->dropped_frames = queue_.dropped_frames();
     if (subscription_.mode() != StreamMode::Frames) status->picture_motions.clear();
     status->queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kMsInNs;
