@@ -154,19 +154,19 @@ Image blank_cells(const LightCells& cells) {
 
 }  // namespace
 
-LightCells cells_of(const Image& shown) {
+LightCells cells_of(const Image& shown, uint32_t cell_px) {
   std::array<double, 256> light;
   for (int value = 0; value < 256; ++value) light[value] = light_of_byte(static_cast<uint8_t>(value));
-  LightCells cells{shown.width / kCellPx, shown.height / kCellPx, {}};
+  LightCells cells{shown.width / cell_px, shown.height / cell_px, {}};
   for (uint32_t cell_y = 0; cell_y < cells.height; ++cell_y)
     for (uint32_t cell_x = 0; cell_x < cells.width; ++cell_x) {
       glm::dvec3 sum(0.0);
-      for (uint32_t k = 0; k < kCellPx * kCellPx; ++k) {
-        const size_t y = cell_y * kCellPx + k / kCellPx;
-        const uint8_t* const pixel = &shown.rgba[(y * shown.width + cell_x * kCellPx + k % kCellPx) * 4];
+      for (uint32_t k = 0; k < cell_px * cell_px; ++k) {
+        const size_t y = cell_y * cell_px + k / cell_px;
+        const uint8_t* const pixel = &shown.rgba[(y * shown.width + cell_x * cell_px + k % cell_px) * 4];
         sum += glm::dvec3(light[pixel[0]], light[pixel[1]], light[pixel[2]]);
       }
-      cells.light.emplace_back(sum / double{kCellPx * kCellPx});
+      cells.light.emplace_back(sum / static_cast<double>(cell_px * cell_px));
     }
   return cells;
 }
@@ -257,6 +257,24 @@ Result<CellError> cell_error(const LightCells& seen, const LightCells& truth, co
   error.psnr_db =
       square > 0.0 ? -10.0 * std::log10(square / error.cells) : std::numeric_limits<double>::infinity();
   return error;
+}
+
+Result<double> restlessness(const std::array<LightCells, 3>& pictures, const PictureMask& mask) {
+  const auto& [before, now, after] = pictures;
+  const size_t count = now.light.size();
+  if (before.light.size() != count || after.light.size() != count || mask.size() != count)
+    return make_error(ErrorCode::BadInput, "pictures of {}, {} and {} cells are compared, by a mask of {}",
+                      before.light.size(), count, after.light.size(), mask.size());
+  double square = 0.0;
+  size_t counted = 0;
+  for (size_t i = 0; i < count; ++i) {
+    if (mask[i] == 0) continue;
+    const auto shown = [i](const LightCells& cells) { return luminance_of(shown_of(cells.light[i])); };
+    const double second = shown(before) - 2.0 * shown(now) + shown(after);
+    square += second * second;
+    ++counted;
+  }
+  return counted > 0 ? std::sqrt(square / static_cast<double>(counted)) : 0.0;
 }
 
 }  // namespace strandcast

@@ -2,12 +2,14 @@
 // of pixels, because a path tracer's single pixels are noisy. Pure functions, any thread.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/pictures/image_codec.h"
+#include "common/pictures/picture_error.h"
 
 namespace strandcast {
 
@@ -28,9 +30,9 @@ struct CoverCells {
   std::vector<float> hair, skin;  // (height x width) each
 };
 
-/// Reduces a shown picture: undoes sRGB and tone curve (shaders/lib/tone.glsl), then takes means. Rest of a
-/// side that fills no cell is left out.
-LightCells cells_of(const Image& shown);
+/// Reduces a shown picture: undoes sRGB and tone curve (shaders/lib/tone.glsl), then takes means over squares
+/// of `cell_px` pixels. Rest of a side that fills no cell is left out.
+LightCells cells_of(const Image& shown, uint32_t cell_px = kCellPx);
 /// Adds the background, as pictures have it, where neither hair nor skin covers a cell.
 LightCells over_background(LightCells light, const CoverCells& cover, const glm::vec3& background);
 /// Returns cells as a screen shows them, a square of pixels each.
@@ -63,5 +65,10 @@ enum class CellPart { Hair, Skin };
 /// Compares cells that hair covers by half, or that skin covers whole. BadInput for sizes that differ.
 Result<CellError> cell_error(const LightCells& seen, const LightCells& truth, const CoverCells& cover,
                              CellPart part);
+
+/// How restless three pictures at equal steps in time are: root mean square, over the cells that count in
+/// `mask`, of the second difference of shown luminance. Light that changes evenly gives 0. BadInput for sizes
+/// that differ.
+Result<double> restlessness(const std::array<LightCells, 3>& pictures, const PictureMask& mask);
 
 }  // namespace strandcast

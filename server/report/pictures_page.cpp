@@ -93,6 +93,13 @@ std::string equal_error_text(const PicturesReport& report) {
   return {};
 }
 
+std::string flicker_text(const FlickerRow& row) {
+  return fmt::format(
+      "{}, head turning by 90 degrees a second: flicker {:.2f} times that of 16 samples a pixel ({:.4f}, "
+      "{:.4f})",
+      row.view, row.ratio(), row.ours, row.supersampled);
+}
+
 /// The sentence of which method comes nearest to the truth.
 std::string nearest_text(const PicturesReport& report) {
   const NamedMeans* nearest = nullptr;
@@ -193,6 +200,7 @@ std::string pictures_text(const PicturesReport& report) {
   for (const auto& [name, m] : all_means(report))
     text += fmt::format("{:34} {:>5} {:>6.2f} {:>6.2f} {:>6.3f} {:>10.1f} {:>8.1f}\n", name, m.rows, m.ratio,
                         m.psnr_db, m.ssim, m.skin_psnr_db, m.cpu_ms);
+  for (const FlickerRow& row : report.flicker) text += flicker_text(row) + "\n";
   for (const CyclesRow& row : report.cycles)
     text += fmt::format("Cycles, {} samples, {}: {:.2f} s, PSNR4 {:.1f}, SSIM4 {:.3f}\n", row.samples,
                         row.view, row.cpu_s, row.hair.psnr_db, row.hair.ssim);
@@ -283,6 +291,7 @@ std::string pictures_page(const PicturesReport& report) {
                                report.device_gl.empty() ? "none" : report.device_gl, nearest_text(report)));
     page.figure(method_plot(report), "Up and to the left is better.");
   }
+  for (const FlickerRow& row : report.flicker) page.paragraph(flicker_text(row) + ".");
   page.heading("Views");
   page.table(view_table(report));
   page.heading("Ours, truth, and where ours is brighter");

@@ -23,6 +23,8 @@ namespace {
 // Views that every method draws: dark and bright hair, in front of the light and against it, and skin.
 constexpr const char* kMethodViews[] = {"front_brown", "front_blond", "front_black", "front_blond_against",
                                         "side_brown"};
+// Views whose flicker is measured.
+constexpr const char* kFlickerViews[] = {"front_brown", "side_brown", "near_brown", "far_brown"};
 // Groups of the rendering report whose rows shade in other ways.
 constexpr const char* kMethodGroups[] = {"the whole picture", "shadow", "shading", "scattering",
                                          "evaluation"};
@@ -265,6 +267,12 @@ Result<PicturesReport> run_pictures(const PicturesDesc& desc) {
     ASSIGN_OR_RETURN(PictureRow row,
                      measure_picture(desc, stage, view, truths.at(view.name()), {}, *renderer));
     report.views.push_back(std::move(row));
+    if (std::find(std::begin(kFlickerViews), std::end(kFlickerViews), view.name()) == std::end(kFlickerViews))
+      continue;
+    say(fmt::format("{}: flicker", view.name()));
+    ASSIGN_OR_RETURN(const SceneDesc seen, scene_of(desc, view.overrides()));
+    ASSIGN_OR_RETURN(FlickerRow flicker, measure_flicker(view, stage.pose.at(view.pose), seen, *renderer));
+    report.flicker.push_back(std::move(flicker));
   }
   if (desc.has_methods) RETURN_IF_ERROR(measure_methods(desc, stage, truths, report));
   return report;

@@ -49,8 +49,17 @@ struct CyclesRow {
   CellError hair;
 };
 
+/// Hair on a head that turns evenly, at 60 pictures a second: restlessness of our pictures, and of such with
+/// 16 samples a pixel, where only what truly changes is left.
+struct FlickerRow {
+  std::string view;
+  double ours = 0.0, supersampled = 0.0;
+  double ratio() const { return ours / supersampled; }
+};
+
 struct PicturesReport {
   std::vector<PictureRow> views;    // drawn as viewers draw them
+  std::vector<FlickerRow> flicker;  // of a few views at rest
   std::vector<PictureRow> methods;  // of a few views
   std::vector<CyclesRow> cycles;    // where Blender ran
   std::string device_gl;            // empty: no OpenGL here, and no methods
@@ -59,6 +68,10 @@ struct PicturesReport {
 /// Draws and compares. BadInput for other hair without Blender, NotFound for an unknown view or a truth that
 /// is missing.
 Result<PicturesReport> run_pictures(const PicturesDesc& desc);
+
+/// Measures the flicker of a view whose strands are `strands`.
+Result<FlickerRow> measure_flicker(const TruthView& view, const PosedStrands& strands, const SceneDesc& scene,
+                                   Renderer& renderer);
 
 /// Means over rows: geometric of ratios, else arithmetic.
 struct PictureMeans {

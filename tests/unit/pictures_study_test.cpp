@@ -99,6 +99,27 @@ TEST(HairFigures, AreThoseOfKnownHair) {
   EXPECT_NEAR(lit.glow_width, 0.3, 0.01);
 }
 
+/// Cells of one luminance on the screen, 0..1.
+LightCells shown_as(double shown) {
+  const auto light = static_cast<float>(std::pow((shown + 0.055) / 1.055, 2.4));
+  return {kWide, kHigh, std::vector<glm::vec3>(size_t{kWide} * kHigh, glm::vec3(light))};
+}
+
+TEST(Restlessness, IsTheSecondDifferenceOfWhatAScreenShows) {
+  const PictureMask all(size_t{kWide} * kHigh, 1);
+  EXPECT_NEAR(restlessness({shown_as(0.2), shown_as(0.3), shown_as(0.4)}, all).value(), 0.0, 1e-6);
+  EXPECT_NEAR(restlessness({shown_as(0.2), shown_as(0.3), shown_as(0.2)}, all).value(), 0.2, 1e-6);
+  // A pixel that jumps counts where the mask says so.
+  LightCells jump = shown_as(0.3);
+  jump.light[5] = shown_as(0.4).light[0];
+  PictureMask without = all;
+  without[5] = 0;
+  EXPECT_NEAR(restlessness({shown_as(0.3), jump, shown_as(0.3)}, all).value(), 0.2 / std::sqrt(kWide * kHigh),
+              1e-6);
+  EXPECT_NEAR(restlessness({shown_as(0.3), jump, shown_as(0.3)}, without).value(), 0.0, 1e-9);
+  EXPECT_FALSE(restlessness({shown_as(0.3), jump, LightCells{}}, all));
+}
+
 /// Where nothing is drawn, a picture shows its background.
 TEST(Cells, UndoWhatAScreenShows) {
   SceneDesc scene =
