@@ -1,4 +1,4 @@
-// How hair answers to a body that moves by itself, by how deep it gets and by time.
+// Compares the ways in which hair answers a body that moves by itself: how deep it gets, and the time taken.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -79,7 +79,7 @@ Image side_by_side(const std::vector<Image>& pictures, const PictureCrop& crop, 
   return sheet;
 }
 
-/// Grey where they are the same.
+/// Difference of two pictures, enlarged; grey where they are the same.
 Image difference_of(const Image& seen, const Image& truth) {
   constexpr int kGrey = 128;
   Image difference = truth;
@@ -90,7 +90,7 @@ Image difference_of(const Image& seen, const Image& truth) {
   return difference;
 }
 
-/// One distance.
+/// Compares pictures from one distance.
 class ViewRun {
  public:
   ViewRun(ViewPainter& painter, const StreamRecording& recording, const std::vector<size_t>& compared,

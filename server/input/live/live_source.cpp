@@ -178,7 +178,7 @@ void LiveSource::hear(const std::string& sender, int64_t arrival_ns) {
   notes_.push_back({false, fmt::format("{}: {} sends", describe(), sender)});
 }
 
-/// How often, and how evenly, packets come.
+/// Measures how often and how evenly packets come.
 void LiveSource::measure(int64_t arrival_ns) {
   const double interval_ms = static_cast<double>(arrival_ns - packet_ns_) * kMsPerNs;
   packet_ns_ = arrival_ns;
