@@ -27,7 +27,7 @@ struct DecodedStrands {
   std::vector<std::vector<glm::vec3>> position_m;  // of the compared frames
 };
 
-/// Of the frames that have a frame after them, as the codec rows.
+/// Chooses frames evenly among those that have a frame after them, which the codec rows compare too.
 std::vector<size_t> compared_frames(size_t frame_count, size_t wanted) {
   CHECK(frame_count > kStartFrames + 1 && wanted > 0);
   const size_t count = frame_count - 1 - kStartFrames;

@@ -328,7 +328,7 @@ LiveSource::Due LiveSource::advance(int64_t now_ns) {
   return due;
 }
 
-/// Once for each time that a sender was heard.
+/// Notes, once after each time that a sender was heard, that it has stopped.
 void LiveSource::note_silence() {
   if (!std::exchange(was_heard_, false)) return;
   rate_hz_ = 0.0;
