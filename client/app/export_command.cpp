@@ -37,7 +37,7 @@ void print(const ExportOptions& options, const ExportReport& report) {
   for (const std::string& remark : report.remarks) std::cout << "  " << remark << '\n';
 }
 
-/// From a recording where one is named, else from the server.
+/// Opens the recording if one is named, else a session with the server.
 Result<std::unique_ptr<ExportSource>> open_source(const CtlTarget& target, const ExportCommand& command,
                                                   const std::atomic<bool>& stop) {
   if (command.paths.size() > 1) {

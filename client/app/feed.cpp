@@ -175,7 +175,7 @@ class SessionWay {
   std::vector<Told> told_;
 };
 
-/// To who says nothing back.
+/// Sends to receivers that never answer.
 class MomentWay {
  public:
   explicit MomentWay(const SendMoment& send) : send_(send) {}

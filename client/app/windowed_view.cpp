@@ -279,7 +279,7 @@ class WindowedView {
                        : saved.error().to_string());
   }
 
-  /// Strands, frames, the server's choice, and again.
+  /// Changes from strands to frames, to the server's choice, and back to strands.
   void change_mode() {
     if (!can_draw()) return show_message(own_reason_);
     const StreamMode last = viewer_->wanted_mode();

@@ -50,7 +50,7 @@ WorkerPool::~WorkerPool() {
   for (std::thread& thread : threads_) thread.join();
 }
 
-/// With the caller's own, `workers` threads take the ranges.
+/// Gives the ranges to `workers` threads, the caller's among them.
 void WorkerPool::share(Call& call, uint32_t workers) {
   const uint64_t callers_own = 1;
   call.free_workers = (workers == 64 ? ~uint64_t{0} : (uint64_t{1} << workers) - 1) & ~callers_own;

@@ -106,7 +106,7 @@ HairInside inside_where(const Groom& groom, Distance distance_m_at) {
   return inside;
 }
 
-/// By the foot of the point on the axis: as far as it leans, a cone is a little nearer.
+/// Distance from a capsule at the point's foot on its axis; the side of a cone may be a little nearer.
 double distance_about(const BodyCapsule& capsule, const glm::dvec3& point_m) {
   const glm::dvec3 axis = capsule.to_m - capsule.from_m;
   const double squared = glm::dot(axis, axis);

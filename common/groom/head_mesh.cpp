@@ -58,7 +58,7 @@ class HeadMesher {
     measure_corners();
   }
 
-  /// In skull radii.
+  /// Builds the mesh, in skull radii.
   Mesh build() {
     for_each(size_ - 1, [&](const glm::ivec3& cell) { add_vertex(cell); });
     project();

@@ -255,8 +255,8 @@ class BallChoice {
   }
 
  private:
-  /// The ball that takes most off what the chosen ones but for number `open` leave; none: as many as there
-  /// are.
+  /// Returns the ball that covers most of what the chosen ones, except number `open`, leave; the number of
+  /// balls where none covers anything.
   size_t best_beside(const std::vector<size_t>& chosen, size_t open) const {
     std::vector<float> left(sample_count_, far_off_);
     for (size_t i = 0; i < chosen.size(); ++i)

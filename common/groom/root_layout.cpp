@@ -143,8 +143,8 @@ class StarBuilder {
   }
 
  private:
-  /// The same for a point in every star, of the order of a thousandth of the distance to its nearest
-  /// neighbour.
+  /// Returns a point moved by about a thousandth of the distance to its nearest neighbour, alike in every
+  /// star.
   glm::dvec3 jittered(uint32_t index) {
     if (jitter_m_.empty()) make_jitter();
     const uint32_t hash = mix_u32(index + 1);

@@ -10,7 +10,7 @@ namespace strandcast {
 namespace {
 
 constexpr uint32_t kLeafTriangles = 4;
-/// In radii of a node: farther away than this it is a dipole. The paper recommends 2 with higher orders.
+/// Distance in radii of a node beyond which it is a dipole. The paper recommends 2 with higher orders.
 constexpr double kFarRadii = 2.3;
 
 glm::dvec3 middle_of(const Triangle& triangle) {

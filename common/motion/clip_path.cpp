@@ -117,7 +117,7 @@ Pose ClipPath::way_back(double passed_s, double whole_s) const {
   return pose;
 }
 
-/// A clip that is more violent than an easy start throughout takes the longest: hair is under way by then.
+/// Returns the shortest easy start; the longest for a clip too violent for any, since hair moves by then.
 double ClipPath::choose_start_s() const {
   for (double wanted_s = options_.blend_s;; wanted_s *= kLonger) {
     if (wanted_s >= kLongestStartS) return std::max(options_.blend_s, kLongestStartS);

@@ -43,7 +43,7 @@ struct LibAv {
 #undef LIBAV_MEMBER
 };
 
-/// The one that the headers are of.
+/// The library of the version that the headers are from.
 std::string libav_file() {
   return fmt::format("libavcodec.so.{}", LIBAVCODEC_VERSION_MAJOR);
 }
@@ -68,7 +68,7 @@ const Result<LibAv>& libav_or_error() {
   return loaded;
 }
 
-/// For what exists only where it is loaded.
+/// The loaded library, for objects that exist only where it is loaded.
 const LibAv& libav() {
   return *libav_or_error();
 }

@@ -68,7 +68,7 @@ Status add_chunk(const ChunkPlace& place, ChunkList& list) {
   return {};
 }
 
-/// The end of a file that was closed.
+/// Reads the footer of a file that was closed; NotFound for any other.
 Result<mcap::Footer> read_footer_at_end(ByteSource& source, uint64_t data_begin) {
   constexpr uint64_t kEndBytes = mcap::kFooterBytes + kMagicBytes;
   const uint64_t size = source.size_bytes();

@@ -247,7 +247,7 @@ void note_distance(const Snapshot& a, const Snapshot& b, RecordingComparison& re
   }
 }
 
-/// Of frames of the same step; as far as both can be decoded.
+/// Compares frames of the same step, as far as both recordings can be decoded.
 void compare_strands(RecordingReader& a, RecordingReader& b, RecordingComparison& result) {
   auto in_a = StrandFrames::begin(a);
   auto in_b = StrandFrames::begin(b);

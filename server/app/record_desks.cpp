@@ -24,7 +24,7 @@ class Answers {
   }
 
  private:
-  /// What all say alike is said once, and of an error whose it is.
+  /// Joins the heads' notices: an error that all share stands once, any other with its head's name.
   Notice joined() const {
     const bool is_same = std::all_of(notices_.begin(), notices_.end(), [this](const Notice& one) {
       return one.is_error && one.text == notices_.front().text;

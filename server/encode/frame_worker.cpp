@@ -489,7 +489,7 @@ Status FrameWorker::encode(uint32_t picture_class, const Image& image) {
   return {};
 }
 
-/// What is shown, once more: whole, or finely.
+/// Sends the shown picture once more: whole, or finely.
 Status FrameWorker::resend(const Due& due) {
   Drawn& drawn = drawn_[due.picture_class];
   const bool is_still = due.task == Task::Still;

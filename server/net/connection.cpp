@@ -30,7 +30,7 @@ bool has_body(const http::request_parser<http::empty_body>& parser) {
   return parser.get().count(http::field::transfer_encoding) > 0 || parser.content_length().value_or(0) > 0;
 }
 
-/// True when a field is there twice of which a proxy or a browser may believe the other one.
+/// Returns whether a field is there twice, so that a proxy or a browser may believe the other one.
 bool is_ambiguous(const http::request<http::empty_body>& request) {
   const auto fields = {http::field::host, http::field::origin, http::field::authorization,
                        http::field::sec_websocket_key, http::field::sec_websocket_version};
@@ -98,7 +98,7 @@ void Connection::start() {
   begin();
 }
 
-/// Exactly so many bytes: what follows belongs to TLS or HTTP.
+/// Reads exactly `size` bytes, because what follows belongs to TLS or HTTP.
 void Connection::read_proxy_header(size_t size) {
   const size_t old_size = proxy_header_.size();
   proxy_header_.resize(size);

@@ -26,7 +26,7 @@ void FlowControl::on_ack(uint16_t stream_id, uint32_t sequence, int64_t time_ns,
   if (decodes_ns_.size() > kDecodes) decodes_ns_.pop_front();
 }
 
-/// A client of which nothing is heard may be away as well: whether its link is too slow shows when it is
+/// Blames the link only while the client is heard: a silent one may be away, and a slow link shows when it is
 /// back.
 void FlowControl::on_chain_loss(int64_t time_ns) {
   const int64_t due_ns = gate_.oldest_due_ns(time_ns);

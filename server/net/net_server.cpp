@@ -205,7 +205,7 @@ void NetServer::State::run() {
   }
 }
 
-/// Over a copy: the work may end sessions.
+/// Does the work for all sessions, over a copy, because it may end some.
 template <class Work>
 void NetServer::State::for_all(Work work) {
   const auto sessions = context.sessions;

@@ -19,8 +19,8 @@ inline constexpr int64_t kGateDelayNs = 200 * kMsInNs;
 inline constexpr int64_t kGateQueueNs = 170 * kMsInNs;
 /// Queueing delay above which no keyframe is sent, since a keyframe fills the queue by itself.
 inline constexpr int64_t kStartDelayNs = 50 * kMsInNs;
-/// Bytes that may be in flight before the first acknowledgement; then one frame of any size is sent. Three
-/// times TCP's initial window (RFC 6928).
+/// Bytes in flight from which nothing more is sent before the first acknowledgement; the frame that reaches
+/// them may have any size. Three times TCP's initial window (RFC 6928).
 inline constexpr size_t kFirstBytes = 44u << 10;
 /// Number of frames that may always be in flight, because a viewer that draws slowly acknowledges in bursts.
 inline constexpr size_t kFreeFrames = 3;

@@ -143,7 +143,7 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
              message);
 }
 
-/// By its own word, or by that of somebody who controls.
+/// Moves this viewer's camera, as it asked itself or as a controller did.
 void Session::move_camera(const CameraChange& camera) {
   const PictureClass before = subscription_.pictures.picture_class;
   head().handler.on_message(id_, camera, now_ns());

@@ -253,7 +253,7 @@ void Recorder::write_held_frame() {
   held_frame_.reset();
 }
 
-/// Behind frames that are missing nothing can be decoded before the next keyframe.
+/// Asks for a keyframe when frames are missing: nothing after them can be decoded before it.
 void Recorder::watch_losses() {
   const uint64_t lost = writer_->lost().frames;
   if (lost == known_lost_frames_) return;

@@ -1,6 +1,6 @@
 // Relay: passes the streams of another server, or relay, on to viewers of its own: no scene, no simulation.
-// Threads: the network's, for each head one for what is got, one for who says something, and one for each
-// session at the server above. Several may live in one process.
+// Threads: the network's; for each head one for its streams and one for its voices; one for each session at
+// the server above. Several relays may live in one process.
 #pragma once
 
 #include <cstdint>

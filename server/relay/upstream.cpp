@@ -68,7 +68,7 @@ void Upstream::stop() {
   for (const auto& link : links) link->begin_stop();
 }
 
-/// Those of which this is true; their threads are waited for later.
+/// Ends the streams for which `is_over` is true; their threads are joined later.
 template <class IsOver>
 void Upstream::end_streams(IsOver is_over) {
   for (auto entry = streams_.begin(); entry != streams_.end();) {
@@ -204,7 +204,7 @@ void Upstream::open_stream(uint16_t stream_id) {
       std::make_unique<UpstreamLink>(client_config_for(config_, hello_for(stream_id)), std::move(hooks));
 }
 
-/// Null when that link is no longer the stream's.
+/// Returns the stream of this link; null when it has another link by now.
 Upstream::Stream* Upstream::find(const StreamKey& key) {
   const auto found = streams_.find(key.stream_id);
   return found != streams_.end() && found->second.number == key.number ? &found->second : nullptr;
@@ -257,7 +257,7 @@ bool Upstream::on_lost(const StreamKey& key, const Error& error) {
   return true;
 }
 
-/// To the viewers, once.
+/// Tells the viewers, once, that the server is away.
 void Upstream::tell_away(const Error& error) {
   if (std::exchange(was_away_, true)) return;
   net_->broadcast(

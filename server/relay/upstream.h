@@ -66,7 +66,7 @@ class Upstream {
   /// Gets the head of this name there from now on, the first for an empty one: tries to connect, again and
   /// again.
   void follow(const std::string& head);
-  /// Gets nothing any more, and those who are there go.
+  /// Stops getting anything; viewers that are there are sent away.
   void rest();
   /// Not on the network thread.
   void stop();
@@ -77,14 +77,14 @@ class Upstream {
   void join(SessionId session, uint16_t stream_id);
   void request_keyframe(uint16_t stream_id);
 
-  /// The newest; nothing before the first.
+  /// The newest status; an empty one before the first.
   ServerStatus status() const;
   UpstreamCounters counters() const;
   /// What is followed, as follow() had it.
   std::string head() const;
   /// Whether viewers can be let in, or why not.
   Status connected() const;
-  /// And frames come, where any are wanted.
+  /// Whether connected() holds and frames come, where any are wanted.
   Status readiness() const;
   /// Why it gave up; nothing while all is well.
   std::optional<Error> failure() const;

@@ -1,4 +1,4 @@
-// How hair answers to a body that moves by itself, by how deep it gets and by time.
+// Compares the ways in which hair answers a body that moves by itself: how deep it gets, and the time taken.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -121,7 +121,7 @@ Groom lying_strands(uint32_t strand_count, uint32_t vertex_count) {
   return groom;
 }
 
-/// Of half a second's way of a belt, the share that it carries tips to the side.
+/// Returns how far a belt carries the tips of lying hair along, over its own way in the same time.
 Result<double> carried_share(const SolverRow& row, const SolverParameters& parameters, Executor& executor,
                              const BodyDesc& body) {
   constexpr uint32_t kStrands = 16, kVertices = 12;
@@ -213,7 +213,7 @@ Result<BodyContestant> make_contestant(const SceneDesc& scene, const Hair& hair,
   return made;
 }
 
-/// The motion, with the body come up from below first.
+/// Returns the motion's input; during warm-up the body rises from below first.
 InputFrame input_at(const BodyMotion& motion, int step) {
   InputFrame input = motion(std::max(0, step - kBodyWarmUpSteps) * kBodyStepS);
   input.has_motion = true;

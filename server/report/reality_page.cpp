@@ -13,9 +13,9 @@ namespace {
 
 /// A lean is right within this of the law's tangent.
 constexpr double kLeanTolerance = 0.03;
-/// Sway that grows more slowly than so does not grow, as far as it can be told.
+/// Growth of sway per second below which it cannot be told from none.
 constexpr double kGrowthPerS = 0.05;
-/// Of a solid cylinder's lean, what a lock's may not be less than.
+/// Least lean of a lock, as a share of a solid cylinder's.
 constexpr double kLeastSolidShare = 0.5;
 
 std::string degrees_text(double angle_rad) {

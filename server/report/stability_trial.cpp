@@ -80,7 +80,7 @@ std::vector<double> even_segments_m(int vertex_count) {
   return std::vector<double>(static_cast<size_t>(vertex_count) - 1, kLengthM / (vertex_count - 1));
 }
 
-/// 0.25 m in 15 segments of which every third is as short as given.
+/// The 15 segments of a strand of 0.25 m, every third one shortened to `short_m`.
 std::vector<double> uneven_segments_m(double short_m) {
   std::vector<double> segments = even_segments_m(16);
   for (size_t i = 2; i < segments.size(); i += 3) segments[i] = short_m;

@@ -27,7 +27,7 @@ struct DecodedStrands {
   std::vector<std::vector<glm::vec3>> position_m;  // of the compared frames
 };
 
-/// Of the frames that have a frame after them, as the codec rows.
+/// Chooses frames evenly among those that have a frame after them, which the codec rows compare too.
 std::vector<size_t> compared_frames(size_t frame_count, size_t wanted) {
   CHECK(frame_count > kStartFrames + 1 && wanted > 0);
   const size_t count = frame_count - 1 - kStartFrames;
@@ -79,7 +79,7 @@ Image side_by_side(const std::vector<Image>& pictures, const PictureCrop& crop, 
   return sheet;
 }
 
-/// Grey where they are the same.
+/// Difference of two pictures, enlarged; grey where they are the same.
 Image difference_of(const Image& seen, const Image& truth) {
   constexpr int kGrey = 128;
   Image difference = truth;
@@ -90,7 +90,7 @@ Image difference_of(const Image& seen, const Image& truth) {
   return difference;
 }
 
-/// One distance.
+/// Compares pictures from one distance.
 class ViewRun {
  public:
   ViewRun(ViewPainter& painter, const StreamRecording& recording, const std::vector<size_t>& compared,

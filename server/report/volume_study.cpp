@@ -144,7 +144,7 @@ struct ErrorSquares {
   }
 };
 
-/// What is known at the guides' vertices, with all ways to ask.
+/// Measures at the guides' vertices how far each way to make a volume is from the finest one of all strands.
 class ErrorStudy {
  public:
   ErrorStudy(const VolumeStudyDesc& desc, const StrandLayout& layout, std::vector<Moment> moments)

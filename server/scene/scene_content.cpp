@@ -19,7 +19,7 @@ namespace {
 /// Cranium when neither the scene nor a groom gives one: an adult head.
 constexpr float kDefaultHeadRadiusM = 0.095f;
 constexpr uint32_t kScalpVertices = 2'000;
-/// Of the box of a target's hair, what it has to share with the box of the scene's.
+/// Least share of the box of a target's hair that lies in the box of the scene's hair.
 constexpr double kLeastTargetShare = 0.1;
 glm::vec3 head_center(const HeadDesc& head) {
   return head.has_center ? head.center_m : glm::vec3(0.0f);

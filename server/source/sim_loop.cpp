@@ -204,7 +204,7 @@ std::deque<SimLoop::Job>::iterator SimLoop::next_command() {
   return next;
 }
 
-/// All news of viewers, and the next command when it has its turn. mutex_ is held.
+/// Takes all news of viewers, and the next command if one is due. mutex_ is held.
 std::deque<SimLoop::Job> SimLoop::take_jobs() {
   std::deque<Job> taken;
   if (const auto next = next_command(); next != jobs_.end()) {

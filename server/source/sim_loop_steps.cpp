@@ -55,7 +55,7 @@ void SimLoop::catch_up() {
   solver_->rebase(builder_->world_from_head().rotation);
 }
 
-/// While the loop slept nobody looked where the head was, and how it moves.
+/// Finds where the head is and how it moves: while the loop slept, nobody looked.
 void SimLoop::find_head(int64_t time_ns) {
   is_behind_ = true;
   const double step_ns = kNsPerS / config_.scene.step_rate_hz;

@@ -268,7 +268,7 @@ Status ScenarioRun::carry_out(const ScenarioRunTime& run) {
   return {};
 }
 
-/// Nobody answers: what came of it shows in /metrics and in what viewers see meanwhile.
+/// Nobody answers datagrams: their effect shows in /metrics and in what viewers see meanwhile.
 Status ScenarioRun::carry_out(const ScenarioSend& send) {
   if (client_ == nullptr) return make_error(ErrorCode::BadInput, "there is no server yet: begin with start");
   std::vector<std::vector<std::byte>> datagrams = send.datagrams;

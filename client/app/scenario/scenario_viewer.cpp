@@ -94,7 +94,7 @@ void ScenarioViewer::watch(ViewerSession& session) {
   session.set_snapshot_listener([this, &session](const auto& state) { take(session, state); });
 }
 
-/// All sessions so far.
+/// Returns the counts of all sessions so far.
 ViewerCounts ScenarioViewer::counts_of(ViewerSession& session) const {
   const ReplayStats& strands = session.replay().stats();
   ViewerCounts counts = earlier_;

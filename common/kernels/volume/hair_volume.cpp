@@ -206,8 +206,8 @@ void HairVolume::fit_grid() {
   grid_.nodes = glm::uvec3(last - first + 1);
 }
 
-/// Counts of layers and shares to where their records begin: layer by layer, in the order of strands. Of the
-/// many layers that hair could be in only those that have some are walked.
+/// Turns the counts of layers and shares into the places where their records begin: layer by layer, in the
+/// order of strands. Only layers that hold hair are walked.
 void HairVolume::choose_places() {
   constexpr float kMiddle = kMaxLayers / 2;
   float low = kMaxLayers;

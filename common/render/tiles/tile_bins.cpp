@@ -22,7 +22,7 @@ int floor_of(float x) {
   return cut - (static_cast<float>(cut) > x ? 1 : 0);
 }
 
-/// Tiles that a segment, as wide as it is drawn, touches: calls visit(tile).
+/// Calls visit(tile) for each tile that a segment touches at its drawn width.
 template <class Visit>
 bool visit_tiles(const StrandPoint& a, const StrandPoint& b, const TileGrid& grid, float near_m,
                  Visit visit) {

@@ -57,7 +57,7 @@ VolumeSample bits_apart(const tangent::Layout& layout, const tangent::Planes<int
   return sample;
 }
 
-/// Whether strands can be where they were decoded: what moves without time passing was put somewhere.
+/// Returns whether strands lie where they were decoded. If not, and no time has passed, they were placed.
 bool is_near(const tangent::Planes<int32_t>& decoded, const tangent::Planes<int32_t>& target) {
   for (size_t axis = 0; axis < 3; ++axis)
     for (size_t i = 0; i < target[axis].size(); ++i)

@@ -576,7 +576,7 @@ class Decoder final : public StrandDecoder {
     return head;
   }
 
-  /// What follows the steps of a delta; `tables` learn.
+  /// Reads what follows the steps of a delta; `tables` learn from it.
   Status read_positions(const BodyHead& head, ByteReader& body, const StrandMessage& message,
                         Snapshot& snapshot, Tables& tables) {
     const bool is_anchor = (head.flags & kAnchorFlag) != 0;

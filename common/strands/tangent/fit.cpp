@@ -116,7 +116,7 @@ class SampleRow {
   static constexpr uint32_t kNowRows = 4;  // the own one and those before it
   static constexpr size_t kAhead = 3;      // eights; samples lie too far apart for the processor to guess
 
-  /// What no row nearer to the root has read yet.
+  /// Prefetches what no row nearer to the root has read yet.
   STRANDCAST_LANES void prefetch(const SampleEight& eight) const {
     for (size_t axis = 0; axis < 3; ++axis) {
       for (const uint32_t place : eight.piece) {

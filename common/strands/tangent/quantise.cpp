@@ -74,7 +74,7 @@ struct Corners {
     is_a_farther = sizes_of(a - to_floats(whole_a)) > sizes_of(b - to_floats(whole_b));
   }
 
-  /// Towards the origin first: the corner of the cell nearest to it, then its sides, then opposite.
+  /// Tries the corner of the cell nearest to the origin first, then the two beside it, then the opposite one.
   STRANDCAST_LANES void try_with(const IntLanes& correction, Found& found) const {
     found.consider({low_a, low_b, correction});
     if (!is_any(found.is_open)) return;

@@ -178,7 +178,7 @@ void LiveSource::hear(const std::string& sender, int64_t arrival_ns) {
   notes_.push_back({false, fmt::format("{}: {} sends", describe(), sender)});
 }
 
-/// How often, and how evenly, packets come.
+/// Measures how often and how evenly packets come.
 void LiveSource::measure(int64_t arrival_ns) {
   const double interval_ms = static_cast<double>(arrival_ns - packet_ns_) * kMsPerNs;
   packet_ns_ = arrival_ns;
@@ -328,7 +328,7 @@ LiveSource::Due LiveSource::advance(int64_t now_ns) {
   return due;
 }
 
-/// Once for each time that a sender was heard.
+/// Notes, once after each time that a sender was heard, that it has stopped.
 void LiveSource::note_silence() {
   if (!std::exchange(was_heard_, false)) return;
   rate_hz_ = 0.0;

@@ -520,7 +520,7 @@ class DirectRodReference final : public ReferenceSolver {
 
   uint64_t model_bytes() const override { return layout().size() * sizeof(RodVertex); }
 
-  /// The rest shape; what has not moved yet starts in it, with the tensions and frames it has as loaded.
+  /// Sets the rest shape. Strands that have not moved yet start with its tensions and frames.
   void set_rest() {
     const auto fit = fit_rod_style(layout(), parameters_, groom_gravity_in_head_mps2_);
     for (uint32_t s = 0; s < layout().strand_count; ++s) {
