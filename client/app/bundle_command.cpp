@@ -85,6 +85,7 @@ Welcome welcome_of(const RecordingStart& start, const SceneDesc& scene, const Sc
   welcome.vertex_count = asset.vertex_count;
   welcome.bound_m = scene.stream.bound_m;
   welcome.step_rate_hz = scene.step_rate_hz;
+  welcome.sim_device = start.sim_device_name;
   welcome.look = scene.look;
   welcome.camera = scene.camera;
   welcome.frame_width = scene.stream.frame_width;
@@ -230,10 +231,6 @@ int bundle_recording(const std::filesystem::path& recording, const BundleCommand
   if (!bundle->other_codec.empty())
     std::cout << fmt::format("  the recording goes on by the codec {}, which is left out\n",
                              bundle->other_codec);
-  const bool is_usual = bundle->solver == "dftl" || bundle->solver == "direct_rod";
-  if (!is_usual && !command.has_all_solvers)
-    std::cout << fmt::format("  {} is not among the solvers of the smaller module: --all-solvers\n",
-                             bundle->solver);
   return kDoneExit;
 }
 
@@ -250,7 +247,7 @@ void declare_bundle(CLI::App& app, BundleCommand& command) {
                  "Length from the begin of the recording (default: all of it), or of the scene (default: 10)")
       ->check(without_nan(CLI::Range(0.0, kMostBundleSeconds)));
   app.add_flag("--all-solvers", command.has_all_solvers,
-               "Take the larger module that steps every solver; others than dftl and direct_rod need it");
+               "Take the larger module that steps every solver, as for a recording whose solver changes");
   app.add_option("--motion", scene.motion, "Of a scene: BVH file, builtin, still or none")
       ->capture_default_str();
   app.add_option("--wind", scene.wind, "Of a scene: CSV file, gusts or none")->capture_default_str();
@@ -266,7 +263,6 @@ Result<Bundle> make_bundle(RecordingReader& reader, PageFiles files, const Bundl
   ASSIGN_OR_RETURN(const SceneAsset asset, reader.asset());
   ASSIGN_OR_RETURN(const SceneDesc scene, parse_scene(start.scene_text, "the recording's scene", {}));
   Bundle bundle;
-  bundle.solver = scene.solver.name;
   constexpr uint32_t kFirstCount = 2;
   Tape tape(kFirstCount);
   tape.add(0, encode(ServerMessage(welcome_of(start, scene, asset))));
@@ -276,11 +272,16 @@ Result<Bundle> make_bundle(RecordingReader& reader, PageFiles files, const Bundl
   if (bundle.frame_count == 0)
     return make_error(ErrorCode::BadInput, "the recording has no frame to begin with");
   bundle.tape_bytes = tape.bytes().size();
-  ASSIGN_OR_RETURN(bundle.html, page_with(files, tape.bytes(), start.codec, command.has_all_solvers));
+  const bool is_usual = scene.solver.name == "dftl" || scene.solver.name == "direct_rod";
+  ASSIGN_OR_RETURN(bundle.html,
+                   page_with(files, tape.bytes(), start.codec, command.has_all_solvers || !is_usual));
   return bundle;
 }
 
 int run_bundle(const BundleCommand& command, const std::atomic<bool>& stop) {
+  if (const std::filesystem::path& page = command.paths.back(); page.extension() != ".html")
+    return ctl_failure(
+        make_error(ErrorCode::BadInput, "a bundle is a file OUT.html, and {} is none", page.string()));
   const std::filesystem::path source = command.paths.size() > 1 ? command.paths.front() : "";
   if (source.extension() == ".mcap") return bundle_recording(source, command);
   if (built_in_page().empty()) return ctl_failure(no_page());

@@ -37,7 +37,6 @@ struct Bundle {
   double seconds = 0.0;     // of simulation
   size_t tape_bytes = 0;    // asset and frames
   uint64_t damaged = 0;     // parts of the recording that could not be read
-  std::string solver;       // of the recorded scene
   std::string other_codec;  // that the recording goes on with behind the bundle; empty: none
 };
 /// Makes the bundle of what the reader gives; it must have been opened for all parts. BadInput

@@ -5,6 +5,7 @@
 
 #include <cstring>
 
+#include "client/app/ctl_commands.h"
 #include "common/wire/messages.h"
 #include "tests/support/sample_recording.h"
 
@@ -93,6 +94,7 @@ TEST(Bundle, HoldsThePageAndAllThatAServerWouldHaveSent) {
   ASSERT_TRUE(welcome) << welcome.error().to_string();
   EXPECT_EQ(std::get<Welcome>(*welcome).codec, "delta");
   EXPECT_EQ(std::get<Welcome>(*welcome).strand_count, 4u);
+  EXPECT_EQ(std::get<Welcome>(*welcome).sim_device, test::sample_start().sim_device_name);
   EXPECT_EQ(static_cast<Opcode>(tape[1].bytes[0]), Opcode::Asset);
   const auto look = decode_server_message(std::as_bytes(std::span(tape[2].bytes)));
   ASSERT_TRUE(look) << look.error().to_string();
@@ -108,9 +110,11 @@ TEST(Bundle, HoldsThePageAndAllThatAServerWouldHaveSent) {
 }
 
 /// Frames of "raw" that nobody decodes, with looks before some, and another codec behind the third.
-mcap::Bytes restyled_recording() {
+mcap::Bytes restyled_recording(const std::string& solver = "dftl") {
   test::MemorySink sink;
-  RecordingWriter writer(sink, test::sample_start(), *test::sample_asset_frame());
+  RecordingStart start = test::sample_start();
+  start.scene_text = "solver { name: \"" + solver + "\" }";
+  RecordingWriter writer(sink, start, *test::sample_asset_frame());
   const int64_t begin_ns = test::sample_start().server_time_ns;
   LookChange red{{}, sample_camera()};
   red.look.hair_color = "red";
@@ -158,11 +162,28 @@ TEST(Bundle, IsAsLongAsAskedFor) {
   EXPECT_EQ(bundle->frame_count, 11u);
 }
 
+TEST(Bundle, TakesTheLargerModuleForWhatTheSmallerOneDoesNotStep) {
+  const auto module_of = [](const char* solver) {
+    return part_of(make_bundle(*reader_of(restyled_recording(solver)), kFiles, {})->html, "stepCore");
+  };
+  EXPECT_EQ(module_of("dftl"), "M");
+  EXPECT_EQ(module_of("direct_rod"), "M");
+  EXPECT_EQ(module_of("pbd"), "whole");
+}
+
 TEST(Bundle, TakesTheLargerModuleIfAskedFor) {
   const auto reader = reader_of(test::moving_recording(2));
   BundleCommand command;
   command.has_all_solvers = true;
   EXPECT_EQ(part_of(make_bundle(*reader, kFiles, command)->html, "stepCore"), "whole");
+}
+
+TEST(Bundle, WritesOverNoRecordingWhosePageWasForgotten) {
+  BundleCommand command;
+  command.paths = {"run.mcap"};
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(run_bundle(command, false), kBadInputExit);
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("OUT.html, and run.mcap is none"));
 }
 
 TEST(Bundle, SaysWhatItLacks) {

@@ -20,6 +20,8 @@ const FRAME_MS = 1000 / 60; // between the last frame and the first one again
 const STATUS_MS = 500;
 const PORTION = 16; // frames at once on a way, so that whoever wants to go elsewhere meanwhile need not wait for its end
 const LATE_MS = 200; // who decodes so much later than in real time sees slow motion
+const STEADY_PACE = 0.95;
+const PACE_SHARE = 0.25; // of the newest STATUS_MS
 
 export type ToTape =
   | { kind: 'command'; command: number } // as a server gets it; a reset goes to the begin
@@ -66,6 +68,8 @@ export class Tape {
   private isLooping = true;
   private isWaiting = false; // for what was given to be decoded
   private wanted = -1; // frame to go to after that
+  private lostMs = 0; // since the last status: of slow motion
+  private pace = 1;
   private timer = 0;
   private statusTimer = 0;
 
@@ -83,7 +87,11 @@ export class Tape {
     this.look = -1;
     this.isWaiting = false;
     for (const { bytes } of this.all.first) this.give(bytes);
-    this.statusTimer = setInterval(() => this.tellStatus(), STATUS_MS);
+    this.statusTimer = setInterval(() => {
+      this.pace += PACE_SHARE * (1 - this.lostMs / STATUS_MS - this.pace);
+      this.lostMs = 0;
+      this.tellStatus();
+    }, STATUS_MS);
     this.goTo(at);
   }
   end(): void {
@@ -112,16 +120,20 @@ export class Tape {
   /** All that was given is decoded. */
   passed(): void {
     this.isWaiting = false;
-    if (this.wanted >= 0) this.goTo(this.wanted);
-    else if (performance.now() - this.dueMs(this.next) > LATE_MS) this.goOn();
-    else this.play();
+    if (this.wanted >= 0) return this.goTo(this.wanted);
+    const lateMs = performance.now() - this.dueMs(this.next);
+    if (lateMs <= LATE_MS) return this.play();
+    if (this.isPlaying) this.lostMs += lateMs;
+    this.goOn();
   }
 
   private give(bytes: Uint8Array): void {
     this.reader.give(bytes.slice().buffer);
   }
   private tellStatus(): void {
-    this.give(encodeServerMessage({ status: { is_paused: !this.isPlaying } }));
+    const isSlow = this.isPlaying && this.pace < STEADY_PACE;
+    const slow_motion = isSlow ? `Slow motion: this browser simulates ${this.pace.toFixed(2)} of real time` : '';
+    this.give(encodeServerMessage({ status: { is_paused: !this.isPlaying, slow_motion } }));
   }
   private tellPlace(): void {
     const { frames } = this.all;
