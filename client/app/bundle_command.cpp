@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "client/app/ctl_commands.h"
+#include "client/app/scenario/server_process.h"
 #include "common/base/base64.h"
 #include "common/base/command_line_error.h"
 #include "common/base/file.h"
@@ -84,6 +85,7 @@ Welcome welcome_of(const RecordingStart& start, const SceneDesc& scene, const Sc
   welcome.vertex_count = asset.vertex_count;
   welcome.bound_m = scene.stream.bound_m;
   welcome.step_rate_hz = scene.step_rate_hz;
+  welcome.sim_device = start.sim_device_name;
   welcome.look = scene.look;
   welcome.camera = scene.camera;
   welcome.frame_width = scene.stream.frame_width;
@@ -115,14 +117,17 @@ Status replace_line(std::string& html, std::string_view what, std::string_view b
   return {};
 }
 
+Error no_page() {
+  return make_error(
+      ErrorCode::Unsupported,
+      "this build has no page for browsers (build with -DSTRANDCAST_WEB=ON, as deploy/run.sh --web does)");
+}
+
 Result<std::string> page_with(PageFiles files, const std::string& tape, const std::string& codec,
                               bool has_all_solvers) {
   const auto index =
       std::find_if(files.begin(), files.end(), [](const auto& file) { return file.path == "/"; });
-  if (index == files.end())
-    return make_error(
-        ErrorCode::Unsupported,
-        "this build has no page for browsers (build with -DSTRANDCAST_WEB=ON, as deploy/run.sh --web does)");
+  if (index == files.end()) return no_page();
   std::string html(index->plain);
   ASSIGN_OR_RETURN(const PageFile* style, part(files, "style."));
   ASSIGN_OR_RETURN(const PageFile* script, part(files, "main."));
@@ -145,15 +150,112 @@ uint32_t time_ms(int64_t since_ns) {
   return static_cast<uint32_t>(std::clamp<int64_t>(since_ns, 0, int64_t{3'600} * kSInNs) / kMsInNs);
 }
 
+/// Puts frames onto the tape, and looks where they change.
+class TapeMaker {
+ public:
+  TapeMaker(Tape& tape, Bundle& bundle, LookChange look, std::string codec, std::optional<double> seconds)
+      : tape_(tape),
+        bundle_(bundle),
+        look_(encode(ServerMessage(std::move(look)))),
+        codec_(std::move(codec)),
+        most_s_(seconds.value_or(kMostBundleSeconds)) {}
+
+  /// LimitExceeded beyond kMaxBundleTapeBytes.
+  Status take_all(RecordingReader& reader) {
+    uint32_t damaged_in_a_row = 0;
+    while (damaged_in_a_row < kMostDamagedInARow) {
+      const auto item = reader.next();
+      damaged_in_a_row = item ? 0 : damaged_in_a_row + 1;
+      if (!item) {
+        ++bundle_.damaged;
+        continue;
+      }
+      if (!*item || !take((*item)->what)) break;
+      if (tape_.bytes().size() > kMaxBundleTapeBytes)
+        return make_error(ErrorCode::LimitExceeded,
+                          "{:.1f} s of this recording take more than {} MiB: --seconds", bundle_.seconds,
+                          kMaxBundleTapeBytes >> 20);
+    }
+    return {};
+  }
+
+ private:
+  /// Returns whether there is more to take.
+  bool take(const std::variant<RecordedFrame, RecordedMessage>& what) {
+    if (const auto* frame = std::get_if<RecordedFrame>(&what)) return take(*frame);
+    const auto& message = std::get<RecordedMessage>(what);
+    if (const auto* look = std::get_if<LookChange>(&message)) look_ = encode(ServerMessage(*look));
+    const auto* stream = std::get_if<RecordedStream>(&message);
+    if (stream == nullptr || stream->codec == codec_) return true;
+    bundle_.other_codec = stream->codec;
+    return false;
+  }
+  bool take(const RecordedFrame& frame) {
+    if (!first_ns_ && !frame.is_keyframe()) return true;
+    const int64_t now_ns = frame.frame->header.sim_time_ns;
+    if (!first_ns_) first_ns_ = now_ns;
+    const double now_s = static_cast<double>(now_ns - *first_ns_) / kNsPerS;
+    if (now_s > most_s_) return false;
+    bundle_.seconds = now_s;
+    const uint32_t now_ms = time_ms(now_ns - *first_ns_);
+    if (look_ != told_look_) tape_.add(now_ms, look_);
+    told_look_ = look_;
+    tape_.add(now_ms, frame.frame->message);
+    ++bundle_.frame_count;
+    return true;
+  }
+
+  Tape& tape_;
+  Bundle& bundle_;
+  std::vector<std::byte> look_, told_look_;  // messages
+  const std::string codec_;
+  const double most_s_;
+  std::optional<int64_t> first_ns_;
+};
+
+int bundle_recording(const std::filesystem::path& recording, const BundleCommand& command) {
+  const auto reader = RecordingReader::open(recording);
+  if (!reader) return ctl_failure(reader.error());
+  const auto bundle = make_bundle(**reader, built_in_page(), command);
+  if (!bundle) return ctl_failure(bundle.error());
+  const std::filesystem::path& page = command.paths.back();
+  if (const Status saved = save_file(page, std::as_bytes(std::span(bundle->html))); !saved)
+    return ctl_failure(saved.error());
+  constexpr double kBytesPerKb = 1e3;
+  std::cout << fmt::format("{}: {} frames, {:.1f} s; {:.0f} kB, {:.0f} kB of them the recording's\n",
+                           page.string(), bundle->frame_count, bundle->seconds,
+                           static_cast<double>(bundle->html.size()) / kBytesPerKb,
+                           static_cast<double>(bundle->tape_bytes) * 4.0 / 3.0 / kBytesPerKb);
+  if (bundle->damaged > 0)
+    std::cout << fmt::format("  {} damaged parts of the recording are left out\n", bundle->damaged);
+  if (!bundle->other_codec.empty())
+    std::cout << fmt::format("  the recording goes on by the codec {}, which is left out\n",
+                             bundle->other_codec);
+  return kDoneExit;
+}
+
 }  // namespace
 
 void declare_bundle(CLI::App& app, BundleCommand& command) {
-  app.add_option("recording", command.recording, "RECORDING.mcap")->required();
-  app.add_option("page", command.page, "The HTML file to write; it is replaced")->required();
-  app.add_option("--seconds", command.seconds, "Length from the begin of the recording (default: all of it)")
+  SceneRecordingOptions& scene = command.scene;
+  app.add_option("paths", command.paths,
+                 "[RECORDING.mcap, SCENE.textproto or a hair file] OUT.html (default: the built-in scene); "
+                 "OUT.html is replaced")
+      ->required()
+      ->expected(1, 2);
+  app.add_option("--seconds", command.seconds,
+                 "Length from the begin of the recording (default: all of it), or of the scene (default: 10)")
       ->check(without_nan(CLI::Range(0.0, kMostBundleSeconds)));
   app.add_flag("--all-solvers", command.has_all_solvers,
-               "Take the larger module that steps every solver; others than dftl and direct_rod need it");
+               "Take the larger module that steps every solver, as for a recording whose solver changes");
+  app.add_option("--motion", scene.motion, "Of a scene: BVH file, builtin, still or none")
+      ->capture_default_str();
+  app.add_option("--wind", scene.wind, "Of a scene: CSV file, gusts or none")->capture_default_str();
+  app.add_option("--set", scene.overrides, "Of a scene: a parameter as path=value; repeatable")
+      ->expected(1)
+      ->take_all();
+  app.add_option("--server", scene.server,
+                 "Server program that simulates a scene (default: strandcast-server beside this one)");
 }
 
 Result<Bundle> make_bundle(RecordingReader& reader, PageFiles files, const BundleCommand& command) {
@@ -161,61 +263,39 @@ Result<Bundle> make_bundle(RecordingReader& reader, PageFiles files, const Bundl
   ASSIGN_OR_RETURN(const SceneAsset asset, reader.asset());
   ASSIGN_OR_RETURN(const SceneDesc scene, parse_scene(start.scene_text, "the recording's scene", {}));
   Bundle bundle;
-  bundle.solver = scene.solver.name;
   constexpr uint32_t kFirstCount = 2;
   Tape tape(kFirstCount);
   tape.add(0, encode(ServerMessage(welcome_of(start, scene, asset))));
   tape.add(0, reader.asset_frame()->message);
-  std::optional<int64_t> first_ns;
-  uint32_t damaged_in_a_row = 0;
-  while (damaged_in_a_row < kMostDamagedInARow) {
-    const auto item = reader.next();
-    if (!item) {
-      ++bundle.damaged;
-      ++damaged_in_a_row;
-      continue;
-    }
-    damaged_in_a_row = 0;
-    if (!*item) break;
-    const auto* frame = std::get_if<RecordedFrame>(&(*item)->what);
-    if (frame == nullptr || (!first_ns && !frame->is_keyframe())) continue;
-    const int64_t now_ns = frame->frame->header.sim_time_ns;
-    if (!first_ns) first_ns = now_ns;
-    bundle.seconds = static_cast<double>(now_ns - *first_ns) / kNsPerS;
-    if (bundle.seconds > command.seconds.value_or(kMostBundleSeconds)) break;
-    tape.add(time_ms(now_ns - *first_ns), frame->frame->message);
-    ++bundle.frame_count;
-    if (tape.bytes().size() > kMaxBundleTapeBytes)
-      return make_error(ErrorCode::LimitExceeded,
-                        "{:.1f} s of this recording take more than {} MiB: --seconds", bundle.seconds,
-                        kMaxBundleTapeBytes >> 20);
-  }
+  RETURN_IF_ERROR(
+      TapeMaker(tape, bundle, {scene.look, scene.camera}, start.codec, command.seconds).take_all(reader));
   if (bundle.frame_count == 0)
     return make_error(ErrorCode::BadInput, "the recording has no frame to begin with");
   bundle.tape_bytes = tape.bytes().size();
-  ASSIGN_OR_RETURN(bundle.html, page_with(files, tape.bytes(), start.codec, command.has_all_solvers));
+  const bool is_usual = scene.solver.name == "dftl" || scene.solver.name == "direct_rod";
+  ASSIGN_OR_RETURN(bundle.html,
+                   page_with(files, tape.bytes(), start.codec, command.has_all_solvers || !is_usual));
   return bundle;
 }
 
-int run_bundle(const BundleCommand& command) {
-  const auto reader = RecordingReader::open(command.recording, RecordedPart::Frames);
-  if (!reader) return ctl_failure(reader.error());
-  const auto bundle = make_bundle(**reader, built_in_page(), command);
-  if (!bundle) return ctl_failure(bundle.error());
-  if (const Status saved = save_file(command.page, std::as_bytes(std::span(bundle->html))); !saved)
-    return ctl_failure(saved.error());
-  constexpr double kBytesPerKb = 1e3;
-  std::cout << fmt::format("{}: {} frames, {:.1f} s; {:.0f} kB, {:.0f} kB of them the recording's\n",
-                           command.page.string(), bundle->frame_count, bundle->seconds,
-                           static_cast<double>(bundle->html.size()) / kBytesPerKb,
-                           static_cast<double>(bundle->tape_bytes) * 4.0 / 3.0 / kBytesPerKb);
-  if (bundle->damaged > 0)
-    std::cout << fmt::format("  {} damaged parts of the recording are left out\n", bundle->damaged);
-  const bool is_usual = bundle->solver == "dftl" || bundle->solver == "direct_rod";
-  if (!is_usual && !command.has_all_solvers)
-    std::cout << fmt::format("  {} is not among the solvers of the smaller module: --all-solvers\n",
-                             bundle->solver);
-  return kDoneExit;
+int run_bundle(const BundleCommand& command, const std::atomic<bool>& stop) {
+  if (const std::filesystem::path& page = command.paths.back(); page.extension() != ".html")
+    return ctl_failure(
+        make_error(ErrorCode::BadInput, "a bundle is a file OUT.html, and {} is none", page.string()));
+  const std::filesystem::path source = command.paths.size() > 1 ? command.paths.front() : "";
+  if (source.extension() == ".mcap") return bundle_recording(source, command);
+  if (built_in_page().empty()) return ctl_failure(no_page());
+  const auto folder = make_temporary_folder();
+  if (!folder) return ctl_failure(folder.error());
+  const std::filesystem::path recording = *folder / "scene.mcap";
+  SceneRecordingOptions options = command.scene;
+  options.scene = source;
+  options.seconds = command.seconds.value_or(options.seconds);
+  const Status recorded = record_scene(options, recording, stop);
+  const int code = recorded ? bundle_recording(recording, command) : ctl_failure(recorded.error());
+  std::error_code ignored;
+  std::filesystem::remove_all(*folder, ignored);
+  return code;
 }
 
 }  // namespace strandcast

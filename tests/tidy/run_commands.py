@@ -22,7 +22,7 @@ COMMAND_S = 60  # a command that takes longer is broken
 OUTPUTS = {"--screenshot", "--report", "--junit", "--export", "--trace", ">"}
 # Commands for another machine, or for a server of their own, with the test that runs them.
 ELSEWHERE = [(r"ctl fleet (tend|start|list|drain|stop)\b", "tests/fleet/check.py"), (r"wss://HOST(/s/)", "tests/fleet/check.py"),
-             (r"ctl (grid)\b", "tests/tools/check_scripts.py"), (r"ctl (bundle)\b", "tests/web/page_browser.mjs"),
+             (r"ctl (grid)\b", "tests/tools/check_scripts.py"), (r"ctl (bundle)\b", "tests/web/page_bundle.mjs"),
              (r"ctl .* (sessions|kick|shutdown)\b", "tests/integration/secrets_test.cpp"),
              (r"ctl (camera) ", "tests/unit/ctl_options_test.cpp"),
              (r"ctl (mocap) ", "tests/integration/server_mocap_test.cpp"),

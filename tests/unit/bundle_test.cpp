@@ -5,6 +5,7 @@
 
 #include <cstring>
 
+#include "client/app/ctl_commands.h"
 #include "common/wire/messages.h"
 #include "tests/support/sample_recording.h"
 
@@ -27,7 +28,7 @@ const PageFile kFiles[] = {
 };
 
 std::unique_ptr<RecordingReader> reader_of(mcap::Bytes bytes) {
-  return RecordingReader::open(memory_byte_source(std::move(bytes)), RecordedPart::Frames).value();
+  return RecordingReader::open(memory_byte_source(std::move(bytes))).value();
 }
 
 std::string decoded(std::string_view base64) {
@@ -88,20 +89,68 @@ TEST(Bundle, HoldsThePageAndAllThatAServerWouldHaveSent) {
   EXPECT_EQ(part_of(bundle->html, "stepCore"), "M");
 
   const std::vector<TapeMessage> tape = tape_of(bundle->html);
-  ASSERT_EQ(tape.size(), 2u + 25u);
+  ASSERT_EQ(tape.size(), 3u + 25u);
   const auto welcome = decode_server_message(std::as_bytes(std::span(tape[0].bytes)));
   ASSERT_TRUE(welcome) << welcome.error().to_string();
   EXPECT_EQ(std::get<Welcome>(*welcome).codec, "delta");
   EXPECT_EQ(std::get<Welcome>(*welcome).strand_count, 4u);
+  EXPECT_EQ(std::get<Welcome>(*welcome).sim_device, test::sample_start().sim_device_name);
   EXPECT_EQ(static_cast<Opcode>(tape[1].bytes[0]), Opcode::Asset);
+  const auto look = decode_server_message(std::as_bytes(std::span(tape[2].bytes)));
+  ASSERT_TRUE(look) << look.error().to_string();
+  EXPECT_EQ(std::get<LookChange>(*look).look, std::get<Welcome>(*welcome).look);
   // What a decoder makes of it is what was recorded.
   auto decoder = make_strand_decoder("delta", {4, 3}).value();
   for (size_t i = 0; i < 25; ++i) {
-    EXPECT_EQ(tape[2 + i].time_ms, 100 * i);
-    const auto state = decoder->decode(std::as_bytes(std::span(tape[2 + i].bytes)));
+    EXPECT_EQ(tape[3 + i].time_ms, 100 * i);
+    const auto state = decoder->decode(std::as_bytes(std::span(tape[3 + i].bytes)));
     ASSERT_TRUE(state) << state.error().to_string();
     EXPECT_EQ((*state)->tick, i);
   }
+}
+
+/// Frames of "raw" that nobody decodes, with looks before some, and another codec behind the third.
+mcap::Bytes restyled_recording(const std::string& solver = "dftl") {
+  test::MemorySink sink;
+  RecordingStart start = test::sample_start();
+  start.scene_text = "solver { name: \"" + solver + "\" }";
+  RecordingWriter writer(sink, start, *test::sample_asset_frame());
+  const int64_t begin_ns = test::sample_start().server_time_ns;
+  LookChange red{{}, sample_camera()};
+  red.look.hair_color = "red";
+  LookChange black = red;
+  black.look.hair_color = "black";
+  const LookChange looks[] = {red, red, black, black};
+  for (uint32_t i = 0; i < 4; ++i) {
+    const int64_t sim_time_ns = i * 100'000'000;
+    if (i == 3) writer.add(begin_ns + sim_time_ns, sim_time_ns, RecordedStream{i, "raw", 1e-4});
+    writer.add(begin_ns + sim_time_ns, sim_time_ns, looks[i]);
+    writer.add(begin_ns + sim_time_ns, test::sample_frame(i + 1, i == 0, sim_time_ns));
+  }
+  writer.finish();
+  return sink.all;
+}
+
+TEST(Bundle, HasEachLookOnceBeforeTheFrameThatItBeginsWith) {
+  const auto bundle = make_bundle(*reader_of(restyled_recording()), kFiles, {});
+  ASSERT_TRUE(bundle) << bundle.error().to_string();
+  const std::vector<TapeMessage> tape = tape_of(bundle->html);
+  ASSERT_EQ(tape.size(), 2u + 5u);
+  const auto hair_color = [&](size_t i) {
+    const auto message = decode_server_message(std::as_bytes(std::span(tape[i].bytes)));
+    return message ? std::get<LookChange>(*message).look.hair_color : message.error().to_string();
+  };
+  EXPECT_EQ(hair_color(2), "red");
+  EXPECT_EQ(hair_color(5), "black");
+  EXPECT_EQ(tape[5].time_ms, 200u);
+}
+
+TEST(Bundle, EndsWhereTheRecordingChangesItsCodec) {
+  const auto bundle = make_bundle(*reader_of(restyled_recording()), kFiles, {});
+  ASSERT_TRUE(bundle) << bundle.error().to_string();
+  EXPECT_EQ(bundle->frame_count, 3u);
+  EXPECT_EQ(bundle->other_codec, "raw");
+  EXPECT_EQ(make_bundle(*reader_of(test::moving_recording(3)), kFiles, {})->other_codec, "");
 }
 
 TEST(Bundle, IsAsLongAsAskedFor) {
@@ -113,11 +162,28 @@ TEST(Bundle, IsAsLongAsAskedFor) {
   EXPECT_EQ(bundle->frame_count, 11u);
 }
 
+TEST(Bundle, TakesTheLargerModuleForWhatTheSmallerOneDoesNotStep) {
+  const auto module_of = [](const char* solver) {
+    return part_of(make_bundle(*reader_of(restyled_recording(solver)), kFiles, {})->html, "stepCore");
+  };
+  EXPECT_EQ(module_of("dftl"), "M");
+  EXPECT_EQ(module_of("direct_rod"), "M");
+  EXPECT_EQ(module_of("pbd"), "whole");
+}
+
 TEST(Bundle, TakesTheLargerModuleIfAskedFor) {
   const auto reader = reader_of(test::moving_recording(2));
   BundleCommand command;
   command.has_all_solvers = true;
   EXPECT_EQ(part_of(make_bundle(*reader, kFiles, command)->html, "stepCore"), "whole");
+}
+
+TEST(Bundle, WritesOverNoRecordingWhosePageWasForgotten) {
+  BundleCommand command;
+  command.paths = {"run.mcap"};
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(run_bundle(command, false), kBadInputExit);
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("OUT.html, and run.mcap is none"));
 }
 
 TEST(Bundle, SaysWhatItLacks) {

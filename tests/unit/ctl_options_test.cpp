@@ -23,8 +23,11 @@ inline void tell(FieldTexts& told, const std::string& where, const FeedOptions& 
 inline void tell(FieldTexts& told, const std::string& where, const ExportCommand& all) {
   OPTION_FIELDS(all, paths, fps, unit, up, space, is_guides, is_drawn, has_head, from_s, to_s, seconds, at_s);
 }
+inline void tell(FieldTexts& told, const std::string& where, const SceneRecordingOptions& all) {
+  OPTION_FIELDS(all, scene, overrides, motion, wind, seconds, server);
+}
 inline void tell(FieldTexts& told, const std::string& where, const BundleCommand& all) {
-  OPTION_FIELDS(all, recording, page, seconds, has_all_solvers);
+  OPTION_FIELDS(all, paths, seconds, scene, has_all_solvers);
 }
 inline void tell(FieldTexts& told, const std::string& where, const TestOptions& all) {
   OPTION_FIELDS(all, scenarios, junit, out, server, uses_running, renews_goldens, jobs, is_watching);
@@ -127,6 +130,10 @@ const OptionRow kCommandRows[] = {
     {"recording", {"a.mcap"}, {{"recording", "a.mcap"}}, {}, "check"},
     {"--seconds", {"2"}, {{"bundle.seconds", "2"}}, kBundle, "bundle"},
     {"--all-solvers", {}, {{"bundle.has_all_solvers", "true"}}, kBundle, "bundle"},
+    {"--motion", {"a.bvh"}, {{"bundle.scene.motion", "a.bvh"}}, kBundle, "bundle"},
+    {"--wind", {"a.csv"}, {{"bundle.scene.wind", "a.csv"}}, kBundle, "bundle"},
+    {"--set", {"a=1", "--set", "b=2"}, {{"bundle.scene.overrides", "a=1 b=2"}}, kBundle, "bundle"},
+    {"--server", {"s"}, {{"bundle.scene.server", "s"}}, kBundle, "bundle"},
     {"--frames", {"7"}, {{"check_frames", "7"}}, {}, "check"},
     {"--timeout", {"7"}, {{"check_timeout_s", "7"}}, {}, "check"},
     {"--ban", {"60"}, {{"ban_s", "60"}}, {"7"}, "kick"},
@@ -146,8 +153,7 @@ const OptionRow kRequiredRows[] = {
     {"assignment", {"look.ambient=1"}, {{"assignment", "look.ambient=1"}}, {}, "set"},
     {"file", {"s.textproto"}, {{"scene_path", "s.textproto"}}, {}, "save"},
     {"paths", {"a.mcap", "o.usda"}, {{"exported.paths", "a.mcap o.usda"}}, {}, "export"},
-    {"recording", kBundle, {{"bundle.recording", "a.mcap"}, {"bundle.page", "o.html"}}, {}, "bundle"},
-    {"page", kBundle, {{"bundle.recording", "a.mcap"}, {"bundle.page", "o.html"}}, {}, "bundle"},
+    {"paths", kBundle, {{"bundle.paths", "a.mcap o.html"}}, {}, "bundle"},
     {"session", {"7"}, {{"session", "7"}}, {}, "kick"},
     {"recording", {"a.mcap"}, {{"recording", "a.mcap"}}, {}, "info"},
     {"recording", {"a.mcap"}, {{"recording", "a.mcap"}}, {}, "recover"},

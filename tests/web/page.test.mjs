@@ -368,4 +368,67 @@ check('shaders', () => {
   assert.throws(() => page.shaderText('#include "lib/none.glsl"'));
 });
 
+/** A tape of 100 frames, 10 ms apart, a keyframe at every tenth; looks before frames 0 and 55. Paused, and all is decoded at once. */
+function playedTape() {
+  const [KEYFRAME, DELTA] = [0x20, 0x21];
+  const parts = [Buffer.from(Uint32Array.of(1).buffer)];
+  const add = (timeMs, ...bytes) => parts.push(Buffer.from(Uint32Array.of(timeMs, bytes.length).buffer), Buffer.from(bytes));
+  add(0, 1, 99);
+  for (let i = 0; i < 100; ++i) {
+    if (i === 0 || i === 55) add(10 * i, 1, 200 + i);
+    add(10 * i, i % 10 ? DELTA : KEYFRAME, i);
+  }
+  const tape = new page.Tape(Uint8Array.from(Buffer.concat(parts)).buffer);
+  const seen = { frames: [], looks: [], place: undefined, marks: 0, tape };
+  tape.hearAndDecode = (wish) => {
+    Object.assign(seen, { frames: [], looks: [] });
+    tape.hear(wish);
+    while (seen.marks > 0) {
+      --seen.marks;
+      tape.passed();
+    }
+  };
+  tape.begin({
+    give: (message) => {
+      const [kind, number] = new Uint8Array(message);
+      if (kind !== 1) seen.frames.push(number);
+      else if (number >= 200) seen.looks.push(number - 200);
+    },
+    mark: () => ++seen.marks, tell: (place) => (seen.place = place),
+  });
+  tape.hearAndDecode({ kind: 'command', command: page.Command.pause });
+  return seen;
+}
+const seek = (timeMs) => ({ kind: 'seek', timeMs });
+const range = (from, to) => Array.from({ length: to - from + 1 }, (_, i) => from + i);
+
+check('a tape goes anywhere by the keyframe before, and on from where it is', () => {
+  const seen = playedTape();
+  const goes = (timeMs, frames, looks) => {
+    seen.tape.hearAndDecode(seek(timeMs));
+    assert.deepEqual([seen.frames, seen.looks, seen.place.timeMs], [frames, looks, 10 * frames[frames.length - 1]], `to ${timeMs}`);
+  };
+  goes(575, range(50, 57), [55]);
+  goes(590, [58, 59], []);
+  goes(542, range(50, 54), [0]);
+  goes(0, [0], []);
+  goes(5000, range(90, 99), [55]);
+  seen.tape.hearAndDecode({ kind: 'command', command: page.Command.stepOnce });
+  assert.deepEqual(seen.frames, [0], 'behind the end is the begin');
+  seen.tape.end();
+});
+check('a tape hears no more frames than are decoded, and the newest wish counts', () => {
+  const seen = playedTape();
+  seen.tape.hear(seek(990));
+  assert.equal(seen.marks, 1);
+  const first = seen.frames.length;
+  seen.tape.hear(seek(330));
+  seen.tape.hear(seek(115));
+  assert.equal(seen.frames.length, first, 'what was given is not decoded yet');
+  --seen.marks;
+  seen.tape.passed();
+  assert.deepEqual(seen.frames.slice(first), [10, 11]);
+  seen.tape.end();
+});
+
 console.log(`${checks} checks of the page passed`);

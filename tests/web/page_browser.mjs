@@ -2,7 +2,7 @@
 // what is wrong with a token, and lets none of it leave the Hello.
 //   node tests/web/page_browser.mjs strandcast-server [FOLDER for screenshots]
 // Ends with 77 where there is no browser; a line per test; the exit status is 1 when any fails.
-import { spawn, spawnSync } from 'node:child_process';
+import { spawn } from 'node:child_process';
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import http from 'node:http';
@@ -176,23 +176,6 @@ const all = {
     } finally {
       relay.kill();
     }
-  },
-  async 'a bundle plays a recording from a file, over and over'() {
-    const run = path.join(work, 'bundled.mcap');
-    const page = path.join(work, 'bundled.html');
-    const recorded = await Server.start(program, [...SMALL, '--record', run, '--seconds', '3']);
-    await new Promise((done) => recorded.child.once('exit', done));
-    const made = spawnSync(path.join(path.dirname(program), 'strandcast-ctl'), ['bundle', run, page], { encoding: 'utf8' });
-    assert.equal(made.status, 0, made.stderr);
-    console.log(`  ${made.stdout.trim()}`);
-    const [frames, all, recording] = made.stdout.match(/: (\d+) frames.*; (\d+) kB, (\d+) kB/).slice(1).map(Number);
-    assert.ok(all - recording <= 600, `page and modules: ${all - recording} kB`);
-    const tab = await browser.open(`file://${page}`);
-    const state = await tab.until((now) => now.mode === 'strands' && now.states > frames + 20, 'strands of the second round');
-    assert.deepEqual([state.codec, state.hash_ok, state.error, state.rejected], ['step', true, '', '']);
-    assert.deepEqual(tab.errors, []);
-    if (shots) await tab.screenshot(path.join(shots, 'bundle.png'));
-    await tab.close();
   },
   async 'memory stays where it is'() {
     const seconds = Number(process.env.STRANDCAST_SOAK_S ?? 0);

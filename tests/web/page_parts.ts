@@ -11,3 +11,4 @@ export { rgbaOfTile } from '../../client/web/page/tile_planes';
 export { orbit, pan, zoom } from '../../client/web/page/ui/orbit';
 export * from '../../client/web/page/wire';
 export * from '../../client/web/page/socket';
+export { Tape } from '../../client/web/page/tape';

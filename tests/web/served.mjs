@@ -15,7 +15,7 @@ if (!program) {
 export const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-page-'));
 
 /** A browser, and a server of little hair. */
-export async function begin() {
+export async function begin(options = SMALL) {
   const missing = whyNoBrowser();
   if (missing) {
     console.log(`skipped: ${missing}`);
@@ -24,7 +24,7 @@ export async function begin() {
   if (shots) fs.mkdirSync(shots, { recursive: true });
   const browser = await Browser.start();
   try {
-    return { browser, server: await Server.start(program, SMALL) };
+    return { browser, server: await Server.start(program, options) };
   } catch (error) {
     await browser.end();
     throw error;

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <spawn.h>
+#include <stdlib.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -32,6 +33,24 @@ constexpr uint64_t kMaxPortFileBytes = 64;
 constexpr size_t kMaxShownChars = 300;
 
 }  // namespace
+
+Result<std::filesystem::path> find_server_program(const std::filesystem::path& path) {
+  std::error_code failure;
+  std::filesystem::path program = path;
+  if (program.empty())
+    program = std::filesystem::read_symlink("/proc/self/exe", failure).parent_path() / "strandcast-server";
+  if (std::filesystem::is_regular_file(program, failure)) return std::filesystem::absolute(program, failure);
+  return make_error(ErrorCode::NotFound, "there is no server program {}: name it with --server PATH",
+                    program.string());
+}
+
+Result<std::filesystem::path> make_temporary_folder() {
+  std::error_code failure;
+  std::string path = (std::filesystem::temp_directory_path(failure) / "strandcast-test-XXXXXX").string();
+  if (failure || mkdtemp(path.data()) == nullptr)
+    return make_error(ErrorCode::Unavailable, "cannot make a folder for temporary files in {}", path);
+  return std::filesystem::path(path);
+}
 
 Status ServerProcess::spawn() {
   std::error_code ignored;

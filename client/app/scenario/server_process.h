@@ -14,6 +14,13 @@
 
 namespace strandcast {
 
+/// Returns the server program: this path, or strandcast-server beside this program if it is empty. NotFound
+/// if it is no file.
+Result<std::filesystem::path> find_server_program(const std::filesystem::path& path);
+
+/// Makes a folder that nobody else has; the caller removes it.
+Result<std::filesystem::path> make_temporary_folder();
+
 struct ServerProcessConfig {
   std::filesystem::path program;
   std::vector<std::string> arguments;  // all but port, files and lifetime

@@ -3,11 +3,13 @@
 import { keepToken, keptToken, linkTo, readFragment, withoutToken } from './address';
 import { compileCore } from './core';
 import type { Asked, Camera, DrawFigures, FromDraw, FromNet, NetFigures, ToDraw, ToNet } from './messages';
+import { element } from './ui/element';
 import { Hud, Row, Warnings } from './ui/hud';
 import type { SocketStart } from './socket';
-import { TAPE_URL } from './tape';
+import { TAPE_URL, type TapePlace, type ToTape } from './tape';
 import { cameraOf, fittedTo, followKey, followPointers, presets } from './ui/orbit';
 import { Panel } from './ui/panel';
+import { Timeline } from './ui/timeline';
 import {
   CameraMessage, Command, Device, FrameQualityMessage, LookMessage, Mode, Role, StatusMessage, StreamQualityMessage,
   WelcomeMessage,
@@ -93,6 +95,7 @@ class Viewer {
   private retryAtMs = 0;
   private lostAtMs = 0; // 0 while connected
   private readonly panel: Panel;
+  private timeline?: Timeline; // of a recording in the page
 
   constructor() {
     this.canDraw = typeof OffscreenCanvas !== 'undefined' && 'transferControlToOffscreen' in strands;
@@ -106,7 +109,9 @@ class Viewer {
     const sockets = new MessageChannel();
     const { stepCore, wholeCore } = assets();
     const start: SocketStart = { port: sockets.port2, tape: bundle?.tape };
-    this.startWorker('socket').postMessage(start, [sockets.port2]);
+    const socket = this.startWorker('socket');
+    socket.postMessage(start, [sockets.port2]);
+    if (bundle) this.showTimeline(socket);
     this.net = this.startWorker('net');
     this.net.onmessage = (event: MessageEvent<FromNet>) => this.fromNet(event.data);
     this.toNet({ kind: 'start', stepCore, wholeCore, asked: this.asked, states: this.states.port1, sockets: sockets.port1 },
@@ -124,13 +129,19 @@ class Viewer {
       close: () => this.togglePanel(),
     });
     this.bind();
-    if (bundle) for (const id of ['mode', 'link']) (at(id).closest('label') ?? at(id)).hidden = true;
     setInterval(() => this.tick(), 500);
     if (!isSecureContext) {
       warnings.say('This page came without TLS: the browser then decodes no video. Over https pictures would take less of the link.');
     }
   }
 
+  private showTimeline(socket: Worker): void {
+    const timeline = (this.timeline = new Timeline((wish: ToTape) => socket.postMessage(wish)));
+    socket.onmessage = (event: MessageEvent<TapePlace>) => timeline.show(event.data);
+    document.querySelector('main')!.append(timeline.card);
+    for (const id of ['mode', 'link', 'reset']) (at(id).closest('label') ?? at(id)).hidden = true;
+    at('keys').querySelector('dl')!.append(element('dt', 'Home, End, comma, point'), element('dd', 'begin, end, a second back or on'));
+  }
   private startWorker(name: string): Worker {
     // A file's document may start no modules of its own as workers.
     const made = bundle ? new Worker(bundle.script, { name }) : new Worker(ownScript(), { type: 'module', name });
@@ -225,7 +236,7 @@ class Viewer {
     this.welcome = welcome;
     this.reason = welcome.mode_reason;
     this.quality = undefined;
-    at('simulation-tools').hidden = !this.isController;
+    at('simulation-tools').hidden = !this.isController && !bundle;
     this.sceneLook(welcome.look, welcome.camera);
     this.panel.setRole(this.isController, this.shown !== Mode.frames);
     at('head').replaceChildren(...welcome.heads.map((name) => new Option(name)));
@@ -406,7 +417,8 @@ class Viewer {
     if (this.isController) this.toNet({ kind: 'scene' });
   }
   private command(command: number): void {
-    if (this.isController) this.toNet({ kind: 'command', command });
+    if (this.timeline) this.timeline.send({ kind: 'command', command });
+    else if (this.isController) this.toNet({ kind: 'command', command });
     else warnings.say('You watch here: the token or the server gives no right to steer.');
   }
   private togglePause(): void {
@@ -527,7 +539,7 @@ class Viewer {
     }
     if (/^(INPUT|TEXTAREA)$/.test(target.tagName)) return;
     if (event.key === ' ' && target.tagName === 'BUTTON') return;
-    if (followKey(event, moves)) return event.preventDefault();
+    if (followKey(event, moves) || this.timeline?.key(event.key)) return event.preventDefault();
     const actions: { [key: string]: () => void } = {
       ' ': () => this.togglePause(), n: () => this.command(Command.stepOnce), r: () => this.usePreset(0),
       m: () => this.setMode({ [Mode.auto]: Mode.strands, [Mode.strands]: Mode.frames, [Mode.frames]: Mode.auto }[this.asked.mode] ?? Mode.auto),
@@ -580,12 +592,14 @@ class Viewer {
       isConnected: this.isConnected, mode: ['strands', 'pictures'][this.shown] ?? '', hz, camera: this.camera.offset,
       states: this.figures?.decodedFrames ?? 0, bytes: this.figures?.receivedBytes ?? 0, pictures: this.pictureCount, codec: this.figures?.codec ?? '',
       decodeMs: this.figures?.decodeMs ?? 0, wholeMs: this.drawFigures?.leastWholeMs ?? 0,
-      hash_ok: !this.figures?.rejectedFrames, rejected: this.figures?.lastError ?? '', error: at('trouble').hidden ? '' : at('trouble-why').textContent,
+      hash_ok: !this.figures?.rejectedFrames, wrong: this.figures?.rejectedFrames ?? 0, timeMs: this.timeline?.place?.timeMs, rejected: this.figures?.lastError ?? '', error: at('trouble').hidden ? '' : at('trouble-why').textContent,
     });
   }
   private showWarnings(): void {
     const all: string[] = [];
-    if (this.status?.is_paused) all.push(this.isController ? 'Paused: Space resumes, N steps' : 'Paused');
+    if (bundle && this.figures?.rejectedFrames)
+      all.push(`${this.figures.rejectedFrames} frames cannot be shown as they were recorded: ${this.figures.lastError}`);
+    if (this.status?.is_paused) all.push(this.isController || bundle ? 'Paused: Space resumes, N steps' : 'Paused');
     if (this.isConnected && this.status?.is_motion_stale && !this.status.is_paused)
       all.push(`No head motion arrives at the server${this.isController ? ': strandcast-ctl feed sends some' : ''}`);
     if (this.isConnected && this.status?.slow_motion) all.push(this.status.slow_motion);
@@ -614,7 +628,7 @@ class Viewer {
     ];
     const add = (name: string, text: string): void => void (text && rows.push([name, text]));
     add('because', this.reason);
-    add('you', this.isController ? 'may steer' : 'watch');
+    if (!bundle) add('you', this.isController ? 'may steer' : 'watch');
     add('shown', `${hz.toFixed(1)} pictures/s`);
     add('drawn by', isFrames ? 'the server' : `${this.drawnBy}: ${this.drawWhy}`);
     const drawn = this.drawFigures;
@@ -633,6 +647,11 @@ class Viewer {
         add('stream of', `${this.quality.strand_share < 1 ? `${(this.quality.strand_share * 100).toFixed(0)} % of the` : 'all'} strands every ${this.quality.rate_divisor > 1 ? `${this.quality.rate_divisor} steps` : 'step'} within ${(this.quality.bound_m * 1000).toPrecision(2)} mm: ${this.quality.reason}`);
     }
     add('decoded in', `${figures.decodeMs.toFixed(2)} ms`);
+    if (bundle) {
+      add('states', `${figures.decodedFrames} with the hash that was recorded, ${figures.rejectedFrames} refused`);
+      add('simulated by', welcome.sim_device);
+      return rows;
+    }
     const status = this.status;
     if (status) {
       add('simulation', `${status.sim_ms.toFixed(2)} ms, x${status.realtime_factor.toFixed(2)} real time`);

@@ -1,6 +1,6 @@
 // The socket in a worker of its own: what arrives is stamped when it arrives, however long decoding of what came
 // before takes, so that the server does not take a busy viewer for a slow link. DistantSocket is its other end.
-import { playTape, TAPE_URL } from './tape';
+import { Tape, TAPE_URL, type ToTape } from './tape';
 
 /** Once, from the page: the port that DistantSockets speak by, and a recording to play instead of a server. */
 export interface SocketStart {
@@ -10,16 +10,20 @@ export interface SocketStart {
 type ToSocket =
   | { kind: 'open'; number: number; url: string; protocol: string; originMs: number }
   | { kind: 'send'; number: number; bytes: Uint8Array }
-  | { kind: 'close'; number: number; code: number };
+  | { kind: 'close'; number: number; code: number }
+  | { kind: 'passed'; number: number };
 type FromSocket =
   | { kind: 'open'; number: number }
+  | { kind: 'mark'; number: number } // when it passes, all that came before it has been heard
   | { kind: 'message'; number: number; data: unknown; receivedNs: number }
   | { kind: 'closed'; number: number; code: number; reason: string };
 
 export function runSocket(): void {
-  self.onmessage = ({ data: { port, tape } }: MessageEvent<SocketStart>) => {
+  let tape: Tape | undefined;
+  self.onmessage = ({ data }: MessageEvent<SocketStart | ToTape>) => {
+    if (!('port' in data)) return tape?.hear(data);
+    const { port } = data;
     let socket: WebSocket | undefined;
-    let stopTape = (): void => {};
     let present = 0;
     port.onmessage = ({ data: wish }: MessageEvent<ToSocket>) => {
       const post = (message: FromSocket, transfer: Transferable[] = []): void => port.postMessage(message, transfer);
@@ -31,11 +35,10 @@ export function runSocket(): void {
           const receivedNs = Math.round((performance.now() + early) * 1e6);
           post({ kind: 'message', number, data, receivedNs }, data instanceof ArrayBuffer ? [data] : []);
         };
-        stopTape();
-        if (url === TAPE_URL && tape) {
+        if (url === TAPE_URL && data.tape) {
           post({ kind: 'open', number });
-          stopTape = playTape(tape, give);
-          return;
+          tape ??= new Tape(data.tape);
+          return tape.begin({ give, mark: () => post({ kind: 'mark', number }), tell: (place) => (self as unknown as WorkerScope).postMessage(place) });
         }
         try {
           socket = new WebSocket(url, protocol);
@@ -46,11 +49,12 @@ export function runSocket(): void {
         socket.onopen = () => post({ kind: 'open', number });
         socket.onmessage = ({ data }: MessageEvent<unknown>) => give(data);
         socket.onclose = ({ code, reason }) => post({ kind: 'closed', number, code, reason });
-      } else if (wish.number === present && wish.kind === 'close' && !socket) {
-        stopTape();
+      } else if (wish.number === present && tape) {
+        if (wish.kind === 'close') tape.end();
+        else if (wish.kind === 'passed') tape.passed();
       } else if (wish.number === present && socket) {
         if (wish.kind === 'close') socket.close(wish.code);
-        else if (socket.readyState === WebSocket.OPEN) socket.send(wish.bytes);
+        else if (wish.kind === 'send' && socket.readyState === WebSocket.OPEN) socket.send(wish.bytes);
       }
     };
   };
@@ -79,6 +83,7 @@ export class DistantSocket implements ServerSocket {
     port.onmessage = ({ data: message }: MessageEvent<FromSocket>) => {
       if (message.number !== this.number || this.isDropped) return;
       if (message.kind === 'message') return this.onmessage?.(message.data, message.receivedNs);
+      if (message.kind === 'mark') return this.post({ kind: 'passed', number: this.number });
       this.isOpen = message.kind === 'open';
       if (message.kind === 'open') this.onopen?.();
       else this.onclose?.(message.code, message.reason);

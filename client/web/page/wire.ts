@@ -277,11 +277,10 @@ export const kControl = 0x01;
 
 /** With its opcode. */
 export function encodeClientMessage(message: Partly<typeof ClientMessage>): Uint8Array {
-  const body = encodeMessage(ClientMessage, message);
-  const bytes = new Uint8Array(1 + body.length);
-  bytes[0] = kControl;
-  bytes.set(body, 1);
-  return bytes;
+  return Uint8Array.of(kControl, ...encodeMessage(ClientMessage, message));
+}
+export function encodeServerMessage(message: Partly<typeof ServerMessage>): Uint8Array {
+  return Uint8Array.of(kControl, ...encodeMessage(ServerMessage, message));
 }
 
 // ---- reading
