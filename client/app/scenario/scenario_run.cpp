@@ -1,7 +1,5 @@
 #include "client/app/scenario/scenario_run.h"
 
-#include <stdlib.h>
-
 #include <algorithm>
 #include <cmath>
 #include <thread>
@@ -31,15 +29,6 @@ constexpr milliseconds kRunPoll{5};
 constexpr milliseconds kHttpTimeout{3'000};
 constexpr double kTraceS = 0.25;
 constexpr double kLifetimeMarginS = 30.0;
-
-/// A folder that nobody else has.
-Result<std::filesystem::path> make_folder() {
-  std::error_code failure;
-  std::string path = (std::filesystem::temp_directory_path(failure) / "strandcast-test-XXXXXX").string();
-  if (failure || mkdtemp(path.data()) == nullptr)
-    return make_error(ErrorCode::Unavailable, "cannot make a folder for temporary files in {}", path);
-  return std::filesystem::path(path);
-}
 
 }  // namespace
 
@@ -91,7 +80,7 @@ Status ScenarioRun::carry_out(const ScenarioAction& action) {
 Status ScenarioRun::carry_out(const ScenarioStart& start) {
   if (options_.running) return {};  // the one that runs is used
   if (server_ != nullptr) return make_error(ErrorCode::BadInput, "a server was started already");
-  ASSIGN_OR_RETURN(folder_, make_folder());
+  ASSIGN_OR_RETURN(folder_, make_server_folder());
   ServerProcessConfig config{options_.server, {}, folder_, scenario_.limit_s + kLifetimeMarginS};
   if (!start.scene.empty()) config.arguments = {"--scene", start.scene.string()};
   for (const std::string& assignment : start.overrides)

@@ -21,6 +21,11 @@ struct ServerProcessConfig {
   double lifetime_s = 3'600.0;         // it ends by itself after so long, whatever becomes of us
 };
 
+/// Makes a folder for a server's files that nobody else has.
+Result<std::filesystem::path> make_server_folder();
+/// Returns the server program that is named, or the one beside this program. NotFound names it.
+Result<std::filesystem::path> find_server_program(const std::filesystem::path& named);
+
 class ServerProcess {
  public:
   explicit ServerProcess(ServerProcessConfig config) : config_(std::move(config)) {}
@@ -38,13 +43,14 @@ class ServerProcess {
 
   bool has_ended();
   uint16_t port() const { return port_; }
+  /// Returns what the server said last, for a person.
+  std::string last_line() const;
   std::filesystem::path token_file() const { return config_.folder / "tokens"; }
   std::filesystem::path log_file() const { return config_.folder / "server.log"; }
 
  private:
   Status spawn();
   Status wait_for_port(double timeout_s, const std::atomic<bool>& stop);
-  std::string last_line() const;
 
   const ServerProcessConfig config_;
   pid_t process_ = -1;  // -1 = none

@@ -15,16 +15,6 @@
 namespace strandcast {
 namespace {
 
-Result<std::filesystem::path> find_server(const TestOptions& options) {
-  std::error_code failure;
-  std::filesystem::path path = options.server;
-  if (path.empty())
-    path = std::filesystem::read_symlink("/proc/self/exe", failure).parent_path() / "strandcast-server";
-  if (std::filesystem::is_regular_file(path, failure)) return std::filesystem::absolute(path, failure);
-  return make_error(ErrorCode::NotFound, "there is no server program {}: name it with --server PATH",
-                    path.string());
-}
-
 /// Scenarios of the same name would write over each other.
 Status check_names(const std::vector<Scenario>& scenarios) {
   for (size_t i = 0; i < scenarios.size(); ++i)
@@ -173,7 +163,7 @@ int run_test(const CtlTarget& target, const TestOptions& options, const std::ato
                                     "one server that runs already takes one scenario at a time: no --jobs"));
     run.running = target;
   } else {
-    auto server = find_server(options);
+    auto server = find_server_program(options.server);
     if (!server) return ctl_failure(server.error());
     run.server = std::move(server).value();
   }
