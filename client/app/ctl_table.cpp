@@ -22,19 +22,7 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
   FeedOptions& feed = line.feed;
   app.add_option("--motion", feed.motion, "BVH file, builtin or none")->capture_default_str();
   app.add_option("--wind", feed.wind, "CSV file, gusts or none")->capture_default_str();
-  app.add_option("--unit", feed.motion_file.unit_m,
-                 "Metres per unit of the BVH file, 0 = guessed from the length of the bones")
-      ->check(without_nan(CLI::Range(0.0, 1e3)))
-      ->capture_default_str();
-  app.add_option("--up", feed.motion_file.up, "Up axis of the BVH file (default: guessed from the rest pose)")
-      ->check(CLI::IsMember({"y", "z"}));
-  app.add_option("--joint", feed.motion_file.joint, "Head joint of the BVH file (default: found by name)");
-  app.add_option("--body-joint", feed.motion_file.body_joints,
-                 "Joints of the BVH file to send besides neck, chest, shoulders and elbows, by their names");
-  app.add_flag("--filter-glitches", feed.motion_file.is_filtering_glitches,
-               "Take steps out of the BVH file that are faster than any head moves");
-  app.add_flag("--keep-first-frames", feed.motion_file.is_keeping_first_frames,
-               "Keep frames of the BVH file that the head jumps from, as from a T-pose before the motion");
+  declare_motion_file(app, feed.motion_file, "--");
   app.add_flag("--loop", feed.is_looped,
                "Start over at the end of the files; the head is led back to where the motion begins");
   app.add_flag(
@@ -139,6 +127,9 @@ void declare_cameras(CLI::App& app, CtlCommandLine& line) {
 
 void declare_bundled(CLI::App& app, CtlCommandLine& line) {
   declare_bundle(app, line.bundle);
+}
+void declare_baked(CLI::App& app, CtlCommandLine& line) {
+  declare_bake(app, line.bake);
 }
 void declare_exported(CLI::App& app, CtlCommandLine& line) {
   declare_export(app, line.exported);
@@ -251,6 +242,8 @@ constexpr CtlCommand kCommands[] = {
      [](const Line& line, const Stop&) { return run_save(line.target, line.scene_path); }},
     {"export", "Write the strands as curves for other programs", declare_exported,
      [](const Line& line, const Stop& stop) { return run_export(line.target, line.exported, stop); }},
+    {"bake", "Simulate hair through a clip, and write it as curves for other programs; runs its own server", declare_baked,
+     [](const Line& line, const Stop& stop) { return run_bake(line.bake, stop); }},
     {"bundle", "Make one HTML file of a recording or a scene, which browsers play without a server", declare_bundled,
      [](const Line& line, const Stop& stop) { return run_bundle(line.bundle, stop); }},
     {"check", "Decode frames with two viewers and compare their states; or look whether a recording is sound",

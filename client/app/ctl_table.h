@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "client/app/bake_command.h"
 #include "client/app/bundle_command.h"
 #include "client/app/camera_command.h"
 #include "client/app/ctl_commands.h"
@@ -29,6 +30,7 @@ struct CtlCommandLine {
   double ban_s = 0.0;
   std::string scene_path;
   ExportCommand exported;
+  BakeCommand bake;
   BundleCommand bundle;
   std::string recording;
   std::string other_recording;

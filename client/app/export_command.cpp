@@ -22,20 +22,7 @@ std::string size_text(uint64_t bytes) {
   return fmt::format("{:.1f} MB", static_cast<double>(bytes) / kBytesPerMb);
 }
 
-void print(const ExportOptions& options, const ExportReport& report) {
-  const std::string frames = report.frame_count == 1
-                                 ? fmt::format("the frame at {:.3f} s", report.first_s)
-                                 : fmt::format("{} frames at {} fps from {:.3f} s on", report.frame_count,
-                                               frame_rate_text(options.fps.hz()), report.first_s);
-  std::cout << fmt::format(
-      "{} strands x {} vertices, {}, {} in {}{}\n", report.strand_count, report.vertex_count, frames,
-      size_text(report.bytes),
-      report.file_count == 1 ? std::string() : fmt::format("{} files up to ", report.file_count),
-      report.last_path.string());
-  for (const std::string& remark : report.remarks) std::cout << "  " << remark << '\n';
-}
-
-/// Opens the recording if one is named, else a session with the server.
+/// From a recording where one is named, else from the server.
 Result<std::unique_ptr<ExportSource>> open_source(const CtlTarget& target, const ExportCommand& command,
                                                   const std::atomic<bool>& stop) {
   if (command.paths.size() > 1) {
@@ -53,12 +40,29 @@ Result<std::unique_ptr<ExportSource>> open_source(const CtlTarget& target, const
 
 }  // namespace
 
+void print_export(const ExportReport& report) {
+  const std::string frames = report.frame_count == 1
+                                 ? fmt::format("the frame at {:.3f} s", report.first_s)
+                                 : fmt::format("{} frames at {} fps from {:.3f} s on", report.frame_count,
+                                               frame_rate_text(report.fps), report.first_s);
+  std::cout << fmt::format(
+      "{} strands x {} vertices, {}, {} in {}{}\n", report.strand_count, report.vertex_count, frames,
+      size_text(report.bytes),
+      report.file_count == 1 ? std::string() : fmt::format("{} files up to ", report.file_count),
+      report.last_path.string());
+  for (const std::string& remark : report.remarks) std::cout << "  " << remark << '\n';
+}
+
 void declare_export(CLI::App& app, ExportCommand& command) {
   app.add_option("paths", command.paths,
                  "[RECORDING.mcap] OUT.usda, OUT.abc, OUT.ply or OUT.csv: what was recorded, or what the "
                  "server sends from now on; a file of the second name is replaced")
       ->required()
       ->expected(1, 2);
+  declare_export_options(app, command);
+}
+
+void declare_export_options(CLI::App& app, ExportCommand& command) {
   app.add_option("--fps", command.fps, "Frames per second, such as 24, 23.976 or 24000/1001 (default: 30)")
       ->check(CLI::Validator(
           [](std::string text) { return make_frame_rate(text, kLeastFrameRate, kMostFrameRate); }, ""));
@@ -123,7 +127,7 @@ int run_export(const CtlTarget& target, const ExportCommand& command, const std:
   if (!source) return ctl_failure(source.error());
   const auto report = export_strands(**source, *options, stop);
   if (!report) return ctl_failure(report.error());
-  print(*options, *report);
+  print_export(*report);
   return kDoneExit;
 }
 

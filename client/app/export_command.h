@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "client/app/ctl_commands.h"
-#include "client/export/export_options.h"
+#include "client/export/export_strands.h"
 
 namespace CLI {
 class App;
@@ -30,9 +30,14 @@ struct ExportCommand {
 /// Adds the options of the sub-command to `app`; `app` and `command` must exist until the command line is
 /// parsed.
 void declare_export(CLI::App& app, ExportCommand& command);
+/// Adds all of them but the paths.
+void declare_export_options(CLI::App& app, ExportCommand& command);
 
 /// Converts and checks the command line's options. BadInput says which combinations are possible.
 Result<ExportOptions> export_options(const ExportCommand& command);
+
+/// Prints what was written.
+void print_export(const ExportReport& report);
 
 int run_export(const CtlTarget& target, const ExportCommand& command, const std::atomic<bool>& stop);
 

@@ -29,6 +29,7 @@ struct ExportOptions {
   std::optional<double> to_s;  // likewise; empty: to the last state
   bool has_head = false;       // the head as a mesh, too; not for .csv
   bool is_one_frame = false;   // the one at from_s, without the rest shape (.ply)
+  bool is_whole = false;       // all frames of the range or no file: an error of the source ends it
   bool is_quiet = false;       // no progress on standard error
 };
 

@@ -47,7 +47,7 @@ class Export {
   Status run(const std::atomic<bool>& stop) {
     while (!stop && !sampler_.is_done() && !is_whole_) {
       auto state = source_.next();
-      if (!state && report_.frame_count == 0) return state.error();
+      if (!state && (report_.frame_count == 0 || options_.is_whole)) return state.error();
       if (!state) report_.remarks.push_back(fmt::format("it ends early: {}", state.error().to_string()));
       if (!state || *state == nullptr) break;
       const SceneAsset& asset = *source_.scene().asset;
@@ -58,6 +58,8 @@ class Export {
       }
       RETURN_IF_ERROR(write_frames());
     }
+    if (stop && options_.is_whole && !sampler_.is_done())
+      return make_error(ErrorCode::Unavailable, "stopped: nothing is left of it");
     sampler_.finish();
     return write_frames();
   }
@@ -67,6 +69,7 @@ class Export {
       return make_error(ErrorCode::BadInput,
                         "there is no state {:.6g} s after the first one: nothing to export", options_.from_s);
     ASSIGN_OR_RETURN(const WrittenBytes written, writer_->finish());
+    report_.fps = options_.fps.hz();
     report_.file_count = written.files;
     report_.bytes = written.bytes;
     report_.last_path = written.last_path;

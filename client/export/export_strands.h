@@ -18,7 +18,8 @@ struct ExportReport {
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
   uint64_t frame_count = 0;  // besides the rest shape
-  double first_s = 0.0;      // simulated time of the first frame
+  double fps = 0.0;
+  double first_s = 0.0;  // simulated time of the first frame
   uint64_t file_count = 0;
   uint64_t bytes = 0;
   std::filesystem::path last_path;   // of the file, or the last of them
@@ -30,7 +31,8 @@ struct ExportReport {
 Status check_export(const ExportOptions& options);
 
 /// Writes the states until the source or the range ends or `stop` is set; the file is complete up to then. An
-/// error of the source is returned only if there is no frame yet, and reported as a remark later.
+/// error of the source is returned if there is no frame yet or only a whole file is wanted, else it is a
+/// remark.
 Result<ExportReport> export_strands(ExportSource& source, const ExportOptions& options,
                                     const std::atomic<bool>& stop);
 

@@ -131,6 +131,8 @@ def shortened(words):
         words += ["--export", "played.webm", "--to", "0.1", "--size", "160x90"] if is_played else ["--headless", "--after-frames", "3"]
     if words[0] == "strandcast-ctl" and {"feed", "monitor"} & set(words) and "--seconds" not in words:
         words += ["--seconds", "1"]
+    if words[:2] == ["strandcast-ctl", "bake"]:
+        words += [*FAST, "--to", "0.2"]
     return words
 
 

@@ -26,6 +26,9 @@ inline void tell(FieldTexts& told, const std::string& where, const ExportCommand
 inline void tell(FieldTexts& told, const std::string& where, const SceneRecordingOptions& all) {
   OPTION_FIELDS(all, scene, overrides, motion, wind, seconds, server);
 }
+inline void tell(FieldTexts& told, const std::string& where, const BakeCommand& all) {
+  OPTION_FIELDS(all, exported, feed, scene, overrides, server, lead_s);
+}
 inline void tell(FieldTexts& told, const std::string& where, const BundleCommand& all) {
   OPTION_FIELDS(all, paths, seconds, scene, has_all_solvers);
 }
@@ -43,8 +46,8 @@ inline void tell(FieldTexts& told, const std::string& where, const CameraOptions
 }
 inline void tell(FieldTexts& told, const std::string& where, const CtlCommandLine& all) {
   OPTION_FIELDS(all, target, log_level, feed, monitor_s, assignment, subject, check_frames, check_timeout_s,
-                session, ban_s, scene_path, exported, bundle, recording, other_recording, recording_name,
-                step_count, test, params, latency, camera, script_words);
+                session, ban_s, scene_path, exported, bake, bundle, recording, other_recording,
+                recording_name, step_count, test, params, latency, camera, script_words);
 }
 
 }  // namespace strandcast::test
@@ -127,6 +130,29 @@ const OptionRow kCommandRows[] = {
     {"--to", {"2"}, {{"exported.to_s", "2"}}, kOut, "export"},
     {"--seconds", {"2"}, {{"exported.seconds", "2"}}, kOut, "export"},
     {"--at", {"2"}, {{"exported.at_s", "2"}}, kOut, "export"},
+    {"--motion", {"a.bvh"}, {{"bake.feed.motion", "a.bvh"}}, kOut, "bake"},
+    {"--wind", {"a.csv"}, {{"bake.feed.wind", "a.csv"}}, kOut, "bake"},
+    {"--motion-unit", {"0.5"}, {{"bake.feed.motion_file.unit_m", "0.5"}}, kOut, "bake"},
+    {"--motion-up", {"z"}, {{"bake.feed.motion_file.up", "z"}}, kOut, "bake"},
+    {"--joint", {"Skull"}, {{"bake.feed.motion_file.joint", "Skull"}}, kOut, "bake"},
+    {"--body-joint", {"Hip"}, {{"bake.feed.motion_file.body_joints", "Hip"}}, kOut, "bake"},
+    {"--filter-glitches", {}, {{"bake.feed.motion_file.is_filtering_glitches", "true"}}, kOut, "bake"},
+    {"--keep-first-frames", {}, {{"bake.feed.motion_file.is_keeping_first_frames", "true"}}, kOut, "bake"},
+    {"--lead", {"2"}, {{"bake.lead_s", "2"}}, kOut, "bake"},
+    {"--scene", {"s"}, {{"bake.scene", "s"}}, kOut, "bake"},
+    {"--set", {"a=1"}, {{"bake.overrides", "a=1"}}, kOut, "bake"},
+    {"--server", {"s"}, {{"bake.server", "s"}}, kOut, "bake"},
+    {"--fps", {"24"}, {{"bake.exported.fps", "24"}}, kOut, "bake"},
+    {"--units", {"m"}, {{"bake.exported.unit", "m"}}, kOut, "bake"},
+    {"--up", {"z"}, {{"bake.exported.up", "z"}}, kOut, "bake"},
+    {"--space", {"world"}, {{"bake.exported.space", "world"}}, kOut, "bake"},
+    {"--guides", {}, {{"bake.exported.is_guides", "true"}}, kOut, "bake"},
+    {"--drawn", {}, {{"bake.exported.is_drawn", "true"}}, kOut, "bake"},
+    {"--head", {}, {{"bake.exported.has_head", "true"}}, kOut, "bake"},
+    {"--from", {"2"}, {{"bake.exported.from_s", "2"}}, kOut, "bake"},
+    {"--to", {"2"}, {{"bake.exported.to_s", "2"}}, kOut, "bake"},
+    {"--seconds", {"2"}, {{"bake.exported.seconds", "2"}}, kOut, "bake"},
+    {"--at", {"2"}, {{"bake.exported.at_s", "2"}}, kOut, "bake"},
     {"recording", {"a.mcap"}, {{"recording", "a.mcap"}}, {}, "check"},
     {"--seconds", {"2"}, {{"bundle.seconds", "2"}}, kBundle, "bundle"},
     {"--all-solvers", {}, {{"bundle.has_all_solvers", "true"}}, kBundle, "bundle"},
@@ -154,6 +180,7 @@ const OptionRow kRequiredRows[] = {
     {"file", {"s.textproto"}, {{"scene_path", "s.textproto"}}, {}, "save"},
     {"paths", {"a.mcap", "o.usda"}, {{"exported.paths", "a.mcap o.usda"}}, {}, "export"},
     {"paths", kBundle, {{"bundle.paths", "a.mcap o.html"}}, {}, "bundle"},
+    {"paths", {"a.ply", "b.ply", "o.abc"}, {{"bake.exported.paths", "a.ply b.ply o.abc"}}, {}, "bake"},
     {"session", {"7"}, {{"session", "7"}}, {}, "kick"},
     {"recording", {"a.mcap"}, {{"recording", "a.mcap"}}, {}, "info"},
     {"recording", {"a.mcap"}, {{"recording", "a.mcap"}}, {}, "recover"},
@@ -211,6 +238,8 @@ TEST(CtlOptionTable, NumbersEndWhereTheyAreSaidTo) {
       {"--to", "-1", "0", "86400", "86401", {"export", "o.usda"}},
       {"--seconds", "-1", "0", "86400", "86401", {"export", "o.usda"}},
       {"--at", "-1", "0", "86400", "86401", {"export", "o.usda"}},
+      {"--lead", "-1", "0", "60", "61", {"bake", "o.usda"}},
+      {"--motion-unit", "-0.1", "0", "1000", "1001", {"bake", "o.usda"}},
       {"--seconds", "-1", "0", "3600", "3601", {"bundle", "a.mcap", "o.html"}},
       {"--frames", "1", "2", "1000000", "1000001", {"check"}},
       {"--timeout", "0.09", "0.1", "1000000", "1000001", {"check"}},

@@ -489,6 +489,28 @@ TEST(Export, WhatWasWrittenWhenTheSourceFailsIsWhole) {
   EXPECT_FALSE(std::filesystem::exists(options.path));
 }
 
+TEST(Export, WhoWantsAWholeFileKeepsTheOldOneUntilThen) {
+  const TemporaryFolder folder;
+  ExportOptions options;
+  options.path = folder.path() / "hair.usda";
+  options.is_quiet = true;
+  options.is_whole = true;
+  const std::string old = "of yesterday";
+  ASSERT_TRUE(save_file(options.path, std::as_bytes(std::span(old))));
+  MadeStates broken(20);
+  broken.end_ = make_error(ErrorCode::Unavailable, "the server has gone");
+  EXPECT_THAT(export_strands(broken, options, kNeverStopped).error().to_string(),
+              HasSubstr("the server has gone"));
+  MadeStates stopped(200);
+  stopped.stop_at_ = 30;
+  EXPECT_THAT(export_strands(stopped, options, stopped.stop_).error().to_string(), HasSubstr("stopped"));
+  EXPECT_EQ(*load_text(options.path, 1 << 24), old);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "no part of one";
+  MadeStates whole(20);
+  EXPECT_EQ(exported(whole, options).frame_count, 10u);
+  EXPECT_NE(*load_text(options.path, 1 << 24), old);
+}
+
 TEST(Export, WhatWasWrittenWhenItIsStoppedIsWhole) {
   const TemporaryFolder folder;
   MadeStates states(200);

@@ -34,22 +34,22 @@ constexpr size_t kMaxShownChars = 300;
 
 }  // namespace
 
-Result<std::filesystem::path> find_server_program(const std::filesystem::path& path) {
-  std::error_code failure;
-  std::filesystem::path program = path;
-  if (program.empty())
-    program = std::filesystem::read_symlink("/proc/self/exe", failure).parent_path() / "strandcast-server";
-  if (std::filesystem::is_regular_file(program, failure)) return std::filesystem::absolute(program, failure);
-  return make_error(ErrorCode::NotFound, "there is no server program {}: name it with --server PATH",
-                    program.string());
-}
-
 Result<std::filesystem::path> make_temporary_folder() {
   std::error_code failure;
-  std::string path = (std::filesystem::temp_directory_path(failure) / "strandcast-test-XXXXXX").string();
+  std::string path = (std::filesystem::temp_directory_path(failure) / "strandcast-XXXXXX").string();
   if (failure || mkdtemp(path.data()) == nullptr)
     return make_error(ErrorCode::Unavailable, "cannot make a folder for temporary files in {}", path);
   return std::filesystem::path(path);
+}
+
+Result<std::filesystem::path> find_server_program(const std::filesystem::path& named) {
+  std::error_code failure;
+  std::filesystem::path path = named;
+  if (path.empty())
+    path = std::filesystem::read_symlink("/proc/self/exe", failure).parent_path() / "strandcast-server";
+  if (std::filesystem::is_regular_file(path, failure)) return std::filesystem::absolute(path, failure);
+  return make_error(ErrorCode::NotFound, "there is no server program {}: name it with --server PATH",
+                    path.string());
 }
 
 Status ServerProcess::spawn() {
@@ -93,7 +93,6 @@ bool ServerProcess::has_ended() {
   return true;
 }
 
-/// What it said last, for a person.
 std::string ServerProcess::last_line() const {
   std::ifstream log(log_file());
   std::string last = "it said nothing";

@@ -45,13 +45,14 @@ class ServerProcess {
 
   bool has_ended();
   uint16_t port() const { return port_; }
+  /// Returns what the server said last, for a person.
+  std::string last_line() const;
   std::filesystem::path token_file() const { return config_.folder / "tokens"; }
   std::filesystem::path log_file() const { return config_.folder / "server.log"; }
 
  private:
   Status spawn();
   Status wait_for_port(double timeout_s, const std::atomic<bool>& stop);
-  std::string last_line() const;
 
   const ServerProcessConfig config_;
   pid_t process_ = -1;  // -1 = none

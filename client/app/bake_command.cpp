@@ -1,0 +1,134 @@
+#include "client/app/bake_command.h"
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <iostream>
+#include <utility>
+
+#include "client/app/baked_states.h"
+#include "client/app/drawn_states.h"
+#include "client/app/scenario/server_process.h"
+#include "client/export/export_strands.h"
+#include "common/base/command_line_error.h"
+#include "common/groom/groom_file.h"
+
+namespace strandcast {
+namespace {
+
+constexpr const char* kStillAir = "none";
+constexpr const char* kSceneWind = "scene";
+constexpr double kLongestLeadS = 60.0;
+
+/// What is fed, in motion time. Whoever names no motion holds the head still.
+Result<FeedPlan> bake_plan(const BakeCommand& command) {
+  FeedOptions options = command.feed;
+  options.blend_s = 0.0;  // the lead does that, so that frames stay at the clip's times
+  if (options.wind == kSceneWind) options.wind = "none";
+  FeedPlan plan;
+  if (options.motion != "none" || options.wind != "none") {
+    ASSIGN_OR_RETURN(plan, make_feed_plan(options));
+  }
+  if (command.feed.wind == kStillAir) plan.wind = [](double) { return glm::vec3(0.0f); };
+  if (!plan.motion) plan.motion = [](double) { return Pose(); };
+  return plan;
+}
+
+/// Where it ends: at what is asked for, else with the motion.
+Result<ExportOptions> bake_export(const BakeCommand& command, const FeedPlan& plan) {
+  ASSIGN_OR_RETURN(ExportOptions options, export_options(command.exported));
+  options.is_whole = true;
+  if (options.is_one_frame) options.to_s = options.from_s;
+  if (!options.to_s && plan.motion_s > 0.0) options.to_s = std::max(plan.motion_s, options.from_s);
+  if (!options.to_s)
+    return make_error(ErrorCode::BadInput,
+                      "this motion has no end: say --seconds, or give a clip with --motion FILE.bvh");
+  return options;
+}
+
+Result<std::unique_ptr<ExportSource>> drawn_if_wanted(std::unique_ptr<BakedStates> states, bool is_drawn) {
+  const LookDesc look = states->simulated().look;
+  if (is_drawn) return as_drawn(std::move(states), look);
+  return std::unique_ptr<ExportSource>(std::move(states));
+}
+
+Result<ExportReport> bake(const BakeCommand& command, const std::atomic<bool>& stop) {
+  ASSIGN_OR_RETURN(const FeedPlan plan, bake_plan(command));
+  ASSIGN_OR_RETURN(const ExportOptions options, bake_export(command, plan));
+  ASSIGN_OR_RETURN(const std::filesystem::path server, find_server_program(command.server));
+  ASSIGN_OR_RETURN(
+      auto states,
+      BakedStates::start({server, server_words(command), plan, command.lead_s, options.fps.hz()}, stop));
+  ASSIGN_OR_RETURN(const auto source, drawn_if_wanted(std::move(states), command.exported.is_drawn));
+  return export_strands(*source, options, stop);
+}
+
+}  // namespace
+
+void declare_motion_file(CLI::App& app, MotionFileOptions& options, const std::string& prefix) {
+  app.add_option(prefix + "unit", options.unit_m,
+                 "Metres per unit of the BVH file, 0 = guessed from the length of the bones")
+      ->check(without_nan(CLI::Range(0.0, 1e3)))
+      ->capture_default_str();
+  app.add_option(prefix + "up", options.up, "Up axis of the BVH file (default: guessed from the rest pose)")
+      ->check(CLI::IsMember({"y", "z"}));
+  app.add_option("--joint", options.joint, "Head joint of the BVH file (default: found by name)");
+  app.add_option("--body-joint", options.body_joints,
+                 "Joints of the BVH file to send besides neck, chest, shoulders and elbows, by their names");
+  app.add_flag("--filter-glitches", options.is_filtering_glitches,
+               "Take steps out of the BVH file that are faster than any head moves");
+  app.add_flag("--keep-first-frames", options.is_keeping_first_frames,
+               "Keep frames of the BVH file that the head jumps from, as from a T-pose before the motion");
+}
+
+void declare_bake(CLI::App& app, BakeCommand& command) {
+  FeedOptions& feed = command.feed;
+  feed.motion = "none";
+  feed.wind = kStillAir;
+  app.add_option("paths", command.exported.paths,
+                 "HAIR.ply [MORE.ply ..] OUT.abc: hair files as for strandcast-server --groom (without: the "
+                 "scene's hair), and the file to write: .abc, .usda, .ply or .csv; it is replaced")
+      ->required()
+      ->expected(1, static_cast<int>(kMaxGroomFiles) + 1);
+  app.add_option("--motion", feed.motion, "Motion of the head: a BVH file, builtin or none")
+      ->capture_default_str();
+  app.add_option("--wind", feed.wind, "CSV file, gusts, scene (what the scene says) or none")
+      ->capture_default_str();
+  declare_motion_file(app, feed.motion_file, "--motion-");
+  app.add_option(
+         "--lead", command.lead_s,
+         "Seconds before the first frame, in which the head gets from rest to the motion's first speed")
+      ->check(without_nan(CLI::Range(0.0, kLongestLeadS)))
+      ->capture_default_str();
+  app.add_option("--scene", command.scene, "Scene file (default: the built-in scene in full quality)");
+  app.add_option("--set", command.overrides, "path=value: override a field of the scene; repeatable")
+      ->expected(1)
+      ->take_all();
+  app.add_option("--server", command.server, "Server program (default: strandcast-server beside this one)");
+  declare_export_options(app, command.exported);
+}
+
+std::vector<std::string> server_words(const BakeCommand& command) {
+  std::vector<std::string> words = {"--lockstep"};
+  const auto set = [&](const std::string& assignment) { words.insert(words.end(), {"--set", assignment}); };
+  if (command.scene.empty())
+    set("quality=full");
+  else
+    words.insert(words.end(), {"--scene", command.scene.string()});
+  const std::vector<std::string>& paths = command.exported.paths;
+  for (size_t i = 0; i + 1 < paths.size(); ++i) words.insert(words.end(), {"--groom", paths[i]});
+  // All strands at every step, as near to what was simulated as a stream gets.
+  for (const char* const assignment : {"detail.mode=off", "detail.simulated_share=1", "stream.codec=delta",
+                                       "stream.bound_m=2e-5", "stream.strand_rate_hz=0"})
+    set(assignment);
+  for (const std::string& assignment : command.overrides) set(assignment);
+  return words;
+}
+
+int run_bake(const BakeCommand& command, const std::atomic<bool>& stop) {
+  const auto report = bake(command, stop);
+  if (!report) return ctl_failure(report.error(), stop ? kRefusedExit : kBadInputExit);
+  print_export(*report);
+  return kDoneExit;
+}
+
+}  // namespace strandcast
