@@ -58,7 +58,7 @@ int write(const std::filesystem::path& folder) {
     MadeStates states;
     ExportOptions options;
     options.path = folder / name;
-    options.fps = 24.0;
+    options.fps = {24, 1};
     options.up = ExportUp::Z;
     options.space = ExportSpace::World;
     options.is_quiet = true;
