@@ -27,7 +27,12 @@ constexpr uint32_t kMostDamagedInARow = 1'000;  // after that nothing more is re
 /// Unpacks the parts and starts the page's script. Modules and script become files of this document alone.
 constexpr std::string_view kLoader = R"html(<script>
 addEventListener('DOMContentLoaded', async () => {
-  const bytes = (id) => Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+  const bytes = (id) => {
+    const text = atob(document.getElementById(id).textContent);
+    const all = new Uint8Array(text.length);
+    for (let i = 0; i < text.length; ++i) all[i] = text.charCodeAt(i);
+    return all;
+  };
   const unzipped = async (id, type) => {
     const stream = new Blob([bytes(id)]).stream().pipeThrough(new DecompressionStream('gzip'));
     return new Blob([await new Response(stream).arrayBuffer()], { type });

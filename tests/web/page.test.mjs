@@ -368,8 +368,8 @@ check('shaders', () => {
   assert.throws(() => page.shaderText('#include "lib/none.glsl"'));
 });
 
-/** A tape of 100 frames, 10 ms apart, a keyframe at every tenth; looks before frames 0 and 55. Paused, and all is decoded at once. */
-function playedTape() {
+/** 100 frames, 10 ms apart, a keyframe at every tenth; looks before frames 0 and 55. */
+function tapeBytes() {
   const [KEYFRAME, DELTA] = [0x20, 0x21];
   const parts = [Buffer.from(Uint32Array.of(1).buffer)];
   const add = (timeMs, ...bytes) => parts.push(Buffer.from(Uint32Array.of(timeMs, bytes.length).buffer), Buffer.from(bytes));
@@ -378,7 +378,11 @@ function playedTape() {
     if (i === 0 || i === 55) add(10 * i, 1, 200 + i);
     add(10 * i, i % 10 ? DELTA : KEYFRAME, i);
   }
-  const tape = new page.Tape(Uint8Array.from(Buffer.concat(parts)).buffer);
+  return Uint8Array.from(Buffer.concat(parts)).buffer;
+}
+/** That tape, paused, and all is decoded at once. */
+function playedTape() {
+  const tape = new page.Tape(tapeBytes());
   const seen = { frames: [], looks: [], place: undefined, marks: 0, tape };
   tape.hearAndDecode = (wish) => {
     Object.assign(seen, { frames: [], looks: [] });
@@ -429,6 +433,41 @@ check('a tape hears no more frames than are decoded, and the newest wish counts'
   seen.tape.passed();
   assert.deepEqual(seen.frames.slice(first), [10, 11]);
   seen.tape.end();
+});
+/** What a tape says of its pace to who decodes a frame in so many ms, on a clock of the test's own. */
+function paceSaid(decodeMs) {
+  const { setTimeout: later, setInterval: often } = globalThis;
+  const now = performance.now;
+  let [ms, due, status, said, given, freeAt] = [0, Infinity, undefined, '', 0, Infinity];
+  let work;
+  try {
+    globalThis.setTimeout = (run, wait) => ((work = run), (due = ms + wait), 1);
+    globalThis.setInterval = (run) => ((status = run), 1);
+    performance.now = () => ms;
+    const tape = new page.Tape(tapeBytes());
+    tape.begin({
+      give: (message) => {
+        if (new Uint8Array(message)[0] !== 1) ++given;
+        else if (message.byteLength > 2) said = page.decodeServerMessage(new Uint8Array(message)).status?.slow_motion ?? said;
+      },
+      mark: () => ([freeAt, given] = [ms + given * decodeMs, 0]), tell: () => {},
+    });
+    for (let next = 500; ms < 10_000; ) {
+      ms = Math.min(due, freeAt, next);
+      if (ms === next) (next += 500), status();
+      if (ms === freeAt) (freeAt = Infinity), tape.passed();
+      if (ms === due) (due = Infinity), work();
+    }
+    return said;
+  } finally {
+    Object.assign(globalThis, { setTimeout: later, setInterval: often });
+    performance.now = now;
+  }
+}
+check('a tape is slow motion for who decodes more slowly than it plays, and says so', () => {
+  assert.equal(paceSaid(5), '');
+  const pace = Number(/simulates (0\.\d+) of real time/.exec(paceSaid(20))?.[1]);
+  assert.ok(Math.abs(pace - 0.5) < 0.05, `frames 10 ms apart, decoded in 20 ms: ${pace}`);
 });
 
 console.log(`${checks} checks of the page passed`);

@@ -3,7 +3,7 @@
 //   node tests/web/page_bundle.mjs strandcast-server [FOLDER for screenshots]
 // Ends with 77 where there is no browser; the exit status is 1 when any test fails.
 import assert from 'node:assert/strict';
-import { execFileSync } from 'node:child_process';
+import { execFileSync, spawn } from 'node:child_process';
 import fs from 'node:fs';
 import path from 'node:path';
 import { sleep } from './browser.mjs';
@@ -18,7 +18,8 @@ const [KEYFRAME, DELTA] = [0x20, 0x21];
 const HEADER_BYTES = 32;
 const WINDY = [...SMALL, '--set', 'wind.mean_mps.x=6'];
 const { browser, server } = await begin(WINDY.concat('--lockstep', '--record', path.join(work, 'run.mcap')));
-const ctl = (...words) => execFileSync(path.join(path.dirname(program), 'strandcast-ctl'), words, { encoding: 'utf8' });
+const ctlProgram = path.join(path.dirname(program), 'strandcast-ctl');
+const ctl = (...words) => execFileSync(ctlProgram, words, { encoding: 'utf8' });
 const bundle = (name, ...words) => {
   const page = path.join(work, name);
   const said = ctl('bundle', ...words, page);
@@ -91,5 +92,16 @@ await runAll({
     assert.deepEqual([state.codec, state.error, tab.errors], ['step', '', []]);
     assert.deepEqual(tab.requests.filter(({ url }) => !/^(file|blob|data):/.test(url)), [], 'nothing is asked of any server');
     await tab.close();
+  },
+  async 'Ctrl-C leaves neither a server nor its files'() {
+    const folder = fs.mkdtempSync(path.join(work, 'tmp-'));
+    const page = path.join(work, 'stopped.html');
+    const child = spawn(ctlProgram, ['bundle', page, ...SMALL, '--seconds', '600'], { env: { ...process.env, TMPDIR: folder }, stdio: 'ignore' });
+    const ended = new Promise((done) => child.once('exit', done));
+    while (!fs.readdirSync(folder, { recursive: true }).some((name) => name.endsWith('scene.mcap'))) await sleep(20);
+    await sleep(300); // steps are under way
+    child.kill('SIGINT');
+    assert.equal(await ended, 2);
+    assert.deepEqual([fs.readdirSync(folder), fs.existsSync(page)], [[], false]);
   },
 }, browser, server);

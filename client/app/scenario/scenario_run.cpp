@@ -68,7 +68,7 @@ ScenarioResult ScenarioRun::run() {
     if (status) status = carry_out(action);
     if (!status) report("to be done", "no trouble", status.error().to_string(), false);
   }
-  if (result_.failed_count() > 0) save_evidence();
+  if (result_.failed_count() > 0 && !is_stopped()) save_evidence();
   result_.seconds = elapsed_s();
   return std::move(result_);
 }

@@ -22,6 +22,7 @@ const PORTION = 16; // frames at once on a way, so that whoever wants to go else
 const LATE_MS = 200; // who decodes so much later than in real time sees slow motion
 const STEADY_PACE = 0.95;
 const PACE_SHARE = 0.25; // of the newest STATUS_MS
+const FIRST_PACE = 1.3; // the first span may be a part of one, and tells nothing yet
 
 export type ToTape =
   | { kind: 'command'; command: number } // as a server gets it; a reset goes to the begin
@@ -68,8 +69,8 @@ export class Tape {
   private isLooping = true;
   private isWaiting = false; // for what was given to be decoded
   private wanted = -1; // frame to go to after that
-  private lostMs = 0; // since the last status: of slow motion
-  private pace = 1;
+  private playedMs = 0; // since the last status
+  private pace = FIRST_PACE;
   private timer = 0;
   private statusTimer = 0;
 
@@ -88,8 +89,8 @@ export class Tape {
     this.isWaiting = false;
     for (const { bytes } of this.all.first) this.give(bytes);
     this.statusTimer = setInterval(() => {
-      this.pace += PACE_SHARE * (1 - this.lostMs / STATUS_MS - this.pace);
-      this.lostMs = 0;
+      this.pace = this.isPlaying && this.wanted < 0 ? this.pace + PACE_SHARE * (this.playedMs / STATUS_MS - this.pace) : FIRST_PACE;
+      this.playedMs = 0;
       this.tellStatus();
     }, STATUS_MS);
     this.goTo(at);
@@ -121,10 +122,8 @@ export class Tape {
   passed(): void {
     this.isWaiting = false;
     if (this.wanted >= 0) return this.goTo(this.wanted);
-    const lateMs = performance.now() - this.dueMs(this.next);
-    if (lateMs <= LATE_MS) return this.play();
-    if (this.isPlaying) this.lostMs += lateMs;
-    this.goOn();
+    if (performance.now() - this.dueMs(this.next) > LATE_MS) this.goOn();
+    else this.play();
   }
 
   private give(bytes: Uint8Array): void {
@@ -159,9 +158,11 @@ export class Tape {
       this.isPlaying = false;
       return this.tellStatus();
     }
-    let last = this.next - 1;
-    while (last + 1 < frames.length && this.dueMs(last + 1) <= performance.now()) ++last;
-    if (last >= this.next) this.giveUpTo(last);
+    const before = this.next - 1;
+    let last = before;
+    while (last + 1 < frames.length && last < before + PORTION && this.dueMs(last + 1) <= performance.now()) ++last;
+    this.playedMs += this.dueMs(last) - this.dueMs(before);
+    if (last > before) this.giveUpTo(last);
     else this.timer = setTimeout(() => this.play(), Math.max(0, this.dueMs(this.next) - performance.now()));
   }
   /** By the last keyframe before it, where that is nearer than the frame that was given last. */
