@@ -7,7 +7,7 @@ usage() {
   cat <<'TEXT'
 usage: bash deploy/run.sh [options]
 
-  --groom FILE         hair to simulate: TressFX .tfx, .hair, .ply, .usda, .abc (default: grown on the spot);
+  --groom FILE         hair to simulate: TressFX .tfx, .hair, .ply, .usd, .abc (default: grown on the spot);
                        hair in several files: the option repeated, or FILE,FILE
   --motion FILE        head motion to feed: BVH                                 (default: built in)
   --motion-unit M      metres per unit of the BVH                               (default: from the body's height)

@@ -11,13 +11,9 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/groom/groom.h"
+#include "common/groom/groom_source.h"
 
 namespace strandcast {
-
-/// Bytes that one load may read, however large the file is. Each read counts as kLeastAbcReadBytes or more.
-inline constexpr uint64_t kMaxAbcReadBytes = kMaxGroomFileBytes;
-inline constexpr uint64_t kLeastAbcReadBytes = 128;
 
 /// Entry of a group: an offset in the file; the top bit says that a block of data lies there, not a group.
 using AbcChild = uint64_t;
@@ -51,12 +47,10 @@ class AbcContainer {
   Result<std::vector<std::byte>> read(const AbcBlock& block, uint64_t limit_bytes) const;
 
  private:
-  class Source;
-  explicit AbcContainer(std::shared_ptr<Source> source) : source_(std::move(source)) {}
-  static Result<AbcContainer> begin(std::shared_ptr<Source> source);
-  Result<uint64_t> number_at(uint64_t offset) const;
+  explicit AbcContainer(std::shared_ptr<GroomSource> source) : source_(std::move(source)) {}
+  static Result<AbcContainer> begin(std::shared_ptr<GroomSource> source);
 
-  std::shared_ptr<Source> source_;
+  std::shared_ptr<GroomSource> source_;
   AbcChild root_ = 0;
 };
 

@@ -13,7 +13,7 @@
 #include "common/groom/resample.h"
 #include "common/groom/stated_groom.h"
 #include "common/groom/tfx_loader.h"
-#include "common/groom/usda_loader.h"
+#include "common/groom/usd_loader.h"
 
 namespace strandcast {
 namespace {
@@ -65,15 +65,6 @@ Error call_text(const std::filesystem::path& path, Error error) {
                                       path.extension().string(), hint));
 }
 
-/// What to do with a file of a format that nobody here reads; empty for any other.
-std::string way_out_of(const std::filesystem::path& path, const std::string& extension) {
-  const bool is_binary_usd = text_beginning(path).starts_with("PXR-USDC") || extension == ".usdc";
-  if (is_binary_usd || extension == ".usdz")
-    return "this is USD in binary or packed: make text of it ('usdcat IN -o hair.usda', or export .usda from "
-           "Blender or Houdini)";
-  return {};
-}
-
 Result<StatedGroom> unstated(const std::filesystem::path& path, Result<Groom> groom) {
   if (groom) return StatedGroom{std::move(groom).value(), {}, {}, {}, {}, {}};
   return groom.error().code == ErrorCode::NotFound ? groom.error() : call_text(path, groom.error());
@@ -87,13 +78,13 @@ Result<StatedGroom> load_by_extension(const std::filesystem::path& path, const G
   if (extension == ".hair") return unstated(path, load_hair(path));
   if (extension == ".abc") return load_abc(path);
   if (extension == ".ply") return load_ply(path, options.strand_vertex_count);
-  if (const std::string way_out = way_out_of(path, extension); !way_out.empty())
-    return at(path.string(), make_error(ErrorCode::Unsupported, "{}", way_out));
-  if (extension == ".usda" || extension == ".usd") return load_usda(path);
+  if (is_usd_extension(extension)) return load_usd(path);
   return at(
       path.string(),
-      make_error(ErrorCode::Unsupported,
-                 "unknown groom file extension '{}', known: .tfx, .hair, .ply, .usda, .abc", extension));
+      make_error(
+          ErrorCode::Unsupported,
+          "unknown groom file extension '{}', known: .tfx, .hair, .ply, .usd, .usda, .usdc, .usdz, .abc",
+          extension));
 }
 
 uint32_t target_vertex_count(const Groom& groom, uint32_t wanted) {

@@ -18,7 +18,7 @@ namespace strandcast {
 inline constexpr size_t kMaxGroomFiles = 8;  // that one head of hair comes in
 
 struct GroomFileOptions {
-  std::filesystem::path path;                     // .tfx, .hair, .ply, .usda or .abc
+  std::filesystem::path path;                     // .tfx, .hair, .ply, .usd (any form) or .abc
   std::vector<std::filesystem::path> more_paths;  // further parts of the same hair: the same unit and axes
   float unit_m = 0.0f;  // metres per file unit; 0 = as the file says, else guessed from the size of the head
   std::optional<bool> is_z_up = false;  // as GroomPlacement; empty = as the file says, else guessed

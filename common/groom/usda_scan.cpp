@@ -125,7 +125,7 @@ Result<std::vector<double>> UsdaScan::numbers(size_t limit) {
   do {
     const char c = peek();
     if (c == '(' || c == '[') {
-      if (open.size() == kMaxUsdaDepth) return error(ErrorCode::LimitExceeded, "too many brackets");
+      if (open.size() == kMaxUsdDepth) return error(ErrorCode::LimitExceeded, "too many brackets");
       take(c);
       open += closing_of(c);
     } else if (!open.empty() && take(open.back())) {
@@ -214,7 +214,7 @@ Status UsdaScan::skip_rest(char closing) {
       open.pop_back();
       ++at_;
     } else if (c == '(' || c == '[' || c == '{') {
-      if (open.size() == kMaxUsdaDepth) return error(ErrorCode::LimitExceeded, "too many brackets");
+      if (open.size() == kMaxUsdDepth) return error(ErrorCode::LimitExceeded, "too many brackets");
       open += closing_of(c);
       ++at_;
     } else if (c == '"' || c == '\'') {

@@ -10,11 +10,9 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/result.h"
+#include "common/groom/usd_stage.h"
 
 namespace strandcast {
-
-inline constexpr size_t kMaxUsdaDepth = 64;  // of brackets, and of prims in each other
 
 class UsdaScan {
  public:

@@ -1,4 +1,4 @@
-#include "common/groom/usda_stage.h"
+#include "common/groom/usd_stage.h"
 
 #include <algorithm>
 
@@ -15,7 +15,7 @@ class StageReader {
  public:
   explicit StageReader(std::string_view text) : scan_(text) {}
 
-  Result<UsdaStage> read() {
+  Result<UsdStage> read() {
     if (scan_.take('(')) RETURN_IF_ERROR(read_layer_metadata());
     while (!scan_.is_at_end()) {
       const std::string_view word = scan_.word();
@@ -61,29 +61,27 @@ class StageReader {
     return {};
   }
 
+  /// An error names the current line.
+  Status here(const Status& status) const {
+    return status ? status : Status(scan_.error(status.error().code, "{}", status.error().message));
+  }
+
   Status read_layer_metadata() {
     return read_metadata([this](std::string_view key) -> Status {
       if (key == "upAxis") {
         ASSIGN_OR_RETURN(const std::string_view axis, scan_.string());
-        if (axis != "Y" && axis != "Z")
-          return scan_.error(ErrorCode::BadInput, "upAxis is {}, known are Y and Z", quoted(axis));
-        stage_.is_z_up = axis == "Z";
-        return {};
+        return here(set_up_axis(stage_, axis));
       }
       if (key == "metersPerUnit") {
         ASSIGN_OR_RETURN(const double value, scan_.number());
-        constexpr double kMostM = 1e3;
-        if (!(value > 0.0 && value <= kMostM))
-          return scan_.error(ErrorCode::BadInput, "metersPerUnit is {}, allowed is up to {}", value, kMostM);
-        stage_.meters_per_unit = value;
-        return {};
+        return here(set_meters_per_unit(stage_, value));
       }
       if (key == "subLayers") ++stage_.reference_count;
       return scan_.skip_value();
     });
   }
 
-  Status read_prim_metadata(UsdaPrim& prim) {
+  Status read_prim_metadata(UsdPrim& prim) {
     return read_metadata([&](std::string_view key) -> Status {
       if (key == "active") {
         const std::string_view value = scan_.word();
@@ -101,18 +99,18 @@ class StageReader {
     if (!begins_prim(specifier))
       return scan_.error(ErrorCode::BadInput, "{} found where a prim is needed",
                          specifier.empty() ? scan_.found() : quoted(specifier));
-    if (depth == kMaxUsdaDepth)
-      return scan_.error(ErrorCode::LimitExceeded, "prims in each other, more than {}", kMaxUsdaDepth);
-    if (stage_.prim.size() == kMaxUsdaPrims)
-      return scan_.error(ErrorCode::LimitExceeded, "more than {} prims", kMaxUsdaPrims);
+    if (depth == kMaxUsdDepth)
+      return scan_.error(ErrorCode::LimitExceeded, "prims in each other, more than {}", kMaxUsdDepth);
+    if (stage_.prim.size() == kMaxUsdPrims)
+      return scan_.error(ErrorCode::LimitExceeded, "more than {} prims", kMaxUsdPrims);
     const std::string_view type = scan_.word();
-    UsdaPrim prim;
+    UsdPrim prim;
     ASSIGN_OR_RETURN(const std::string_view name, scan_.string());
     prim.parent = parent;
-    prim.name = one_line(name, 80);
+    prim.name = one_line(name, kMaxUsdNameChars);
     prim.is_left_out = specifier != "def";
     if (scan_.take('(')) RETURN_IF_ERROR(read_prim_metadata(prim));
-    if (type == "NurbsCurves" || type == "HermiteCurves") ++stage_.other_curve_count;
+    if (is_other_curves(type)) ++stage_.other_curve_count;
     if (type == "BasisCurves") prim.curves.emplace();
     const size_t index = stage_.prim.size();
     stage_.prim.push_back(std::move(prim));
@@ -164,14 +162,14 @@ class StageReader {
 
   /// The value of a property, of its first time sample where `time` is set: what has no time goes before.
   Status take_value(std::string_view name, size_t index, std::optional<double> time) {
-    UsdaPrim& prim = stage_.prim[index];
+    UsdPrim& prim = stage_.prim[index];
     if (name == "visibility") {
       ASSIGN_OR_RETURN(const std::string_view value, scan_.string());
       if (value == "invisible") prim.is_left_out = true;
       return {};
     }
     if (name == "xformOpOrder") {
-      ASSIGN_OR_RETURN(const auto order, scan_.strings(kMaxUsdaXformOps));
+      ASSIGN_OR_RETURN(const auto order, scan_.strings(kMaxUsdXformOps));
       prim.op_order.assign(order.begin(), order.end());
       return {};
     }
@@ -179,21 +177,12 @@ class StageReader {
     return prim.curves ? take_curves(name, *prim.curves, time) : scan_.skip_value();
   }
 
-  Status take_op(std::string_view name, UsdaPrim& prim, bool is_sample) {
+  Status take_op(std::string_view name, UsdPrim& prim, bool is_sample) {
     ASSIGN_OR_RETURN(std::vector<double> value, scan_.numbers(kMatrixNumbers));
-    const auto known =
-        std::find_if(prim.op.begin(), prim.op.end(), [&](const UsdaXformOp& op) { return op.name == name; });
-    if (known != prim.op.end()) {
-      if (!is_sample) known->value = std::move(value);
-      return {};
-    }
-    if (prim.op.size() == kMaxUsdaXformOps)
-      return scan_.error(ErrorCode::LimitExceeded, "more than {} transforms of one prim", kMaxUsdaXformOps);
-    prim.op.push_back({std::string(name), std::move(value)});
-    return {};
+    return here(set_xform_op(prim, name, std::move(value), is_sample));
   }
 
-  Status take_curves(std::string_view name, UsdaCurves& curves, std::optional<double> time) {
+  Status take_curves(std::string_view name, UsdCurves& curves, std::optional<double> time) {
     if (name == "points") {
       if (time && !curves.points.empty()) return scan_.skip_value();
       ASSIGN_OR_RETURN(curves.points, scan_.points(kMaxGroomVertices));
@@ -210,32 +199,23 @@ class StageReader {
       ASSIGN_OR_RETURN(curves.widths, scan_.floats(kMaxGroomVertices));
       return {};
     }
-    std::string* const token = name == "type"    ? &curves.type
-                               : name == "basis" ? &curves.basis
-                               : name == "wrap"  ? &curves.wrap
-                                                 : nullptr;
-    if (token == nullptr) return scan_.skip_value();
+    std::string* const word = find_curves_word(curves, name);
+    if (word == nullptr) return scan_.skip_value();
     ASSIGN_OR_RETURN(const std::string_view value, scan_.string());
-    *token = one_line(value, 40);
+    *word = one_line(value, kMaxUsdWordChars);
     return {};
   }
 
   UsdaScan scan_;
-  UsdaStage stage_;
+  UsdStage stage_;
 };
 
 }  // namespace
 
-Result<UsdaStage> read_usda_stage(std::string_view text) {
+Result<UsdStage> read_usda_stage(std::string_view text) {
   if (!text.starts_with("#usda 1."))
     return make_error(ErrorCode::BadInput, "does not begin with '#usda 1.0': not a USD text file");
   return StageReader(text).read();
-}
-
-bool is_left_out(const UsdaStage& stage, size_t prim) {
-  for (std::optional<size_t> i = prim; i; i = stage.prim[*i].parent)
-    if (stage.prim[*i].is_left_out) return true;
-  return false;
 }
 
 }  // namespace strandcast

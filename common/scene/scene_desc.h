@@ -39,7 +39,7 @@ struct ProceduralGroomDesc {
 };
 
 struct FileGroomDesc {
-  std::filesystem::path path;  // .tfx, .hair, .ply, .usda or .abc
+  std::filesystem::path path;  // .tfx, .hair, .ply, .usd or .abc
   std::vector<std::filesystem::path>
       more_paths;       // further parts of the same hair, at most kMaxGroomFiles - 1
   float unit_m = 0.0f;  // metres per file unit; 0 = as the file says, else guessed from the size of the head

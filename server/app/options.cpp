@@ -107,7 +107,7 @@ void add_scene_options(CLI::App& app, ServerOptions& options, NamedFiles& named)
       ->expected(1)
       ->take_all();
   app.add_option("--groom", named.grooms,
-                 "hair from this .tfx, .hair, .ply, .usda or .abc file; hair in several files: FILE,FILE or "
+                 "hair from this .tfx, .hair, .ply, .usd or .abc file; hair in several files: FILE,FILE or "
                  "the option repeated")
       ->expected(1)
       ->take_all();

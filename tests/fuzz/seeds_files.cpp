@@ -4,6 +4,7 @@
 #include "common/scene/scene_file.h"
 #include "tests/fuzz/seed_folder.h"
 #include "tests/support/made_abc.h"
+#include "tests/support/made_usdc.h"
 #include "tests/support/proxy_header.h"
 #include "tests/support/sample_asset.h"
 #include "tests/support/sample_recording.h"
@@ -142,6 +143,48 @@ void add_alembic(const SeedFolder& seeds) {
   }
 }
 
+/// Curves in a transform, as a version of the format has its numbers.
+std::string made_usdc(uint8_t minor, bool is_packed) {
+  using test::MadeUsdc;
+  using test::raw_bytes;
+  MadeUsdc file(minor);
+  std::vector<glm::vec3> points;
+  std::vector<int32_t> table_index;
+  for (int i = 0; i < 36; ++i) points.emplace_back(i / 2, i % 2, i % 2);
+  for (int i = 0; i < 36; ++i) table_index.push_back(i % 2);
+  const std::string table = "t" + raw_bytes(std::vector<uint32_t>{2}) +
+                            raw_bytes(std::vector<float>{0.1f, 0.2f}) + MadeUsdc::packed_ints(table_index);
+  const uint64_t still = file.array(24, points.size(), raw_bytes(points));
+  std::vector<test::MadeSpec> items = {
+      MadeUsdc::attribute("type", file.token("linear")),
+      MadeUsdc::attribute("curveVertexCounts", file.ints(std::vector<int32_t>(18, 2))),
+      is_packed ? MadeUsdc::moving("points", file.samples({1.5, 2.0}, {still, MadeUsdc::rep(51, 0)}))
+                : MadeUsdc::attribute("points", still),
+      MadeUsdc::attribute("widths", is_packed ? file.array(8, points.size(), table, MadeUsdc::kPacked)
+                                              : file.array(8, 1, raw_bytes(std::vector<float>{0.1f})))};
+  std::vector<test::MadeSpec> xform = {
+      MadeUsdc::attribute("xformOp:scale", MadeUsdc::inlined(24, 0x01'02'fe)),
+      MadeUsdc::attribute("xformOp:orient", file.scalar(17, raw_bytes(std::vector<float>{0, 0, 1, 0.5f}))),
+      MadeUsdc::attribute("xformOpOrder", file.tokens({"xformOp:scale", "xformOp:orient"})),
+      file.prim("Hair", "BasisCurves", std::move(items))};
+  return file.finish({file.prim("Head", "Xform", std::move(xform)), file.prim("n", "NurbsCurves", {})},
+                     {{"upAxis", file.token("Z")}, {"metersPerUnit", MadeUsdc::inlined(9, 0x3f000000)}});
+}
+
+void add_usdc(const SeedFolder& seeds) {
+  seeds.add("usdc", "version_4", made_usdc(4, false));
+  seeds.add("usdc", "version_6", made_usdc(6, true));
+  seeds.add("usdc", "version_8", made_usdc(8, true));
+  const std::string name = "a.usd",
+                    layer =
+                        "#usda 1.0\ndef BasisCurves \"b\" { uniform token type = \"linear\" "
+                        "int[] curveVertexCounts = [2] point3f[] points = [(0,0,0), (0,0,1)] }";
+  const auto size = static_cast<uint32_t>(layer.size());
+  seeds.add("usdc", "package",
+            joined({bytes_of("PK\3\4"), Bytes(14), packed(size, size, static_cast<uint32_t>(name.size())),
+                    bytes_of(name + layer)}));
+}
+
 void add_texts(const SeedFolder& seeds) {
   const std::string bvh =
       "HIERARCHY\nROOT Hips\n{\n OFFSET 9 9 9\n CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation "
@@ -203,6 +246,7 @@ void add_file_seeds(const SeedFolder& seeds) {
   add_grooms(seeds);
   add_curves(seeds);
   add_alembic(seeds);
+  add_usdc(seeds);
   add_texts(seeds);
   add_recordings(seeds);
 }

@@ -1,5 +1,5 @@
 // libFuzzer entry: strands in USD text.
-#include "common/groom/usda_loader.h"
+#include "common/groom/usd_loader.h"
 
 #include "tests/fuzz/fuzz_input.h"
 #include "tests/fuzz/groom_checks.h"
@@ -7,7 +7,7 @@
 namespace strandcast::usda_fuzz {
 
 extern "C" int FUZZ_ENTRY(usda)(const uint8_t* data, size_t size) {
-  const auto stated = read_usda(FuzzInput(data, size).take_rest_as_text());
+  const auto stated = read_usd(FuzzInput(data, size).take_rest_as_text());
   if (!stated) return 0;
   CHECK(!stated->unit_m || *stated->unit_m > 0.0f);
   check_loaded_groom(stated->groom);

@@ -12,7 +12,7 @@
 #include "common/groom/groom_asset.h"
 #include "common/groom/ply_loader.h"
 #include "common/groom/procedural.h"
-#include "common/groom/usda_loader.h"
+#include "common/groom/usd_loader.h"
 #include "common/render/drawn_strands.h"
 #include "common/render/tiles/tile_renderer.h"
 #include "tests/support/temporary_folder.h"
@@ -103,7 +103,7 @@ TEST_F(DrawnExport, HasTheStrandsOfAPictureInEveryFormat) {
   ASSERT_GT(expected_.strand_count(), asset_->strand_count);
   for (const bool has_head : {false, true}) {
     options_.has_head = has_head;
-    expect_strands(load_usda(written("hair.usda"))->groom, 2e-6);
+    expect_strands(load_usd(written("hair.usda"))->groom, 2e-6);
     EXPECT_EQ(report_.strand_count, expected_.strand_count());
     expect_strands(load_abc(written("hair.abc"))->groom, 1e-6);
     options_.is_one_frame = true;

@@ -464,7 +464,7 @@ TEST_F(AbcTest, AllReadsTogetherHaveALimit) {
   const AbcBlock block{16, bytes.size() - 16};
   uint64_t count = 0;
   while (container->read(block, kBlockBytes)) ++count;
-  EXPECT_EQ(count, kMaxAbcReadBytes / block.size_bytes);
+  EXPECT_EQ(count, kMaxGroomReadBytes / block.size_bytes);
   EXPECT_THAT(container->read(block, kBlockBytes).error().to_string(),
               HasSubstr("more than 536870912 bytes"));
 }

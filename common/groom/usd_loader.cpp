@@ -1,15 +1,17 @@
-#include "common/groom/usda_loader.h"
+#include "common/groom/usd_loader.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/file.h"
 #include "common/groom/curve_basis.h"
 #include "common/groom/text_scan.h"
-#include "common/groom/usda_stage.h"
+#include "common/groom/usd_stage.h"
+#include "common/groom/usdc_coding.h"
 
 namespace strandcast {
 namespace {
+
+constexpr std::string_view kZipMagic = "PK\x03\x04";
 
 /// What notes say of all curves together.
 struct Tally {
@@ -27,7 +29,7 @@ struct CurveKind {
   CurveEnds ends = CurveEnds::Open;
 };
 
-Result<CurveKind> kind_of(const UsdaCurves& curves) {
+Result<CurveKind> kind_of(const UsdCurves& curves) {
   CurveKind kind;
   if (curves.wrap == "periodic")
     return make_error(ErrorCode::BadInput, "wrap is 'periodic': closed curves are no strands");
@@ -51,7 +53,7 @@ Result<CurveKind> kind_of(const UsdaCurves& curves) {
   return kind;
 }
 
-Status check_counts(const UsdaCurves& curves) {
+Status check_counts(const UsdCurves& curves) {
   uint64_t total = 0;
   for (size_t curve = 0; curve < curves.vertex_counts.size(); ++curve) {
     const uint32_t count = curves.vertex_counts[curve];
@@ -66,8 +68,8 @@ Status check_counts(const UsdaCurves& curves) {
   return {};
 }
 
-Status add_curves(const UsdaStage& stage, size_t prim, Groom& groom, Tally& tally) {
-  const UsdaCurves& curves = *stage.prim[prim].curves;
+Status add_curves(const UsdStage& stage, size_t prim, Groom& groom, Tally& tally) {
+  const UsdCurves& curves = *stage.prim[prim].curves;
   RETURN_IF_ERROR(check_counts(curves));
   if (groom.strand_count() + curves.vertex_counts.size() > kMaxStrandCount ||
       groom.rest_position_m.size() + curves.points.size() > kMaxGroomVertices)
@@ -105,7 +107,7 @@ Status add_curves(const UsdaStage& stage, size_t prim, Groom& groom, Tally& tall
   return {};
 }
 
-std::string where_else(const UsdaStage& stage) {
+std::string where_else(const UsdStage& stage) {
   if (stage.reference_count > 0)
     return "; it refers to other files, prims or variants, which are not followed: flatten it first "
            "(usdcat --flatten)";
@@ -113,7 +115,7 @@ std::string where_else(const UsdaStage& stage) {
   return "";
 }
 
-std::vector<std::string> notes_of(const UsdaStage& stage, const Tally& tally) {
+std::vector<std::string> notes_of(const UsdStage& stage, const Tally& tally) {
   std::vector<std::string> notes;
   if (tally.curves_prims > 1) notes.push_back(fmt::format("strands of {} BasisCurves", tally.curves_prims));
   if (tally.time_code)
@@ -139,10 +141,72 @@ std::vector<std::string> notes_of(const UsdaStage& stage, const Tally& tally) {
   return notes;
 }
 
-}  // namespace
+/// What begins a member of a package: the parts of ZIP's local file header that are needed.
+struct Member {
+  static constexpr uint64_t kHeaderBytes = 30;
+  std::string name;
+  uint64_t begin = 0, size_bytes = 0;  // of what it holds
+};
 
-Result<StatedGroom> read_usda(std::string_view text) {
-  ASSIGN_OR_RETURN(const UsdaStage stage, read_usda_stage(text));
+Result<Member> read_member(GroomSource& source, uint64_t offset) {
+  constexpr uint64_t kFlagsAt = 6, kMethodAt = 8, kSizeAt = 18, kNameSizeAt = 26, kExtraSizeAt = 28;
+  constexpr uint16_t kUnknownFlags = 1u | 1u << 3;  // encrypted, or sizes come later
+  ASSIGN_OR_RETURN(const auto magic, source.array<char>(offset, kZipMagic.size()));
+  if (std::string_view(magic.data(), magic.size()) != kZipMagic)
+    return make_error(ErrorCode::BadInput, "the package holds no .usd, .usda or .usdc");
+  ASSIGN_OR_RETURN(const auto flags, source.number<uint16_t>(offset + kFlagsAt));
+  ASSIGN_OR_RETURN(const auto method, source.number<uint16_t>(offset + kMethodAt));
+  ASSIGN_OR_RETURN(const auto size_bytes, source.number<uint32_t>(offset + kSizeAt));
+  ASSIGN_OR_RETURN(const auto name_size, source.number<uint16_t>(offset + kNameSizeAt));
+  ASSIGN_OR_RETURN(const auto extra_size, source.number<uint16_t>(offset + kExtraSizeAt));
+  ASSIGN_OR_RETURN(const auto name, source.array<char>(offset + Member::kHeaderBytes, name_size));
+  Member member{
+      {name.begin(), name.end()}, offset + Member::kHeaderBytes + name_size + extra_size, size_bytes};
+  if (method != 0 || (flags & kUnknownFlags) != 0)
+    return make_error(ErrorCode::Unsupported,
+                      "{} in the package is not stored as it is: pack it anew as .usdz",
+                      strandcast::quoted(member.name));
+  if (!source.has(member.begin, member.size_bytes, 1))
+    return make_error(ErrorCode::BadInput, "{} in the package is cut off: it should have {} bytes",
+                      strandcast::quoted(member.name), member.size_bytes);
+  return member;
+}
+
+/// Leaves of a package its first layer.
+Status open_package(GroomSource& source) {
+  constexpr int kMostMembers = 1'000;
+  uint64_t offset = 0;
+  for (int i = 0; i < kMostMembers; ++i) {
+    ASSIGN_OR_RETURN(const Member member, read_member(source, offset));
+    if (is_usd_extension(std::filesystem::path(member.name).extension().string())) {
+      source.narrow(member.begin, member.size_bytes);
+      return {};
+    }
+    offset = member.begin + member.size_bytes;
+  }
+  return make_error(ErrorCode::LimitExceeded, "no .usd, .usda or .usdc is among the first {} of the package",
+                    kMostMembers);
+}
+
+Result<std::string> beginning_of(GroomSource& source) {
+  constexpr uint64_t kLookedAtBytes = 8;
+  ASSIGN_OR_RETURN(const auto bytes, source.array<char>(0, std::min(kLookedAtBytes, source.size_bytes())));
+  return std::string(bytes.begin(), bytes.end());
+}
+
+Result<UsdStage> read_stage(const std::shared_ptr<GroomSource>& source) {
+  ASSIGN_OR_RETURN(std::string beginning, beginning_of(*source));
+  if (beginning.starts_with(kZipMagic)) {
+    RETURN_IF_ERROR(open_package(*source));
+    ASSIGN_OR_RETURN(beginning, beginning_of(*source));
+  }
+  if (beginning == kUsdcMagic) return read_usdc_stage(source);
+  ASSIGN_OR_RETURN(const auto text, source->array<char>(0, source->size_bytes()));
+  return read_usda_stage({text.data(), text.size()});
+}
+
+Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source) {
+  ASSIGN_OR_RETURN(const UsdStage stage, read_stage(source));
   StatedGroom stated;
   stated.groom.offset.push_back(0);
   Tally tally;
@@ -166,9 +230,20 @@ Result<StatedGroom> read_usda(std::string_view text) {
   return stated;
 }
 
-Result<StatedGroom> load_usda(const std::filesystem::path& path) {
-  ASSIGN_OR_RETURN(const std::string text, load_text(path, kMaxGroomFileBytes));
-  auto stated = read_usda(text);
+}  // namespace
+
+bool is_usd_extension(std::string_view extension) {
+  return extension == ".usd" || extension == ".usda" || extension == ".usdc" || extension == ".usdz";
+}
+
+Result<StatedGroom> read_usd(std::string_view file) {
+  return read(std::make_shared<GroomSource>(std::as_bytes(std::span(file))));
+}
+
+Result<StatedGroom> load_usd(const std::filesystem::path& path) {
+  auto source = GroomSource::open(path);
+  if (!source) return at(path.string(), source.error());
+  auto stated = read(*source);
   if (!stated) return at(path.string(), stated.error());
   stated->groom.name = path.stem().string();
   return stated;

@@ -5,7 +5,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "common/groom/text_scan.h"
-#include "common/groom/usda_stage.h"
+#include "common/groom/usd_stage.h"
 
 namespace strandcast {
 namespace {
@@ -34,7 +34,7 @@ Result<glm::dmat4> rotation(std::string_view axes, const std::vector<double>& an
   return turn;
 }
 
-Result<glm::dmat4> matrix_of(std::string_view type, const UsdaXformOp& op) {
+Result<glm::dmat4> matrix_of(std::string_view type, const UsdXformOp& op) {
   const std::vector<double>& value = op.value;
   if (type == "translate" && value.size() == 3)
     return glm::translate(glm::dmat4(1.0), glm::dvec3(value[0], value[1], value[2]));
@@ -61,7 +61,7 @@ struct Local {
   bool is_reset = false;  // what is above does not count
 };
 
-Result<Local> local_of(const UsdaPrim& prim) {
+Result<Local> local_of(const UsdPrim& prim) {
   Local local;
   for (const std::string& step : prim.op_order) {
     std::string_view name = step;
@@ -72,7 +72,7 @@ Result<Local> local_of(const UsdaPrim& prim) {
     const bool is_inverse = name.starts_with(kInverse);
     if (is_inverse) name.remove_prefix(kInverse.size());
     const auto op = std::find_if(prim.op.begin(), prim.op.end(),
-                                 [&](const UsdaXformOp& known) { return known.name == name; });
+                                 [&](const UsdXformOp& known) { return known.name == name; });
     if (op == prim.op.end() || !name.starts_with(kPrefix))
       return make_error(ErrorCode::BadInput, "prim {} names the transform {}, which it does not have",
                         strandcast::quoted(prim.name), strandcast::quoted(step));
@@ -87,7 +87,7 @@ Result<Local> local_of(const UsdaPrim& prim) {
 
 }  // namespace
 
-Result<glm::dmat4> world_from_prim(const UsdaStage& stage, size_t prim) {
+Result<glm::dmat4> world_from_prim(const UsdStage& stage, size_t prim) {
   glm::dmat4 world(1.0);
   for (std::optional<size_t> i = prim; i; i = stage.prim[*i].parent) {
     ASSIGN_OR_RETURN(const Local local, local_of(stage.prim[*i]));

@@ -1,0 +1,54 @@
+#include "common/groom/usd_stage.h"
+
+#include <algorithm>
+
+#include "common/groom/text_scan.h"
+
+namespace strandcast {
+
+Status set_up_axis(UsdStage& stage, std::string_view axis) {
+  if (axis != "Y" && axis != "Z")
+    return make_error(ErrorCode::BadInput, "upAxis is {}, known are Y and Z", quoted(axis));
+  stage.is_z_up = axis == "Z";
+  return {};
+}
+
+Status set_meters_per_unit(UsdStage& stage, double value) {
+  constexpr double kMostM = 1e3;
+  if (!(value > 0.0 && value <= kMostM))
+    return make_error(ErrorCode::BadInput, "metersPerUnit is {}, allowed is up to {}", value, kMostM);
+  stage.meters_per_unit = value;
+  return {};
+}
+
+std::string* find_curves_word(UsdCurves& curves, std::string_view property) {
+  return property == "type"    ? &curves.type
+         : property == "basis" ? &curves.basis
+         : property == "wrap"  ? &curves.wrap
+                               : nullptr;
+}
+
+Status set_xform_op(UsdPrim& prim, std::string_view name, std::vector<double> value, bool is_sample) {
+  const auto known =
+      std::find_if(prim.op.begin(), prim.op.end(), [&](const UsdXformOp& op) { return op.name == name; });
+  if (known != prim.op.end()) {
+    if (!is_sample) known->value = std::move(value);
+    return {};
+  }
+  if (prim.op.size() == kMaxUsdXformOps)
+    return make_error(ErrorCode::LimitExceeded, "more than {} transforms of one prim", kMaxUsdXformOps);
+  prim.op.push_back({std::string(name), std::move(value)});
+  return {};
+}
+
+bool is_other_curves(std::string_view type) {
+  return type == "NurbsCurves" || type == "HermiteCurves";
+}
+
+bool is_left_out(const UsdStage& stage, size_t prim) {
+  for (std::optional<size_t> i = prim; i; i = stage.prim[*i].parent)
+    if (stage.prim[*i].is_left_out) return true;
+  return false;
+}
+
+}  // namespace strandcast
