@@ -34,7 +34,7 @@ class AbcContainer::Source {
   }
   uint64_t size_bytes() const { return size_bytes_; }
 
-  /// Checks that so many bytes are there and may still be read, and counts them.
+  /// Checks that `size_bytes` are there and may still be read, and counts them.
   Status claim(uint64_t offset, uint64_t size_bytes) {
     const uint64_t cost = std::max(size_bytes, kLeastAbcReadBytes);
     if (!has(offset, size_bytes, 1))

@@ -13,7 +13,7 @@ namespace strandcast {
 namespace {
 
 constexpr int kPictureQuality = 85;
-/// What is deeper than so in the mesh, where hair has settled, is seen.
+/// Depth in the mesh beyond which a person sees that settled hair is inside.
 constexpr double kSeenM = 0.0005;
 
 std::string mm(double metres) {
