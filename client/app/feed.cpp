@@ -74,7 +74,7 @@ void count(bool is_sent, uint64_t& counter, FeedProgress& progress) {
   ++(is_sent ? counter : progress.unsent_samples);
 }
 
-/// To a server, as a source of its own for each head.
+/// Sends to a server, as a source of its own for each head.
 class SessionWay {
  public:
   explicit SessionWay(std::span<const std::unique_ptr<SteadyClient>> heads)

@@ -71,7 +71,7 @@ Status await_session(LiveConnection& live, const TimeLimit& limit, const std::at
 
 class Collector {
  public:
-  /// `others`: of the further heads.
+  /// `others` are the connections of the further heads.
   Collector(const ViewOptions& options, LiveConnection& live, Connections& others, FrameTrace& trace,
             const TimeLimit& limit, const std::atomic<bool>& stop)
       : options_(options),
@@ -146,7 +146,7 @@ class Collector {
     return {};
   }
 
-  /// The server's pictures are taken from where this viewer says, once it has said so.
+  /// Tells the server where this viewer looks from, and so its pictures, when that changes.
   void follow_camera() {
     const CameraDesc& camera = session().camera();
     if (camera == camera_ || !session().client().send(CameraChange{camera})) return;

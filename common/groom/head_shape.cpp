@@ -20,7 +20,7 @@ constexpr double kNearestRoot = 0.7, kFurthestRoot = 1.35;
 /// How uncertain things are before any root is looked at, for the least squares of the ellipsoid.
 constexpr double kRootNoiseM = 0.004, kCenterNoiseM = 0.02, kStretchNoise = 0.08;
 constexpr int kStretchRounds = 8;
-/// Of the roots in one direction, so many may lie below the skin.
+/// Share of the roots in one direction that may lie below the skin.
 constexpr double kRootQuantile = 0.3;
 /// Angles over which skin follows roots, first far around, then near; what the built-in shape weighs against
 /// roots that fill that angle.

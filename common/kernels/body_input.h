@@ -16,9 +16,9 @@ inline constexpr size_t kMaxBodyPlanes = 4;
 /// What strands do about it.
 enum class BodyResponse : uint32_t {
   Turn,     // segments turn about their start, at their length, onto the plane that touches the body
-  Sphere,   // likewise, but onto the sphere under them: 003 figure 4.1 in closed form
+  Sphere,   // likewise, but onto the sphere under them: Woodhouse, figure 4.1 in closed form
   Project,  // vertices move out the shortest way, whatever their segments' lengths
-  Force     // velocities gain with depth, as 002 3.3 has it
+  Force     // velocities gain with depth, as Sams has it, 3.3
 };
 /// Names of the responses in scenes, in the order of their numbers.
 inline constexpr std::array kBodyResponses = {"turn", "sphere", "project", "force"};

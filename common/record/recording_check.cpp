@@ -38,7 +38,7 @@ Result<uint32_t> crc_of(ByteSource& source, uint64_t end) {
   return crc;
 }
 
-/// The file's records, and the index against them.
+/// Checks the file's records, and its index against them.
 Status check_file(ByteSource& source, RecordingCheck& check) {
   ASSIGN_OR_RETURN(const ChunkList walked, walk_chunks(source));
   ASSIGN_OR_RETURN(const ChunkList listed, list_chunks(source));

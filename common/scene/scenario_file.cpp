@@ -172,7 +172,7 @@ class Part {
   Findings& findings_;
 };
 
-/// Paths of the file.
+/// Reads a scenario; its paths start from `folder`.
 class ScenarioReader {
  public:
   explicit ScenarioReader(std::filesystem::path folder) : folder_(std::move(folder)) {}

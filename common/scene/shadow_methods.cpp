@@ -25,7 +25,8 @@ constexpr std::array<MethodRow, 5> kTransparencies{{
 constexpr std::array<MethodRow, 3> kAntialiasings{{
     {"analytic", "a strand covers as much of a pixel as it is wide"},
     {"msaa4", "four samples per pixel, by the rasteriser"},
-    {"density_samples", "four samples where little hair is behind a strand, one where much is (003, 5.2)"},
+    {"density_samples",
+     "four samples where little hair is behind a strand, one where much is (Woodhouse 2017, 5.2)"},
 }};
 
 template <class Method>

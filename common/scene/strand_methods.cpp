@@ -8,17 +8,18 @@ namespace strandcast {
 namespace {
 
 constexpr std::array<MethodRow, 2> kCurves{{
-    {"hermite", "cubics whose tangents are those of Catmull and Rom (003, 4.3.1)"},
+    {"hermite", "cubics whose tangents are those of Catmull and Rom (Woodhouse 2017, 4.3.1)"},
     {"bezier", "Bezier curves with the vertices as anchors, handles a third of a gap long (Nalu)"},
 }};
 constexpr std::array<MethodRow, 2> kJoints{{
     {"mended", "two segments share the corners where they meet"},
-    {"split", "each quad across its own segment, with cracks at bends (003, 4.3.2)"},
+    {"split", "each quad across its own segment, with cracks at bends (Woodhouse 2017, 4.3.2)"},
 }};
 constexpr std::array<MethodRow, 5> kDetails{{
     {"adaptive", "fewer, wider strands and fewer segments where they are small on the screen"},
     {"full", "all strands and all segments"},
-    {"decimation", "fewer strands, together as wide, where they are thinner than a pixel (003, 6.3)"},
+    {"decimation",
+     "fewer strands, together as wide, where they are thinner than a pixel (Woodhouse 2017, 6.3)"},
     {"bends", "in each gap as many segments as a quarter of a pixel asks for"},
     {"volume", "as adaptive; from far away a volume of their density stands for strands"},
 }};

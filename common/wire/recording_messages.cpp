@@ -106,7 +106,7 @@ void clear_options(pb::DescriptorProto& type) {
   for (auto& choice : *type.mutable_enum_type()) choice.clear_options();
 }
 
-/// A file with these types alone, behind those that it needs.
+/// Adds a file with these types alone, after the files that it needs.
 void add_file(const pb::FileDescriptor& file, const std::set<const pb::Descriptor*>& types,
               const std::set<const pb::EnumDescriptor*>& enums, pb::FileDescriptorSet& set) {
   const auto is_known = [&](const pb::FileDescriptor& other) {

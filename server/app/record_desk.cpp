@@ -16,12 +16,12 @@ namespace {
 constexpr double kBytesPerMb = 1e6;
 constexpr double kBytesPerGb = 1e9;
 constexpr const char* kEnding = ".mcap";
-/// Of one name that was not given, within a second.
+/// Recordings without a given name that may begin within one second.
 constexpr int kMaxAlike = 10;
 constexpr std::chrono::seconds kRoomInterval{1};
 constexpr std::chrono::milliseconds kTapPoll{50};
 
-/// Whatever the locale says.
+/// Knows ASCII alone, whatever the locale says.
 bool is_letter_or_digit(char character) {
   const char lower = static_cast<char>(character | 0x20);
   return (lower >= 'a' && lower <= 'z') || (character >= '0' && character <= '9');
@@ -31,7 +31,7 @@ bool may_be_in_name(char character) {
   return is_letter_or_digit(character) || std::string_view(" ._-+").find(character) != std::string_view::npos;
 }
 
-/// `end`: why it ended by itself; empty = it goes on.
+/// Describes a recording; `end` says why it ended by itself, empty = it goes on.
 std::string text_of(const Recorder& recorder, const std::string& end) {
   const RecordCounters counts = recorder.counters();
   const std::string text =

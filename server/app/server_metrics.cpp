@@ -175,7 +175,7 @@ std::string format_recording(const RecordCounters& record) {
          row("record_lag_ms", "Age of the newest that the recorder has taken.", record.lag_ms);
 }
 
-/// Of no head: of which the first text that has it tells.
+/// Returns whether a family is of the process, not of a head; the first text that has it then counts.
 bool is_of_process(std::string_view family) {
   return family == "strandcast_build_info" || family == "strandcast_log_dropped_lines_total" ||
          family.starts_with("strandcast_gl_");

@@ -63,7 +63,7 @@ EncodedFramePtr SessionDesk::asset() const {
   return asset_;
 }
 
-/// Null where it cannot be told: everybody keeps the shape of before.
+/// Returns the frame of a new asset; null where none can be made: then everybody keeps the old shape.
 EncodedFramePtr SessionDesk::follow_shape(const SceneAsset& asset) {
   Result<EncodedFramePtr> frame = make_asset_frame(asset);
   if (!frame) {

@@ -54,7 +54,7 @@ std::vector<double> FlowControl::decode_shares(const Classes& classes) const {
   return shares;
 }
 
-/// Of another class, until it was seen.
+/// Scales the measured decoding times to another class, until frames of that class are measured.
 void FlowControl::expect_decodes(const Classes& classes, size_t chosen) {
   if (classes.strands.size() != classes.costs.size()) return decodes_ns_.clear();
   const double factor = static_cast<double>(classes.strands[chosen].strand_share) /

@@ -16,7 +16,7 @@ constexpr int64_t kLeastTransferNs = kMsInNs;
 constexpr size_t kMaxBusySamples = 16;
 /// A rate is taken over at least this: frames and acknowledgements come in bunches.
 constexpr int64_t kBusySpanNs = 50 * kMsInNs;
-/// A round trip differs by so much for other reasons than the rate: jitter, or a client that looks only now
+/// Difference of round trips that has other reasons than the rate: jitter, or a client that looks only now
 /// and then.
 constexpr int64_t kJitterNs = 50 * kMsInNs;
 constexpr size_t kMinBusySamples = 3;
@@ -85,7 +85,7 @@ void LinkEstimate::note_look(int64_t arrived_ns) {
   bunch_ns_ = arrived_ns;
 }
 
-/// From here to the client, by our clock and the one of arrival_ns().
+/// Returns the shortest way to the client, by our clock and that of arrival_ns().
 int64_t LinkEstimate::shortest_way_ns() const {
   if (!has_client_clock_ || ways_.empty()) return base_ns();
   return static_cast<int64_t>(ways_.front().value);

@@ -33,7 +33,7 @@ std::vector<StrandByteModel> byte_models(const std::vector<std::string>& codecs)
   return models;
 }
 
-/// At least one, whatever the list says.
+/// Returns the classes of a list; one where it has none.
 std::vector<StrandClass> classes_of(const StreamList& list) {
   return list.classes.empty() ? std::vector<StrandClass>(1) : list.classes;
 }

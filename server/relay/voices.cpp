@@ -107,7 +107,7 @@ std::optional<Error> Voices::why_full(const Speaker& speaker) const {
                     kMaxVoicesPerAddress);
 }
 
-/// Null while it is not tried again.
+/// Returns the session's link, opened where there is none; null while no new one may be tried.
 UpstreamLink* Voices::find_or_open(const Speaker& speaker, const Hello& hello, size_t head) {
   if (is_stopping_) return nullptr;
   const SessionId session = speaker.session;

@@ -13,7 +13,7 @@ namespace strandcast {
 namespace {
 
 constexpr int kPictureQuality = 85;
-/// What is deeper than so in the mesh, where hair has settled, is seen.
+/// Depth in the mesh beyond which a person sees that settled hair is inside.
 constexpr double kSeenM = 0.0005;
 
 std::string mm(double metres) {
@@ -59,11 +59,13 @@ void add_head(HtmlPage& page, const CollisionStudy& study) {
 void add_body(HtmlPage& page, const CollisionStudy& study) {
   page.heading("How hair answers to a body that moves by itself");
   page.paragraph(fmt::format(
-      "Motion: {}; the fastest end of a capsule goes {:.2f} m/s. \"turn\" and \"sphere\" (003, figure 4.1) "
+      "Motion: {}; the fastest end of a capsule goes {:.2f} m/s. \"turn\" and \"sphere\" (Woodhouse 2017, "
+      "figure 4.1) "
       "turn "
       "segments at their length, \"project\" moves vertices out the shortest way, \"force\" pushes with the "
       "depth "
-      "(002, 3.3). Carried is the share of a belt's way that lying tips go along with, by a friction of 1.",
+      "(Sams 2014, 3.3). Carried is the share of a belt's way that lying tips go along with, by a friction "
+      "of 1.",
       study.body_name, study.fastest_mps));
   page.figure(body_answer_plot(study),
               "How deep 99.9 % of all vertices stay, against processor time over a step without the body.");

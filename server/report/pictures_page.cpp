@@ -142,7 +142,7 @@ std::vector<std::string> stale_texts(const PicturesReport& report) {
   return texts;
 }
 
-/// Ours, truth and difference side by side.
+/// Returns our picture, the truth and their difference side by side.
 Image side_by_side(const PictureRow& row) {
   const Image truth = shown_cells(row.truth_cells);
   const Image off = shown_difference(row.cells, row.truth_cells);

@@ -30,7 +30,7 @@ std::string growth_text(double per_s) {
   return std::isfinite(per_s) ? fmt::format("{:+.2f}", per_s) : "too fast";
 }
 
-/// Of the tangent: force over weight.
+/// Relative error of the lean's tangent, which is force over weight.
 double lean_off(const WindLean& lean) {
   return std::tan(lean.ours_rad) / std::tan(lean.law_rad) - 1.0;
 }

@@ -24,9 +24,9 @@ constexpr Way kHost = {"host", "sorted by layers on the processors, summed in do
 constexpr Way kInUse[] = {{"sort", "sorted by cells, integer sums of each cell in registers"},
                           {"atomics", "32 integer atomic additions a sample"}};
 constexpr Way kTried[] = {
-    {"raster", "points drawn into the layers of a texture, blending sums (003's choice)"},
-    {"counting", "samples sorted into cells, nodes visit those around them (003's second)"},
-    {"hashing", "bins by the sides of 20 random planes, nodes visit their own (003's first)"}};
+    {"raster", "points drawn into the layers of a texture, blending sums (Woodhouse's choice)"},
+    {"counting", "samples sorted into cells, nodes visit those around them (Woodhouse's second)"},
+    {"hashing", "bins by the sides of 20 random planes, nodes visit their own (Woodhouse's first)"}};
 
 class ScatterStudy {
  public:

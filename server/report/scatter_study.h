@@ -1,5 +1,5 @@
 // Compares the methods of summing strands into a volume: the host's, those of OpenGL that the simulation may
-// use, and those of document 003 (4.2.4). All compute the same volume of the same hair without smoothing, and
+// use, and those of Woodhouse 2017 (4.2.4). All compute the same volume of the same hair unsmoothed, and
 // are compared with a sum in double precision.
 #pragma once
 

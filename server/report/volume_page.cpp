@@ -13,9 +13,9 @@
 namespace strandcast {
 namespace {
 
-// Of a hair, for what 002, 4.2 asks: force that it breaks at (Robbins 2012, "Chemical and Physical Behavior
-// of Human Hair": about 1 N for 80 micrometres), mass per length of that width at 1,320 kg/m^3, and a long
-// one in a hard shake.
+// Of a hair, for what Sams 2014, 4.2 asks: force that it breaks at (Robbins 2012, "Chemical and Physical
+// Behavior of Human Hair": about 1 N for 80 micrometres), mass per length of that width at 1,320 kg/m^3, and
+// a long one in a hard shake.
 constexpr double kBreakingN = 1.0;
 constexpr double kLinearDensityKgPm = 6.6e-6;
 constexpr double kLongHairM = 0.5;
@@ -70,15 +70,15 @@ void add_errors(HtmlPage& page, const VolumeStudy& study) {
 
 void add_scatters(HtmlPage& page, const VolumeStudy& study) {
   page.heading("How strands get into it");
-  page.paragraph(
-      fmt::format("{} samples of all hairs into {} cells, without smoothing, each way against a sum in "
-                  "double. OpenGL: {}. Document "
-                  "003 (4.2.4) tried hashing, then counting, and kept drawing points, on graphics cards of "
-                  "2011; the ways in use here "
-                  "find the box of the hair as well, and give the same bits every time.",
-                  study.scatter_samples, study.scatter_resolution,
-                  study.scatter_device.empty() ? "not there, so that only the host's way was tried"
-                                               : study.scatter_device));
+  page.paragraph(fmt::format(
+      "{} samples of all hairs into {} cells, without smoothing, each way against a sum in "
+      "double. OpenGL: {}. "
+      "Woodhouse 2017 (4.2.4) tried hashing, then counting, and kept drawing points, on graphics cards of "
+      "2011; the ways in use here "
+      "find the box of the hair as well, and give the same bits every time.",
+      study.scatter_samples, study.scatter_resolution,
+      study.scatter_device.empty() ? "not there, so that only the host's way was tried"
+                                   : study.scatter_device));
   HtmlTable table{"", {"way", "", "ms", "density", "momentum", "same bits", "samples lost"}, {}};
   for (const ScatterResult& scatter : study.scatters)
     table.rows.push_back(
@@ -118,8 +118,8 @@ void add_covered(HtmlPage& page, const VolumeStudy& study) {
   const VolumeOutcome* const usual = find_by_name(study.outcomes, "as shipped");
   if (none != nullptr && usual != nullptr)
     page.paragraph(
-        fmt::format("Hair as a continuum (Hadap and Magnenat-Thalmann 2001, named by 000) and webbing "
-                    "(McAdams and others 2009; 002, "
+        fmt::format("Hair as a continuum (Hadap and Magnenat-Thalmann 2001, named by Zappe 2020) and webbing "
+                    "(McAdams and others 2009; Sams 2014, "
                     "4.3) correct the velocities of strands by a volume's. That is what friction and "
                     "repulsion do, step by step, with "
                     "an implicit term in the place of a pressure solve: a tuft keeps {} of its volume "
@@ -129,21 +129,22 @@ void add_covered(HtmlPage& page, const VolumeStudy& study) {
                     volume_percent(usual->crowded_share), volume_percent(none->crowded_share)));
   if (const VolumeError* const same = find_guides(study, kTrueResolution); same != nullptr)
     page.paragraph(fmt::format(
-        "Strips (Koh and Huang 2001; 003, 2.1) move many hairs as one patch, to simulate fewer vertices. "
+        "Strips (Koh and Huang 2001; Woodhouse 2017, 2.1) move many hairs as one patch, to simulate fewer "
+        "vertices. "
         "Guides that stand for "
         "the hairs around them do so with {} of the vertices here, and know the density of all hair within "
         "{} on the same "
         "cells, without taking any freedom from strands.",
         volume_percent(static_cast<double>(study.guide_count) / study.hair_count),
         volume_percent(same->density)));
-  page.paragraph(
-      fmt::format("Breaking (002, 4.2): a hair of {:.0f} cm in a shake of 10 g pulls at its root with {:.2f} "
-                  "mN, and breaks at {:.0f} N, "
-                  "{:.0f} times that. No head breaks hair by moving; a threshold that could ever be reached "
-                  "would be an effect, and "
-                  "none is built.",
-                  100.0 * kLongHairM, 1e3 * kLinearDensityKgPm * kLongHairM * kHardShakeMps2, kBreakingN,
-                  kBreakingN / (kLinearDensityKgPm * kLongHairM * kHardShakeMps2)));
+  page.paragraph(fmt::format(
+      "Breaking (Sams 2014, 4.2): a hair of {:.0f} cm in a shake of 10 g pulls at its root with {:.2f} "
+      "mN, and breaks at {:.0f} N, "
+      "{:.0f} times that. No head breaks hair by moving; a threshold that could ever be reached "
+      "would be an effect, and "
+      "none is built.",
+      100.0 * kLongHairM, 1e3 * kLinearDensityKgPm * kLongHairM * kHardShakeMps2, kBreakingN,
+      kBreakingN / (kLinearDensityKgPm * kLongHairM * kHardShakeMps2)));
 }
 
 }  // namespace

@@ -122,7 +122,7 @@ glm::dvec3 onto_plane(const Contact& contact, const glm::dvec3& edge, const glm:
   return lean(contact.normal, flat_side(held, contact.normal, held), length_m, height_m / length_m);
 }
 
-/// 003 figure 4.1; `was` is where the end was, from the start.
+/// Woodhouse 2017, figure 4.1; `was` is where the end was, from the start.
 glm::dvec3 onto_ball(const Ball& ball, const glm::dvec3& start, const glm::dvec3& held, const glm::dvec3& was,
                      double length_m) {
   const glm::dvec3 to_center = ball.center_m - start;

@@ -92,9 +92,9 @@ glm::dvec3 turned_onto_sphere(const ReferenceSegment& segment, const glm::dvec3&
   return segment.start_m + length * (cosine * axis + std::sqrt(1.0 - cosine * cosine) * side);
 }
 
-// 003 solves collider and length constraints in turn and leaves the exact solution of both (figure 4.1) out
-// for its cost; turning the segment onto the sphere is that exact solution. Several colliders: out of the one
-// with the largest r^2 - |p - c|^2 first, then once more.
+// Woodhouse 2017 solves collider and length constraints in turn and leaves the exact solution of both
+// (figure 4.1) out for its cost; turning the segment onto the sphere is that exact solution. Several
+// colliders: out of the one with the largest r^2 - |p - c|^2 first, then once more.
 glm::dvec3 pushed_out(const ReferenceSkin& skin, ReferenceSegment segment) {
   const StepInput& input = skin.input;
   for (int round = 0; round < push_rounds(input); ++round) {

@@ -65,8 +65,8 @@ struct ReferenceSegment {
 /// then applies Coulomb friction.
 glm::dvec3 pushed_out(const ReferenceSkin& skin, ReferenceSegment segment);
 
-/// Rotates a segment about its start until its end lies on the sphere (center, radius): both equations of 003
-/// figure 4.1 at once. Returns the nearest possible end if the two spheres do not intersect.
+/// Rotates a segment about its start until its end lies on the sphere (center, radius): both equations of
+/// Woodhouse figure 4.1 at once. Returns the nearest possible end if the two spheres do not intersect.
 glm::dvec3 turned_onto_sphere(const ReferenceSegment& segment, const glm::dvec3& center, double radius);
 
 /// Returns the velocity of wind and gusts at a point relative to the head joint, within the limits of

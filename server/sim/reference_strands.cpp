@@ -146,7 +146,7 @@ void ReferenceStrands::place(ReferenceStrand& strand, uint32_t i) const {
   strand.placed_m[i] = end;
 }
 
-// 003 section 2.1.4: v_i = (p_i(t+h) - p_i(t)) / h - s_damping d_(i+1) / h, where d is what the length
+// Woodhouse 2017, 2.1.4: v_i = (p_i(t+h) - p_i(t)) / h - s_damping d_(i+1) / h, where d is what the length
 // constraint moved a vertex by; friction and the speed limit are ours.
 glm::dvec3 ReferenceStrands::finish_velocity(const ReferenceStrand& strand, uint32_t i) const {
   glm::dvec3 u = way_m(strand, i) / h_s();

@@ -14,10 +14,11 @@ std::vector<SolverParameterInfo> shared_parameter_infos();
 /// Returns the shared entries of a model without velocity correction.
 std::vector<SolverParameterInfo> uncorrected_parameter_infos();
 
-/// Parameter against two faults of dynamic Follow-The-Leader that 003 section 5.2 reports; not all solvers
-/// have both. One is jitter under fast reversals: a follower nearer than its segment's length is pushed away,
-/// and the correction then thrusts its leader backwards. Real hair would buckle instead. The default is the
-/// published form, because limp strands that stand against gravity do not come to rest without thrusts.
+/// Parameter against two faults of dynamic Follow-The-Leader that Woodhouse 2017, 5.2 reports; not all
+/// solvers have both. One is jitter under fast reversals: a follower nearer than its segment's length is
+/// pushed away, and the correction then thrusts its leader backwards. Real hair would buckle instead. The
+/// default is the published form, because limp strands that stand against gravity do not come to rest without
+/// thrusts.
 SolverParameterInfo thrust_share_info();
 /// Parameter against equal motion of all strands: hairs differ in thickness. With f the thickness relative to
 /// the mean, bending stiffness scales with f^4 and mass with f^2. So the pull per mass to the groomed shape

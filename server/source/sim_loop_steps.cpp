@@ -216,7 +216,7 @@ void SimLoop::publish() {
   report_quarantine();
 }
 
-/// What of the body is not there, and what hair began inside of it: when that changes.
+/// Reports joints of the body that are missing, and hair that began inside of it, when either changes.
 void SimLoop::report_body() {
   if (input_.has_motion && builder_->missing_joints() != told_missing_joints_) {
     told_missing_joints_ = builder_->missing_joints();

@@ -1,5 +1,5 @@
-// Bezier curves through the vertices of a strand, as Nalu smooths hair (Nguyen and Donnelly 2005; 003, 2.1.1): vertices
-// are anchors, the handles of a gap lie a third of its length from them along tangents that are found at run time. That
+// Bezier curves through the vertices of a strand, as Nalu smooths hair (Nguyen and Donnelly 2005; Woodhouse 2017, 2.1.1).
+// Vertices are anchors; the handles of a gap lie a third of its length from them along tangents found at run time. That
 // is the Hermite curve whose derivatives at the anchors are these tangents, as long as the gap: it is told as one.
 #pragma once
 #include "lib/hermite.glsl"

@@ -1,5 +1,5 @@
-// Samples by density (003, 5.2): segments with so much hair behind them that nothing else shines through are marked, one
-// invocation per segment; a sample per pixel will do for those.
+// Samples by density (Woodhouse 2017, 5.2): marks segments with so much hair behind them that nothing shines through. For
+// those one sample per pixel will do. One invocation per segment.
 #include "shared/bindings.h"
 #include "shared/limits.h"
 

@@ -76,7 +76,7 @@ void main() {
 
   vec4 clip = u_clip_from_head * vec4(position_m, 1.0);
 #if JOINTS == 1
-  // 003, 4.3.2: across the segment's own way and the camera's, so that the next quad begins elsewhere at a bend.
+  // Woodhouse 2017, 4.3.2: across the segment's own way and the camera's, so quads have gaps at bends.
   vec3 way = expanded.vertex[2u * segment + 1u].position_along.xyz - expanded.vertex[2u * segment].position_along.xyz;
   vec4 clip_step = u_clip_from_head * vec4(way - front() * dot(way, front()), 0.0);
 #else

@@ -1,5 +1,5 @@
 // Limits of bending: after a substep of any model, the angle from each segment to the next is brought between
-// a least and a most one, which go from those at the root to those at the tip (document 003, section 6.1). A
+// a least and a most one, which go from those at the root to those at the tip (Woodhouse 2017, 6.1). A
 // segment is turned about its start, in the plane of both; what hangs on it goes along, so that no length and
 // no direction beyond changes. What a vertex is moved by counts in its velocity, as with all limits of
 // positions: joints that only lose what drives them out never rest, since each carries the ones beyond. How far

@@ -97,7 +97,7 @@ BodyContact deepest_in_body(vec3 point, vec3 before, float clearance) {
 
 float distance_to_body(vec3 point) { return -deepest_in_body(point, point, 0.0).depth; }
 
-// The end of a segment turned about its start until it lies on a ball: both equations of 003 figure 4.1 at once, by the
+// The end of a segment turned about its start until it lies on a ball: Woodhouse 2017, figure 4.1, at once, by the
 // law of cosines; straight away from the ball where they have no solution. Of their two roots in the plane of segment
 // and centre it is the one that the segment is nearer to, unless that is beyond the line from the start to the centre,
 // seen from where the end was: nothing gets there but through the ball. Then its mirror image is; and what points nearly

@@ -9,7 +9,7 @@
 // Times a vertex inside several colliders is pushed, out of the deepest first.
 #define PUSH_ROUNDS (COLLIDER_COUNT > 1u ? 2 : 1)
 
-// The end of a segment turned about its start until it lies on a sphere: both equations of 003 figure 4.1 at
+// The end of a segment turned about its start until it lies on a sphere: both equations of Woodhouse, figure 4.1 at
 // once, by the law of cosines; the nearest end that can be had when there is none. `direction` is the
 // segment's now.
 vec3 turned_onto_sphere(vec3 start, vec3 direction, float segment, vec3 center, float radius) {

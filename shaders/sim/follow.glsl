@@ -1,4 +1,4 @@
-// Prediction and Follow-The-Leader placement of one vertex, with colliders and their friction. Document 003,
+// Prediction and Follow-The-Leader placement of one vertex, with colliders and their friction. Woodhouse 2017,
 // sections 2.1.4 and 4.2.3.
 #pragma variant HAS_PINNED_TAIL 0 1
 #include "lib/hash.glsl"

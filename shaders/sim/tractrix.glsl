@@ -1,5 +1,5 @@
 // The tractrix step: where the tail of a rigid segment goes when its head is moved along a straight line and
-// the tail only ever follows the segment. Source: document 000, section 2.2.3, after Sreenivasan, Goel and
+// the tail only ever follows the segment. Source: Zappe 2020, 2.2.3, after Sreenivasan, Goel and
 // Ghosal 2010.
 //
 // With u the unit vector from head to tail, s that of the head's way d and l the segment's length, the tail's

@@ -1,4 +1,4 @@
-// 000 section 3.0.1: every vertex in turn goes where its forces take it and drags the others along; then the
+// Zappe 2020, 3.0.1: every vertex in turn goes where its forces take it and drags the others along; then the
 // strand is pulled back to its root. One invocation per strand.
 #include "sim/tractrix_drag.glsl"
 #include "lib/hash.glsl"

@@ -1,4 +1,4 @@
-// Compliant position-based dynamics with tractrix sweeps: 000 chapter 6.
+// Compliant position-based dynamics with tractrix sweeps: Zappe 2020 chapter 6.
 #define IS_COMPLIANT 1
 #define HAS_TRACTRIX_SWEEPS 1
 #include "sim/tractrix.glsl"

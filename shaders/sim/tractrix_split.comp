@@ -1,4 +1,4 @@
-// 000 section 3.0.2: only the last free vertex has forces and drags the strand, which is then pulled back to
+// Zappe 2020, 3.0.2: only the last free vertex has forces and drags the strand, which is then pulled back to
 // its root; what is shown has every segment turned from there towards the groomed one. One invocation per
 // strand.
 #include "sim/tractrix_drag.glsl"

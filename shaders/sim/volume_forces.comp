@@ -1,8 +1,8 @@
 // What hair does to hair, before a substep of whatever model: friction brings a vertex's velocity to the mean
 // of the hair around it, and where hair is denser than it may be, it is pushed down the slope of the density
-// (Petrovic, Henne, Anderson 2005; document 003, equations 2.2 to 2.4 and section 4.2.4, with the push's own
+// (Petrovic, Henne, Anderson 2005; Woodhouse 2017, equations 2.2 to 2.4 and 4.2.4, with the push's own
 // stiffness taken implicitly, as drag against the mean velocity). With extras hair is also pushed towards a
-// target's density (document 003, section 6.2), and feels less of the wind behind other hair. With air each
+// target's density (Woodhouse 2017, 6.2), and feels less of the wind behind other hair. With air each
 // hair is dragged, as a thin cylinder, by the air at its place. Hair around it carries that air along, the
 // more the denser it is (common/kernels/volume/hair_in_air.h); models have no drag of their own then. A model
 // that keeps its ways is also told how much more inert a vertex is for all other forces while air drags it. One

@@ -1,5 +1,5 @@
-// Bins that a volume's nodes look for samples in. BY_PLANES 0: the cells of the grid, by counting sort (003's [16]);
-// 1: by the sides of random planes, locality-sensitive hashing (003's [13]), bins of a fixed size.
+// Bins in which a volume's nodes look for samples. BY_PLANES 0: cells of the grid, by counting sort (Woodhouse's [16]);
+// 1: by the sides of random planes, locality-sensitive hashing (Woodhouse's [13]), bins of a fixed size.
 #pragma variant BY_PLANES 0 1
 #include "lib/hash.glsl"
 #include "shared/limits.h"

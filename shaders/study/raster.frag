@@ -1,4 +1,4 @@
-// What a sample adds to a node (003, equation 2.2); blending sums.
+// What a sample adds to a node (Woodhouse 2017, equation 2.2); blending sums.
 layout(location = 0) flat in vec2 g_at;
 layout(location = 1) flat in vec4 g_value;
 layout(location = 0) out vec4 o_sum;

@@ -1,4 +1,4 @@
-// A sample on its way into the layers of a texture (003, 4.2.4).
+// A sample on its way into the layers of a texture (Woodhouse 2017, 4.2.4).
 #include "study/samples.glsl"
 
 layout(location = 0) out vec4 v_place;

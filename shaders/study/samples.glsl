@@ -1,4 +1,4 @@
-// Samples of strands on a given grid, for the ways of document 003 (4.2.4) to get them into a volume. Two texels each:
+// Samples of strands on a given grid, for the ways of Woodhouse 2017 (4.2.4) to get them into a volume. Two texels each:
 // where it is, in cells from the grid's first node, and its length, m; how it moves, m/s.
 #include "shared/scatter_study.h"
 

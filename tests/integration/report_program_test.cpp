@@ -283,7 +283,7 @@ TEST_F(ReportProgram, ASmallVolumeReportKeepsTheLaws) {
   for (const auto& row : rows_) share[row.at("volume")] = number(row, "volume_share");
   EXPECT_GT(share.at("as shipped"), share.at("no volume") + 0.05);
   const std::string page = load_text(out / "volume.html", 1u << 24).value();
-  EXPECT_THAT(page, AllOf(HasSubstr("</html>"), HasSubstr("Breaking (002, 4.2)")));
+  EXPECT_THAT(page, AllOf(HasSubstr("</html>"), HasSubstr("Breaking (Sams 2014, 4.2)")));
 }
 
 TEST_F(ReportProgram, RefusesBadInputInOneSentence) {

@@ -276,8 +276,9 @@ double largest_move_m(const std::vector<glm::dvec3>& from, const std::vector<glm
   return largest_m;
 }
 
-// 003 figure 4.1 has two roots in a plane, and a circle of them in space. A model that has segments point at
-// the centre, a little beside it, on any side, and every step on another, moves them a little.
+// Woodhouse 2017, figure 4.1 has two roots in a plane, and a circle of them in space. A model that has
+// segments point at the centre, a little beside it, on any side, and every step on another, moves them a
+// little.
 TEST_P(BodyOnEveryExecutor, WhatPointsAtTheCentreStaysOnItsSideOfTheBall) {
   constexpr double kUnsteadyM = 1e-4;
   SegmentsOverABall segments(executor_, 0.01);

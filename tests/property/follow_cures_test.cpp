@@ -1,5 +1,5 @@
-// The two faults of dynamic Follow-The-Leader that 003 section 5.2 reports, measured without and with their
-// cures.
+// The two faults of dynamic Follow-The-Leader that Woodhouse 2017, 5.2 reports, measured without and with
+// their cures.
 #include <complex>
 #include <numbers>
 
@@ -82,8 +82,8 @@ class FollowCures : public SolverTest {
   }
 };
 
-// 003: "under very strong force which rapidly changes direction" strands shake on by themselves. They do at
-// small steps, where the correction damps less; without thrusts they do not.
+// Woodhouse 2017: "under very strong force which rapidly changes direction" strands shake on by themselves.
+// They do at small steps, where the correction damps less; without thrusts they do not.
 TEST_F(FollowCures, WithoutThrustsStrandsComeToRestAfterFastReversals) {
   const Groom groom = make_test_groom({});
   struct Case {

@@ -42,9 +42,9 @@ class ShapeConstraints : public SolverTest {
   }
 };
 
-// 004 "Local constraints": a lone error is taken back by both ends, so that the middle stays. Stiffness: L =
-// 0.2 m, l = 0.1 m, h = 0.1 s, b = 0.0075 m^4/s^2: 1 / (k h^2) = 3 L l^3 / (8 b h^2) = 1 segment's mass, so
-// that each end takes 1 / (1 + 1 + 1) of the error, relaxed.
+// PT1 "Local constraints": a lone error is taken back by both ends, so that the middle stays. Stiffness:
+// L = 0.2 m, l = 0.1 m, h = 0.1 s, b = 0.0075 m^4/s^2: 1 / (k h^2) = 3 L l^3 / (8 b h^2) = 1 segment's mass,
+// so that each end takes 1 / (1 + 1 + 1) of the error, relaxed.
 TEST_F(ShapeConstraints, LocalShapeTurnsASegmentAboutItsMiddle) {
   constexpr double kRelaxation = 0.7;
   const glm::dvec3 before(0.1, 0.0, 0.0);
@@ -98,8 +98,8 @@ TEST_F(ShapeConstraints, LocalShapeSeesAnglesBetweenSegmentsOnly) {
   }
 }
 
-// 004 "Global constraints": x' = x + S (target - x), S = h^2 s / (1 + h^2 s), in steps of a 60th of a second;
-// in others the pull is looked up elsewhere (pull_rate_test.cpp).
+// PT1 "Global constraints": x' = x + S (target - x), S = h^2 s / (1 + h^2 s), in steps of a 60th of a
+// second; in others the pull is looked up elsewhere (pull_rate_test.cpp).
 TEST_F(ShapeConstraints, GlobalShapeTakesItsShareOfTheWayBack) {
   constexpr double kStepS = 1.0 / 60.0;
   constexpr double kStiffnessPerS2 = 1800.0;
@@ -157,8 +157,8 @@ TEST_F(ShapeConstraints, AFastShockTakesTheStrandAlongRigidly) {
   }
 }
 
-// 004 "Edge constraints", segments after even vertices first: vertices at 0, 1.3, 2 and 3.4 m. First 0-1 (the
-// root does not move) and 2-3 (0.2 m each), then 1-2 (0.1 m each). Root to tip it would be 1, 2.2, 3.2.
+// PT1 "Edge constraints", segments after even vertices first: vertices at 0, 1.3, 2 and 3.4 m. First 0-1
+// (the root does not move) and 2-3 (0.2 m each), then 1-2 (0.1 m each). Root to tip it would be 1, 2.2, 3.2.
 TEST_F(ShapeConstraints, LengthsAreCorrectedInRedBlackOrder) {
   for (const SolverKind& kind : kinds()) {
     SCOPED_TRACE(kind.name());
@@ -191,7 +191,7 @@ TEST_F(ShapeConstraints, LengthErrorsFallWithTheIterations) {
   EXPECT_LT(before, 0.1);
 }
 
-// 000 algorithm 1: the ad-hoc pass meets all lengths in one walk, however poor the convergence, and only
+// Zappe, algorithm 1: the ad-hoc pass meets all lengths in one walk, however poor the convergence, and only
 // while the acceleration is fast.
 TEST_F(ShapeConstraints, TheFastPassLeavesExactLengths) {
   const Groom groom = make_test_groom({});

@@ -469,8 +469,8 @@ TEST_F(OddEven, HalfAsManyIterationsAsVerticesGiveTheSerialMotion) {
     EXPECT_EQ(compare(host, 8.0, false).largest_m, 0.0) << host.name();
 }
 
-// 003 section 4.2.3: as few as five iterations look like the serial version. Strands here are 0.17 to 0.25 m
-// long and move as fast as a person can shake a head.
+// Woodhouse 2017, 4.2.3: as few as five iterations look like the serial version. Strands here are 0.17 to
+// 0.25 m long and move as fast as a person can shake a head.
 TEST_F(OddEven, FiveIterationsComeClose) {
   for (const SolverHost& host : kernel_hosts()) {
     SCOPED_TRACE(host.name());

@@ -1,4 +1,4 @@
-// The question that document 000 leaves open (chapter 6): do tractrix sweeps in a constraint solver save
+// The question that Zappe 2020 leaves open (chapter 6): do tractrix sweeps in a constraint solver save
 // iterations at equal error? Against the same solver with so many iterations that more change nothing.
 #include <algorithm>
 #include <map>

@@ -261,7 +261,7 @@ class TractrixStyle : public TractrixRows {
   }
 };
 
-// 000 section 4.2: strands find their style and then slowly leave it for the shape that gravity gives them.
+// Zappe 2020, 4.2: strands find their style and then slowly leave it for the shape that gravity gives them.
 // What does it: each step's fall is undone by the pull back to the root, which turns every segment towards
 // hanging, and nothing in the style carries that. Cured by a style that carries the weight (sag_free); moves
 // from the tip to the root with the reaction of each correction (s_damping) stop the shiver.

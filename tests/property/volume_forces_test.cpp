@@ -355,7 +355,7 @@ TEST(VolumeForces, ATargetKeepsAStyleAsAVolume) {
 }
 
 /// Half of the sum of squares by which a tuft's density differs from that of other hair on the same lattice,
-/// over what it is without the tuft (003, section 6.2), before and after some seconds.
+/// over what it is without the tuft (Woodhouse 2017, 6.2), before and after some seconds.
 std::pair<double, double> energies(const SceneDesc& scene, const Groom& groom, const Groom& target,
                                    double seconds) {
   SceneContent content;
@@ -409,7 +409,8 @@ std::pair<double, double> energies(const SceneDesc& scene, const Groom& groom, c
   return {before, energy()};
 }
 
-// Hair goes to where other hair is, as a volume: the energy of 003 falls, and without the push it does not.
+// Hair goes to where other hair is, as a volume: the energy of Woodhouse falls, and without the push it does
+// not.
 TEST(VolumeForces, ATargetOfAnotherGroomIsApproached) {
   SceneDesc scene = hanging_scene(*find_solver("direct_rod").value());
   scene.volume = {};

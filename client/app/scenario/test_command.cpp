@@ -15,7 +15,7 @@
 namespace strandcast {
 namespace {
 
-/// Scenarios of the same name would write over each other.
+/// Refuses two scenarios of one name, because they would write over each other's files.
 Status check_names(const std::vector<Scenario>& scenarios) {
   for (size_t i = 0; i < scenarios.size(); ++i)
     for (size_t j = 0; j < i; ++j)

@@ -1,5 +1,5 @@
 // HairVolume: length of hair per space, and the mean velocity of the hair there, on the nodes of a lattice in
-// head space (Petrovic, Henne, Anderson 2005; document 003, equations 2.2 to 2.4). Computed on the
+// head space (Petrovic, Henne, Anderson 2005; Woodhouse 2017, equations 2.2 to 2.4). Computed on the
 // processors from strands in blocks; who reads it says when. The same bits from every instruction set and
 // number of threads. From one thread.
 #pragma once

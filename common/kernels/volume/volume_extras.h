@@ -1,5 +1,5 @@
 // What some readers want of a hair volume besides density and velocity, at the same nodes: by how much the
-// density exceeds that of a target (document 003, section 6.2), and what the hair upwind leaves of the wind.
+// density exceeds that of a target (Woodhouse 2017, 6.2), and what the hair upwind leaves of the wind.
 // From one thread.
 #pragma once
 

@@ -1,6 +1,7 @@
-// Deep opacity maps (Yuksel and Keyser 2008; 003, 2.2.6 and 4.3.4): two draws from the light. The first tells
-// where hair begins in each texel, the second sums opacity in three layers that begin there, so that they
-// follow the shape of the hair. Three layers and the first depth are the four channels of one texture.
+// Deep opacity maps (Yuksel and Keyser 2008; Woodhouse 2017, 2.2.6 and 4.3.4): two draws from the light. The
+// first tells where hair begins in each texel, the second sums opacity in three layers that begin there, so
+// that they follow the shape of the hair. Three layers and the first depth are the four channels of one
+// texture.
 
 #include <epoxy/gl.h>
 

@@ -1,5 +1,5 @@
-// Deep shadow maps (Lokovic and Veach 2000; 003, 2.2.4), made on the CPU of what the GPU expanded: the truth
-// for the others, far too slow for pictures in motion.
+// Deep shadow maps (Lokovic and Veach 2000; Woodhouse 2017, 2.2.4), made on the CPU of what the GPU expanded:
+// the truth for the others, far too slow for pictures in motion.
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>

@@ -1,8 +1,8 @@
-// Rays through a volume of density (003, 4.3.4: what its faster program does): no map of the light, and
-// nothing drawn from it. The sources differ in what a step takes off the light: 003 multiplies by absorption
-// / (1 + density) in each of a fixed number of steps, which depends on their number; here optical depth is
-// summed along the ray, exp(-depth) passes (3.8 c of the reference sheet). The volume is of the drawn
-// strands, summed in integers, and knows the true angle between each strand and the light.
+// Rays through a volume of density (Woodhouse 2017, 4.3.4: what its faster program does): no map of the
+// light, and nothing drawn from it. The sources differ in what a step takes off the light: it multiplies by
+// absorption / (1 + density) in each of a fixed number of steps, which depends on their number; here optical
+// depth is summed along the ray, exp(-depth) passes (3.8 c of the reference sheet). The volume is of the
+// drawn strands, summed in integers, and knows the true angle between each strand and the light.
 
 #include <epoxy/gl.h>
 

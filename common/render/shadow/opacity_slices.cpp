@@ -1,11 +1,11 @@
-// Opacity shadow maps (Kim and Neumann 2001; 003, 2.2.5; in one draw as in Nalu, GPU Gems 2, chapter 23): 16
-// slices at fixed depths through the hair. Hair that begins within a slice is lit as if it were thin from the
-// slice's begin on.
+// Opacity shadow maps (Kim and Neumann 2001; Woodhouse 2017, 2.2.5; in one draw as in Nalu, GPU Gems 2,
+// chapter 23): 16 slices at fixed depths through the hair. Hair that begins within a slice is lit as if it
+// were thin from the slice's begin on.
 //
-// Hybrid: what 003 proposes in 5.2 and did not build: a density volume that lies along the light, fine across
-// it and coarse along it, with the first depth of deep opacity maps, all in one draw. The volume's slices
-// hold densities (4.3.4), summed at look-up; the first depth is the least of a fifth target. So the first
-// slice begins where the hair does.
+// Hybrid: what Woodhouse proposes in 5.2 and did not build: a density volume that lies along the light, fine
+// across it and coarse along it, with the first depth of deep opacity maps, all in one draw. The volume's
+// slices hold densities (4.3.4), summed at look-up; the first depth is the least of a fifth target. So the
+// first slice begins where the hair does.
 
 #include <epoxy/gl.h>
 

@@ -1,7 +1,7 @@
-// Samples by density: what 003 proposes in 5.2 and leaves to others. Strands in front of much hair hide their
-// edges among others like them, so one sample per pixel is enough for them; those with little behind them, at
-// the edge of the hair, have four. How much hair is behind a segment is what the density volume says along
-// the ray that goes on from the eye.
+// Samples by density: what Woodhouse (2017) proposes in 5.2 and leaves to others. Strands in front of much
+// hair hide their edges among others like them, so one sample per pixel is enough for them; those with little
+// behind them, at the edge of the hair, have four. How much hair is behind a segment is what the density
+// volume says along the ray that goes on from the eye.
 
 #include <epoxy/gl.h>
 

@@ -1,5 +1,5 @@
-// Four samples per pixel by the rasteriser (003, 5.1: what its programs are measured with). A strand thinner
-// than a pixel has no share of a sample: it is drawn a pixel wide in that share of the pixels.
+// Four samples per pixel by the rasteriser (Woodhouse 2017, 5.1: what its programs are measured with). A
+// strand thinner than a pixel has no share of a sample: it is drawn a pixel wide in that share of the pixels.
 
 #include "common/render/transparency/transparency.h"
 

@@ -71,10 +71,10 @@ struct Chain {
   }
 };
 
-/// Of an exact frame: it has no integers.
+/// Flags of an exact frame, which has no integers.
 constexpr uint8_t kExactFlags = step::kStepFlag | step::kSparseFlag;
 
-/// Whether nobody would see that vertices are where steps led: floats of the same strands round differently.
+/// Returns whether every vertex is where the step led, within one lattice step: floats round differently.
 bool is_foretold(const Planes<int32_t>& expected, const Planes<int32_t>& target) {
   for (size_t axis = 0; axis < 3; ++axis)
     for (size_t i = 0; i < target[axis].size(); ++i)
@@ -303,7 +303,7 @@ class Encoder final : public StrandEncoder {
                             std::span(slices).subspan(first, count));
   }
 
-  /// Of the history's last frame.
+  /// Returns the state of the history's last frame.
   State state_of(const SnapshotInfo& info) const {
     return {info, hash_planes(layout_, chain_.history.lattice, info)};
   }

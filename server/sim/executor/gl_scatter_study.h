@@ -1,5 +1,5 @@
 // Alternative methods to sum strands into a volume, for the comparison of strandcast-report volume. They are
-// those of document 003 (4.2.4): points drawn into the layers of a texture, and nodes that search their
+// those of Woodhouse 2017 (4.2.4): points drawn into the layers of a texture, and nodes that search their
 // neighbours in bins. They work on a given grid with samples that are already on the device. Needs a GL
 // context.
 #pragma once
@@ -19,7 +19,7 @@
 
 namespace strandcast {
 
-/// Names of the methods. "raster": additive blending, the choice of 003. "counting": bins are cells, samples
+/// Names of the methods. "raster": additive blending, Woodhouse's choice. "counting": bins are cells, samples
 /// are sorted by counting. "hashing": fixed-size bins of samples on the same sides of random planes.
 inline constexpr std::string_view kStudiedScatters[] = {"raster", "counting", "hashing"};
 

@@ -1,4 +1,4 @@
-// A hair volume by plain loops in double precision, which others are held against: document 003,
+// A hair volume by plain loops in double precision, which others are held against: Woodhouse 2017,
 // equations 2.2 to 2.4, on the nodes of a given grid.
 #pragma once
 

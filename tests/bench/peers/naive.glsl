@@ -1,4 +1,4 @@
-// One particle as document 003's first version kept it; strand after strand.
+// One particle as Woodhouse's first version kept it; strand after strand.
 struct Particle {
   vec4 position;   // m; w = segment before it, m
   vec4 predicted;  // m; w = 1 when pinned

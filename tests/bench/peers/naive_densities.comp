@@ -1,4 +1,4 @@
-// Density and velocity of the hair per voxel as document 003's first version sums them (4.2.4): one invocation per
+// Density and velocity of the hair per voxel as Woodhouse's first version sums them (4.2.4): one invocation per
 // particle and group, 27 voxels in turn, four atomic sums each in 16.16 fixed point.
 layout(local_size_x = 1) in;
 struct Particle {

@@ -1,4 +1,4 @@
-// Each particle onto the sphere about the one before it, from root to tip (003 section 2.1.4).
+// Each particle onto the sphere about the one before it, from root to tip (Woodhouse 2017, 2.1.4).
 #include "naive.glsl"
 
 void main() {

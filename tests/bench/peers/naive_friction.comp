@@ -1,4 +1,4 @@
-// Friction among hair as document 003's first version has it (4.2.6): a particle's velocity is drawn towards the mean of
+// Friction among hair as Woodhouse's first version has it (4.2.6): a particle's velocity is drawn towards the mean of
 // its voxel. One invocation per particle and group.
 layout(local_size_x = 1) in;
 struct Particle {

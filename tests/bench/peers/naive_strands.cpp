@@ -15,7 +15,7 @@ struct Particle {
   glm::vec4 velocity;   // m/s
   glm::vec4 moved;      // by the constraints, m
 };
-constexpr size_t kBytesPerParticle = 64;  // 123,904 bytes for 242 x 8: 003 section 5.1
+constexpr size_t kBytesPerParticle = 64;  // 123,904 bytes for 242 x 8: Woodhouse 2017, 5.1
 static_assert(sizeof(Particle) == kBytesPerParticle);
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Serial Dynamic Follow-The-Leader as document 003 first built it (its version `gpu`, section 4.2): 64 bytes
+// Serial Dynamic Follow-The-Leader as Woodhouse 2017 first built it (its version `gpu`, 4.2): 64 bytes
 // per particle side by side, one invocation per work group, one dispatch and barrier per stage. To show what
 // the fused, vertex-major kernel of the row `dftl` is worth, stage by stage. Gravity and drag only.
 #pragma once

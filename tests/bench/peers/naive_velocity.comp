@@ -1,4 +1,4 @@
-// Velocities from the way made and from what the follower was moved (003 section 2.1.4).
+// Velocities from the way made and from what the follower was moved (Woodhouse 2017, 2.1.4).
 #include "naive.glsl"
 
 void main() {

@@ -149,8 +149,8 @@ Status measure(const Options& options, int thread_count, bool has_swings, std::s
   RETURN_IF_ERROR(print_times(*executor, options, csv));
   ThesisOptions thesis = options.thesis;
   ASSIGN_OR_RETURN(thesis.device, gl::read_device_info());
-  RETURN_IF_ERROR(print_tables_of_000(thesis, *executor, csv));
-  return print_tables_of_003(thesis, *executor, csv);
+  RETURN_IF_ERROR(print_tables_of_zappe(thesis, *executor, csv));
+  return print_tables_of_woodhouse(thesis, *executor, csv);
 }
 
 /// In a process of its own, since the driver reads the number of threads once.

@@ -29,7 +29,7 @@ struct ThesisSet {
   const char* name;
   uint32_t strand_count;
   uint32_t vertex_count;
-  // 000 Table 4.2, GTX 1080 Ti; Mohawk and Short were one demo with one time.
+  // Zappe, Table 4.2, GTX 1080 Ti; Mohawk and Short were one demo with one time.
   const char* cited_tressfx;
   const char* cited_emulation;
   const char* cited_split;
@@ -77,12 +77,12 @@ StepInput falling_input(double h_s) {
   return input;
 }
 
-/// 003's stages before a picture: naive beside optimised.
+/// Woodhouse's stages before a picture: naive beside optimised.
 struct SimulationTimes {
   std::array<double, NaiveStrands::kStages.size()> naive_stage_ms{};
   double naive_ms = 0.0;     // all of them
   double fused_ms = 0.0;     // dftl
-  double odd_even_ms = 0.0;  // dftl_parallel, as 003's faster version solves constraints
+  double odd_even_ms = 0.0;  // dftl_parallel, as Woodhouse's faster version solves constraints
   VoxelTimes naive_voxels;
   VoxelTimes voxels;
   double difference_m = 0.0;    // between naive and dftl after the last step
@@ -157,7 +157,7 @@ Result<SimulationTimes> time_simulation(const Groom& groom, const ThesisOptions&
   return result;
 }
 
-/// A picture of one of 003's versions: by the shadow that it had, with four samples per pixel or one.
+/// A picture of one of Woodhouse's versions: by the shadow that it had, with four samples per pixel or one.
 struct Drawing {
   const char* shadow;
   bool has_antialiasing;
@@ -182,7 +182,7 @@ double shadow_stages_ms(const Renderer& renderer) {
   return ms;
 }
 
-/// Deep opacity maps (003's `gpu`) beside rays through the density (its `optimised_gpu`), in turn.
+/// Deep opacity maps (Woodhouse's `gpu`) beside rays through the density (its `optimised_gpu`), in turn.
 Result<AllDrawTimes> time_drawing(const ThesisOptions& options, const gl::ShaderLibrary& shaders) {
   constexpr int kPictures = 7;
   ASSIGN_OR_RETURN(const SceneDesc scene, load_scene(options.scene, {"look.segments=2", "look.followers=3"}));
@@ -225,7 +225,8 @@ double simulation_ms(double strands_ms, const VoxelTimes& voxels) {
 
 void print_table_51(const SimulationTimes& times, const AllDrawTimes& drawn) {
   fmt::print(
-      "\nIn the form of 003, Table 5.1: 242 strands x 8 particles, smoothed to 16 when drawn, with "
+      "\nIn the form of Woodhouse 2017, Table 5.1: 242 strands x 8 particles, smoothed to 16 when drawn, "
+      "with "
       "antialiasing; ms\n{:<16}{:>30}{:>30}{:>30}\n{:<16}",
       "Method", "Simulation", "Rendering", "Total", "");
   for (int i = 0; i < 3; ++i) fmt::print("{:>10}{:>10}{:>10}", "HD 7520G", "HD 6670", "here");
@@ -260,7 +261,8 @@ void print_table_51(const SimulationTimes& times, const AllDrawTimes& drawn) {
 
 void print_table_52(const SimulationTimes& times, const AllDrawTimes& drawn) {
   fmt::print(
-      "\nIn the form of 003, Table 5.2: components, ms; draw and total with / without antialiasing\n"
+      "\nIn the form of Woodhouse 2017, Table 5.2: components, ms; draw and total with / without "
+      "antialiasing\n"
       "{:<24}{:>51}{:>51}\n{:<24}",
       "Component", "gpu", "optimised_gpu", "");
   for (int i = 0; i < 2; ++i) fmt::print("{:>17}{:>17}{:>17}", "HD 7520G", "HD 6670", "here");
@@ -300,8 +302,8 @@ void print_table_52(const SimulationTimes& times, const AllDrawTimes& drawn) {
 
 }  // namespace
 
-Status print_tables_of_000(const ThesisOptions& options, Executor& executor, std::string& csv) {
-  fmt::print("\nIn the form of 000, Table 4.1: test sets\n{:<14}{:>16}{:>22}{:>16}\n", "Name",
+Status print_tables_of_zappe(const ThesisOptions& options, Executor& executor, std::string& csv) {
+  fmt::print("\nIn the form of Zappe 2020, Table 4.1: test sets\n{:<14}{:>16}{:>22}{:>16}\n", "Name",
              "Number Strands", "Particles per Strand", "Particle count");
   for (const ThesisSet& set : kSets)
     fmt::print("{:<14}{:>16}{:>22}{:>16}\n", set.name, set.strand_count, set.vertex_count,
@@ -309,7 +311,8 @@ Status print_tables_of_000(const ThesisOptions& options, Executor& executor, std
   fmt::print("{}\n", options.mohawk.empty() ? "Mohawk and Short: grown strands of these sizes."
                                             : "Mohawk: the file; Short: grown strands of this size.");
   fmt::print(
-      "\nIn the form of 000, Table 4.2: ms per step. Cited: whole programs on a GTX 1080 Ti; here: one step "
+      "\nIn the form of Zappe 2020, Table 4.2: ms per step. Cited: whole programs on a GTX 1080 Ti; here: "
+      "one step "
       "of "
       "1/60 s.\n{:<16}{:>10}{:>11}{:>8} |",
       "", "TressFX", "Emulation", "Split");
@@ -338,7 +341,7 @@ Status print_tables_of_000(const ThesisOptions& options, Executor& executor, std
   return {};
 }
 
-Status print_tables_of_003(const ThesisOptions& options, Executor& executor, std::string& csv) {
+Status print_tables_of_woodhouse(const ThesisOptions& options, Executor& executor, std::string& csv) {
   constexpr uint32_t kStrands = 242;
   constexpr uint32_t kParticles = 8;
   const Groom groom = bench_groom(kStrands, kParticles);

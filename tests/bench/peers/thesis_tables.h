@@ -1,4 +1,4 @@
-// The performance tables of documents 000 (Zappe, tractrix hair) and 003 (Woodhouse, hair on OpenGL), in
+// The performance tables of Zappe 2020 (tractrix hair) and Woodhouse 2017 (hair on OpenGL), in
 // their own form: the same sets and components in the same order, their numbers as cited beside ours.
 #pragma once
 
@@ -20,7 +20,7 @@ struct ThesisOptions {
 
 /// Prints, with a current context: the executor's where it has one. Lines for a CSV file are appended to
 /// `csv` (section, set, model, measure, value).
-Status print_tables_of_000(const ThesisOptions& options, Executor& executor, std::string& csv);
-Status print_tables_of_003(const ThesisOptions& options, Executor& executor, std::string& csv);
+Status print_tables_of_zappe(const ThesisOptions& options, Executor& executor, std::string& csv);
+Status print_tables_of_woodhouse(const ThesisOptions& options, Executor& executor, std::string& csv);
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// Friction among hair as document 003's faster version has it: one texture read per particle.
+// Friction among hair as Woodhouse's faster version has it: one texture read per particle.
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) buffer StateBlock { float value[]; } b_state;   // (6 x particles)
 uniform sampler3D u_sums;

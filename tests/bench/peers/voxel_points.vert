@@ -1,4 +1,4 @@
-// Density and velocity of the hair as document 003's faster version draws them (4.2.4): a point per particle. Position
+// Density and velocity of the hair as Woodhouse's faster version draws them (4.2.4): a point per particle. Position
 // and velocity component by component.
 layout(std430, binding = 0) readonly buffer StateBlock { float value[]; } b_state;   // (6 x particles)
 uniform uint u_particles;

@@ -1,4 +1,4 @@
-// The voxel stages of document 003 (4.2.4), which Strandcast does not have, as its two versions did them:
+// The voxel stages of Woodhouse 2017 (4.2.4), which Strandcast does not have, as its two versions did them:
 // density and mean velocity of the hair per voxel, and friction towards that mean. `naive`: sums in a buffer
 // by atomic additions in 16.16 fixed point, one invocation per group. `optimised`: points drawn into the
 // layers of a texture, summed by blending. GL context's thread.
@@ -19,7 +19,7 @@ struct VoxelTimes {
 
 class VoxelStages {
  public:
-  /// Along each side: as many as take the 250,000 bytes of 003, section 5.1.
+  /// Along each side: as many as take the 250,000 bytes of Woodhouse 2017, 5.1.
   static constexpr uint32_t kVoxels = 25;
   static constexpr uint64_t kBytes = 16ull * kVoxels * kVoxels * kVoxels;
 

@@ -1,5 +1,5 @@
 // Serial Dynamic Follow-The-Leader: one pass from root to tip per strand, exact segment lengths.
-// Source: document 003, sections 2.1.4 (projection and velocity correction) and 4.2.3 (gpu version,
+// Source: Woodhouse 2017, sections 2.1.4 (projection and velocity correction) and 4.2.3 (gpu version,
 // colliders).
 #pragma once
 

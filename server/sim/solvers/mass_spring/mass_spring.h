@@ -1,9 +1,9 @@
-// mass_spring: point masses joined by springs, forces and units of physics (000 section 2.2.1; 002
-// sections 3.1 and 3.2; 003 sections 2.1.1 and 2.1.2; Selle, Lentine, Fedkiw, A Mass Spring Model for Hair
+// mass_spring: point masses joined by springs, forces and units of physics (Zappe 2020, 2.2.1; Sams 2014
+// sections 3.1 and 3.2; Woodhouse 2017, 2.1.1 and 2.1.2; Selle, Lentine, Fedkiw, A Mass Spring Model for Hair
 // Simulation, SIGGRAPH 2008, sections 3 and 4). With e_i the edge before vertex i, l_i its rest length, L_i =
 // max(l_i, shortest segment), t_i its direction:
 //   mass      density (L_i + L_(i+1)) / 2 per vertex, half a segment's at the tip
-//   stretch   k / 2 (|e_i| - l_i)^2 with a damper c along the spring; 002's damper takes the whole relative
+//   stretch   k / 2 (|e_i| - l_i)^2 with a damper c along the spring; Sams's damper takes the whole relative
 //             velocity and so brakes a strand that only turns
 //   bend      angular spring K / 2 |s_i t_i - s_(i-1) u_i|^2 per joint, s_i t_i = e_i / L_i + (1 - l_i /
 //             L_i) t_i: the angle to the rest shape as its chord 2 sin(angle / 2), within 1 % up to 0.49 rad.
@@ -19,7 +19,7 @@
 // take a vertex, s = 1 + h (drag + h pull),
 //   0 symplectic Euler   v' = v_p + h f(x) / (m s),  x' = x + h v'
 //   1 Verlet             the same with f at x + h v / 2 and x' = x + h (v + v') / 2: the points where f is
-//                        taken obey 002's x(t + h) = 2 x(t) - x(t - h) + a h^2
+//                        taken obey Sams's x(t + h) = 2 x(t) - x(t - h) + a h^2
 //   2 backward Euler     m s (x' - p) = h^2 f(x'), by Newton's method from the unchanged motion,
 //                        with the lengths that the springs have; springs under pressure without their
 //                        negative stiffness, so that the matrix stays positive

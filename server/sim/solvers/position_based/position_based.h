@@ -4,13 +4,13 @@
 // by this only to second order, a bent one to first.
 //
 // Both: x = x_predicted, then per constraint C with gradient along the line between the two vertices
-//   pbd    dx = -w / (w_a + w_b) k' C,  k' = 1 - (1 - k)^(1 / iterations)  (003 equation 2.1; Mueller et al.
+//   pbd    dx = -w / (w_a + w_b) k' C,  k' = 1 - (1 - k)^(1 / iterations)  (Woodhouse, 2.1; Mueller et al.
 //          2007, equations 10, 11 and section 3.3)
 //   xpbd   dlambda = (-C - a lambda) / (w_a + w_b + a),  a = compliance / h^2,  dx = w dlambda
 //          (Macklin, Mueller, Chentanez 2016, equations 17 and 18)
 //   tractrix_hybrid  xpbd with tractrix sweeps: each vertex follows the one before it, which the sweep has
 //   just
-//          moved, and the segment between them gets its length. 000 chapter 6 asks whether that saves
+//          moved, and the segment between them gets its length. Zappe 2020 chapter 6 asks whether that saves
 //          iterations: tests/property/tractrix_test.cpp answers. After the iterations they finish the lengths
 //          exactly, outside of the velocity (within it they would drive the strand); before them they are a
 //          first guess, which misleads: the constraints are then met, but not where the masses want it.

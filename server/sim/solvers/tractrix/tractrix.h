@@ -4,13 +4,13 @@
 //   tractrix_emulation  every vertex in turn goes where its forces take it and drags those on both sides
 //                       along; then the root is pulled back to the head and the strand follows. Velocities
 //                       are the ways made in the step, so that they have in them what the vertices did to
-//                       each other. 000 section 3.0.1, algorithm 3.
+//                       each other. Zappe 2020, 3.0.1, algorithm 3.
 //   tractrix_split      only the last free vertex has forces and drags the strand, which is pulled back to
 //   its
 //                       root; the strand that is shown has each segment turned from there towards the groomed
 //                       one by a share of the angle. The leader's velocity is the way left after the pull
-//                       back. 000 section 3.0.2, algorithm 4.
-// Source: document 000. Deviations: forces, pull to the groomed shape, colliders and the velocity correction
+//                       back. Zappe 2020, 3.0.2, algorithm 4.
+// Source: Zappe 2020. Deviations: forces, pull to the groomed shape, colliders and the velocity correction
 // are those of the other models (predict(), place() and finish_velocity() of
 // server/sim/reference_strands.h); colliders and a pinned tip act while the strand is pulled back, so that
 // what they move drags the rest along; all strands have the same order.

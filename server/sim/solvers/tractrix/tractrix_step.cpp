@@ -14,8 +14,8 @@ constexpr uint32_t kRounds = 3;
 
 }  // namespace
 
-// 000 section 2.2.3, steps 1 to 9, with one change. The curve with its parameter p along the way, in units of
-// the segment: tail = (-tanh p, sech p) seen from the head, and p grows by the way. 000 finds p from
+// Zappe 2020, 2.2.3, steps 1 to 9, with one change. The curve with its parameter p along the way, in units of
+// the segment: tail = (-tanh p, sech p) seen from the head, and p grows by the way. Zappe finds p from
 // y = sech p, which has two answers and none that is good near y = 1; the tangent of the angle, sinh p, has
 // one everywhere.
 glm::dvec3 tractrix_followed(const glm::dvec3& head_before, const glm::dvec3& head, const glm::dvec3& tail,
