@@ -16,7 +16,7 @@ enum class ExportRole {
 };
 
 struct ExportOptions {
-  std::filesystem::path path;  // .usda, .abc, .ply or .csv
+  std::filesystem::path path;  // .usda, .usdc, .usdz, .abc, .ply or .csv
   double fps = 30.0;           // frames per second
   ExportUnit unit = ExportUnit::Centimetre;
   ExportUp up = ExportUp::Y;
