@@ -54,9 +54,10 @@ void print_export(const ExportReport& report) {
 }
 
 void declare_export(CLI::App& app, ExportCommand& command) {
-  app.add_option("paths", command.paths,
-                 "[RECORDING.mcap] OUT.usda, OUT.abc, OUT.ply or OUT.csv: what was recorded, or what the "
-                 "server sends from now on; a file of the second name is replaced")
+  app.add_option(
+         "paths", command.paths,
+         "[RECORDING.mcap] OUT.usda, .usdc, .usdz, .abc, .ply or .csv: what was recorded, or what the "
+         "server sends from now on; a file of the second name is replaced")
       ->required()
       ->expected(1, 2);
   declare_export_options(app, command);
@@ -81,8 +82,7 @@ void declare_export_options(CLI::App& app, ExportCommand& command) {
   app.add_flag(
       "--drawn", command.is_drawn,
       "Strands as viewers draw them, with followers, style and taper, instead of the simulated ones");
-  app.add_flag("--head", command.has_head,
-               "The head, too, as a mesh with its neck at rest (.usda, .abc, .ply)");
+  app.add_flag("--head", command.has_head, "The head, too, as a mesh with its neck at rest; not for .csv");
   const auto seconds = without_nan(CLI::Range(0.0, kMostSeconds));
   app.add_option("--from", command.from_s, "Begin so many seconds after the first state")->check(seconds);
   app.add_option("--to", command.to_s, "End so many seconds after the first state")->check(seconds);

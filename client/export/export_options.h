@@ -19,7 +19,7 @@ enum class ExportRole {
 };
 
 struct ExportOptions {
-  std::filesystem::path path;  // .usda, .abc, .ply or .csv
+  std::filesystem::path path;  // .usda, .usdc, .usdz, .abc, .ply or .csv
   FrameRate fps;
   ExportUnit unit = ExportUnit::Centimetre;
   ExportUp up = ExportUp::Y;

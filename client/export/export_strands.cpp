@@ -23,6 +23,7 @@ std::string extension_of(const std::filesystem::path& path) {
 
 MakeWriter writer_for(const std::string& extension) {
   if (extension == ".usda") return make_usda_writer;
+  if (extension == ".usdc" || extension == ".usdz") return make_usdc_writer;
   if (extension == ".abc") return make_abc_writer;
   if (extension == ".ply") return make_ply_writer;
   if (extension == ".csv") return make_csv_writer;
@@ -144,13 +145,11 @@ Status check_export(const ExportOptions& options) {
   const auto fail = [&](ErrorCode code, std::string_view sentence) {
     return at(options.path.string(), make_error(code, "{}", sentence));
   };
-  if (extension == ".usdc" || extension == ".usd" || extension == ".usdz")
-    return fail(ErrorCode::Unsupported,
-                "USD is written as text: export .usda ('usdcat out.usda -o out.usdc' makes it binary)");
   if (writer_for(extension) == nullptr)
-    return fail(ErrorCode::BadInput, "the extension says the format; known are .usda, .abc, .ply and .csv");
+    return fail(ErrorCode::BadInput,
+                "the extension says the format; known are .usda, .usdc, .usdz, .abc, .ply and .csv");
   if (options.has_head && extension == ".csv")
-    return fail(ErrorCode::BadInput, "a table has no head: leave --head out, or export .usda, .abc or .ply");
+    return fail(ErrorCode::BadInput, "a table has no head: leave --head out, or export USD, .abc or .ply");
   if (!std::isfinite(options.from_s) || options.from_s < 0.0)
     return make_error(ErrorCode::BadInput, "the beginning is {} s, it has to be 0 or later", options.from_s);
   if (options.to_s && !(*options.to_s >= options.from_s))

@@ -7,6 +7,7 @@
 #include <glm/glm.hpp>
 #include <memory>
 #include <span>
+#include <string>
 
 #include "client/export/export_options.h"
 #include "client/export/strand_set.h"
@@ -36,10 +37,16 @@ class StrandWriter {
   virtual Result<WrittenBytes> finish() = 0;
 };
 
+/// What both forms of USD say: of Unreal's groom conventions, and what the file holds.
+inline constexpr int kUsdGroomMajor = 1, kUsdGroomMinor = 5;
+std::string usd_description(const ExportOptions& options, const StrandSet& strands);
+
 /// Make the writer of each format; the rest shape is written as frame 0. `strands` must outlive them.
 Result<std::unique_ptr<StrandWriter>> make_abc_writer(const ExportOptions& options, const StrandSet& strands);
 Result<std::unique_ptr<StrandWriter>> make_usda_writer(const ExportOptions& options,
                                                        const StrandSet& strands);
+Result<std::unique_ptr<StrandWriter>> make_usdc_writer(const ExportOptions& options,
+                                                       const StrandSet& strands);  // .usdz, too
 Result<std::unique_ptr<StrandWriter>> make_ply_writer(const ExportOptions& options, const StrandSet& strands);
 Result<std::unique_ptr<StrandWriter>> make_csv_writer(const ExportOptions& options, const StrandSet& strands);
 

@@ -17,7 +17,6 @@ namespace {
 
 constexpr size_t kPointsPerPiece = 4'096;
 constexpr size_t kMostPointChars = 3 * kMostDecimalChars + 8;  // "(x, y, z), "
-constexpr int kGroomVersionMajor = 1, kGroomVersionMinor = 5;  // of Unreal's groom conventions
 
 /// Decimals of a coordinate: steps of kExportStepM.
 int decimals_of(ExportUnit unit) {
@@ -71,11 +70,7 @@ class UsdaWriter : public StrandWriter {
   std::string layer_text() {
     std::string text = "#usda 1.0\n(\n";
     text += "    defaultPrim = \"Hair\"\n";
-    text += fmt::format(
-        "    doc = \"{} strands of {} vertices, root first, in {}. Time code 0 is the rest shape, the motion "
-        "begins at 1.\"\n",
-        strands_.strand_count(), strands_.vertex_count(),
-        options_.space == ExportSpace::Head ? "the head's own space" : "the world");
+    text += fmt::format("    doc = \"{}\"\n", usd_description(options_, strands_));
     text += fmt::format("    metersPerUnit = {}\n", metres_of(options_.unit));
     text += fmt::format("    upAxis = \"{}\"\n", options_.up == ExportUp::Y ? 'Y' : 'Z');
     text += "    startTimeCode = 1\n    endTimeCode = ";
@@ -98,8 +93,8 @@ class UsdaWriter : public StrandWriter {
         fmt::format("        int[] curveVertexCounts = [{}]\n", fmt::join(strands_.vertex_counts(), ", "));
     text += fmt::format("        float[] widths = [{:.6g}]", fmt::join(strands_.widths(), ", ")) +
             " (\n            interpolation = \"vertex\"\n        )\n";
-    text += fmt::format("        custom int userProperties:groom_version_major = {}\n", kGroomVersionMajor);
-    text += fmt::format("        custom int userProperties:groom_version_minor = {}\n", kGroomVersionMinor);
+    text += fmt::format("        custom int userProperties:groom_version_major = {}\n", kUsdGroomMajor);
+    text += fmt::format("        custom int userProperties:groom_version_minor = {}\n", kUsdGroomMinor);
     const std::string uniform = " (\n            interpolation = \"uniform\"\n        )\n";
     text += "        int[] primvars:groom_guide = " + repeated(is_guide ? "1" : "0") + uniform;
     text += "        int[] primvars:groom_group_id = " + repeated("0") + uniform;
@@ -206,6 +201,13 @@ class UsdaWriter : public StrandWriter {
 };
 
 }  // namespace
+
+std::string usd_description(const ExportOptions& options, const StrandSet& strands) {
+  return fmt::format(
+      "{} strands of {} vertices, root first, in {}. Time code 0 is the rest shape, the motion begins at 1.",
+      strands.strand_count(), strands.vertex_count(),
+      options.space == ExportSpace::Head ? "the head's own space" : "the world");
+}
 
 Result<std::unique_ptr<StrandWriter>> make_usda_writer(const ExportOptions& options,
                                                        const StrandSet& strands) {

@@ -20,7 +20,7 @@ namespace strandcast {
 
 inline constexpr size_t kMaxUsdcItems = 4'000'000;  // tokens, strings, fields, field sets, paths or specs
 inline constexpr size_t kMaxUsdcTokenBytes = 64u << 20;
-inline constexpr size_t kMaxUsdcFields = 256;  // of one spec
+inline constexpr size_t kMaxUsdcFields = 64;  // of one spec
 
 struct UsdcPath {
   uint32_t parent = 0;

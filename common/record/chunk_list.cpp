@@ -5,7 +5,7 @@
 #include <cstring>
 #include <utility>
 
-#include "common/record/crc32.h"
+#include "common/base/crc32.h"
 #include "common/record/recording_layout.h"
 #include "common/strands/byte_io.h"
 #include "common/strands/zstd_block.h"

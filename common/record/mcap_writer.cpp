@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "common/base/check.h"
-#include "common/record/crc32.h"
+#include "common/base/crc32.h"
 
 namespace strandcast::mcap {
 

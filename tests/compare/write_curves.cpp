@@ -1,5 +1,5 @@
-// Writes the same made-up strands in motion as FOLDER/hair.usda and FOLDER/hair.csv, so that another program
-// can compare the two.
+// Writes the same made-up strands in motion as FOLDER/hair.usda, .usdc, .usdz and .csv, so that another
+// program can compare them.
 #include <cmath>
 #include <cstdio>
 
@@ -54,7 +54,7 @@ class MadeStates : public ExportSource {
 };
 
 int write(const std::filesystem::path& folder) {
-  for (const char* const name : {"hair.usda", "hair.csv"}) {
+  for (const char* const name : {"hair.usda", "hair.usdc", "hair.usdz", "hair.csv"}) {
     MadeStates states;
     ExportOptions options;
     options.path = folder / name;

@@ -32,7 +32,7 @@ WORDS = {
     "kMaxClipBytes": "2 GiB", "kMaxUpgradeAnswerBytes": "16 KiB", "kMaxHttpAnswerHeaderBytes": "16 KiB",
     "kMaxHttpBodyBytes": "1 MiB", "kMaxOutstandingPings": "32", "kClockWindow": "100", "kStageWindow": "512", "kMaxForeignLinesPerS": "20",
     "kMaxGroomReadBytes": "512 MiB", "kMaxAbcObjects": "100,000", "kMaxAbcDepth": "2,000", "kMaxUsdPrims": "100,000", "kMaxUsdDepth": "64",
-    "kMaxUsdXformOps": "32", "kMaxUsdcItems": "4,000,000", "kMaxUsdcTokenBytes": "64 MiB", "kMaxUsdcFields": "256", "connections_per_s": "10 a second", "requests_per_s": "50 a second", "wrong_tokens": "5", "guarded_addresses": "1,024",
+    "kMaxUsdXformOps": "32", "kMaxUsdcItems": "4,000,000", "kMaxUsdcTokenBytes": "64 MiB", "kMaxUsdcFields": "64", "connections_per_s": "10 a second", "requests_per_s": "50 a second", "wrong_tokens": "5", "guarded_addresses": "1,024",
     "handshake_ms": "5 s", "messages_per_s": "1,000 a second", "stalled_ms": "4.5 s", "idle_ms": "15 s",
     "refusal_lines_per_address": "10 of one address", "refusal_lines": "300 of all", "session_lines": "1,200"}
 # Said in words, or of another constant; the value alone stands here.

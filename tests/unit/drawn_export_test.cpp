@@ -16,6 +16,7 @@
 #include "common/render/drawn_strands.h"
 #include "common/render/tiles/tile_renderer.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/usdc_found.h"
 
 namespace strandcast::drawn_export_test {
 namespace {
@@ -105,6 +106,7 @@ TEST_F(DrawnExport, HasTheStrandsOfAPictureInEveryFormat) {
     options_.has_head = has_head;
     expect_strands(load_usd(written("hair.usda"))->groom, 2e-6);
     EXPECT_EQ(report_.strand_count, expected_.strand_count());
+    expect_strands(load_usd(written("hair.usdz"))->groom, 1e-6);
     expect_strands(load_abc(written("hair.abc"))->groom, 1e-6);
     options_.is_one_frame = true;
     expect_strands(load_ply(written("hair.ply"), 0)->groom, 2e-6);
@@ -170,6 +172,20 @@ TEST_F(DrawnExport, TheHeadIsThatOfTheSceneOnItsPose) {
     EXPECT_THAT(usda, HasSubstr("def Mesh \"Head\""));
     const glm::uvec3 first = head.triangle.front();
     EXPECT_THAT(usda, HasSubstr(fmt::format("faceVertexIndices = [{}, {}, {}, ", first.x, first.y, first.z)));
+    const test::UsdcFound usdc(written("hair.usdc"));
+    const auto usdc_corners = *usdc.archive.ints(usdc.get("Head", "faceVertexIndices"), 1 << 20);
+    ASSERT_EQ(usdc_corners.size(), corners.size());
+    for (size_t i = 0; i < corners.size(); ++i)  // from the other end: the faces' order does not change
+      EXPECT_EQ(static_cast<uint32_t>(usdc_corners[3 * (i / 3) + 2 - i % 3]), corners[i]);
+    const auto moving = usdc.find("Head", "points", "timeSamples");
+    EXPECT_EQ(moving.has_value(), space == ExportSpace::World);
+    const UsdcValue usdc_points =
+        moving ? (*usdc.archive.sample(*moving, 1))->value : usdc.get("Head", "points");
+    const auto placed = *usdc.archive.points(usdc_points, 1 << 20);
+    ASSERT_EQ(placed.size(), points.size());
+    for (size_t i = 0; i < points.size(); ++i)
+      EXPECT_LT(glm::distance(glm::dvec3(placed[i]), pose * glm::dvec3(head.position_m[i])), 1e-6)
+          << i;
   }
   options_.is_one_frame = true;
   EXPECT_THAT(*load_text(written("hair.ply"), 1 << 26),
@@ -180,6 +196,7 @@ TEST_F(DrawnExport, TheHeadIsThatOfTheSceneOnItsPose) {
 TEST_F(DrawnExport, WithoutTheOptionThereIsNoHead) {
   EXPECT_TRUE(abc_mesh(written("hair.abc"), 0).first.empty());
   EXPECT_EQ(load_text(written("hair.usda"), 1 << 26)->find("Mesh"), std::string::npos);
+  EXPECT_FALSE(test::UsdcFound(written("hair.usdc")).find("Head", "", "specifier"));
   options_.has_head = true;
   options_.path = "a.csv";
   EXPECT_THAT(check_export(options_).error().to_string(), HasSubstr("leave --head out"));

@@ -6,11 +6,14 @@
 #include "client/export/frame_sampler.h"
 #include "client/export/number_text.h"
 #include "client/export/strand_writer.h"
+#include "common/base/crc32.h"
 #include "common/base/file.h"
 #include "common/groom/abc_curves.h"
 #include "common/groom/abc_tree.h"
 #include "common/groom/groom_file.h"
+#include "common/groom/usd_stage.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/usdc_found.h"
 
 namespace strandcast::export_test {
 namespace {
@@ -21,7 +24,7 @@ using ::testing::HasSubstr;
 
 constexpr uint32_t kStrands = 7, kVertices = 5;
 constexpr float kQuantumM = 1e-5f;
-constexpr double kReimportM = 1e-5, kAbcReimportM = 1e-6;
+constexpr double kReimportM = 1e-5, kBinaryReimportM = 1e-6;
 constexpr int64_t kStepNs = 16'666'667;
 
 /// Hair that hangs from a ring and swings as cubics of time do, on a head that walks and turns.
@@ -158,13 +161,13 @@ TEST(FrameSampler, ARangeIsKeptAndTimeThatBeginsAnewEndsIt) {
 
 TEST(Export, EveryFormatUnitAxisAndSpaceComesBackWithinTheBound) {
   const TemporaryFolder folder;
-  for (const char* const extension : {".usda", ".abc", ".ply"}) {
+  for (const std::string extension : {".usda", ".usdc", ".usdz", ".abc", ".ply"}) {
     for (const ExportUnit unit : {ExportUnit::Centimetre, ExportUnit::Metre}) {
       for (const ExportUp up : {ExportUp::Y, ExportUp::Z}) {
         for (const ExportSpace space : {ExportSpace::Head, ExportSpace::World}) {
           MadeStates states(30);
           ExportOptions options;
-          options.path = folder.path() / (std::string("hair") + extension);
+          options.path = folder.path() / ("hair" + extension);
           options.unit = unit;
           options.up = up;
           options.space = space;
@@ -177,8 +180,8 @@ TEST(Export, EveryFormatUnitAxisAndSpaceComesBackWithinTheBound) {
           ASSERT_EQ(groom.strand_count(), kStrands);
           ASSERT_EQ(groom.uniform_vertex_count(), kVertices);
           // What USD and Alembic have first is the rest shape, on the head of the first frame.
-          const bool is_rest = options.path.extension() != ".ply";
-          const double bound_m = options.path.extension() == ".abc" ? kAbcReimportM : kReimportM;
+          const bool is_rest = extension != ".ply";
+          const double bound_m = extension == ".usda" || extension == ".ply" ? kReimportM : kBinaryReimportM;
           const Pose pose = space == ExportSpace::World ? pose_of(0.2) : Pose{};
           for (uint32_t strand = 0; strand < kStrands; ++strand) {
             for (uint32_t vertex = 0; vertex < kVertices; ++vertex) {
@@ -372,10 +375,149 @@ TEST(Export, AbcSamplesAreTheFramesWithinAMicrometre) {
       ASSERT_TRUE(curves) << curves.error().to_string();
       EXPECT_EQ(curves->vertex_counts, std::vector<uint32_t>(kStrands, kVertices));
       for (size_t i = 0; i < expected.size(); ++i)
-        EXPECT_LT(glm::distance(glm::dvec3(curves->points[i]), expected[i]) * metres_of(unit), kAbcReimportM);
+        EXPECT_LT(glm::distance(glm::dvec3(curves->points[i]), expected[i]) * metres_of(unit),
+                  kBinaryReimportM);
     };
     expect_sample(0, strands.rest_points());
     for (; frame; frame = sampler.next()) expect_sample(frame->index + 1, strands.points(frame->strands));
+  }
+}
+
+TEST(Export, UsdcSamplesAreTheFramesWithinAMicrometre) {
+  const TemporaryFolder folder;
+  for (const ExportUnit unit : {ExportUnit::Centimetre, ExportUnit::Metre}) {
+    MadeStates states(61);
+    ExportOptions options;
+    options.path = folder.path() / "hair.usdc";
+    options.unit = unit;
+    options.space = ExportSpace::World;
+    options.fps = 24;
+    const ExportReport report = exported(states, options);
+    EXPECT_EQ(report.frame_count, 25u);
+    EXPECT_EQ(report.bytes, std::filesystem::file_size(options.path));
+    FrameSampler sampler({24.0, 0.0, {}}, StrandFill());
+    for (const auto& state : states.states_) sampler.add(state);
+    sampler.finish();
+    std::optional<SampledFrame> frame = sampler.next();
+    const StrandSet strands(states.scene(), options, frame->strands);
+    const test::UsdcFound found(options.path);
+    const UsdcValue samples = found.get("Strands", "points", "timeSamples");
+    const UsdcValue boxes = found.get("Strands", "extent", "timeSamples");
+    const auto expect_sample = [&](uint64_t sample, const std::vector<glm::dvec3>& expected) {
+      const auto kept = *found.archive.sample(samples, sample);
+      ASSERT_TRUE(kept);
+      EXPECT_EQ(kept->time, static_cast<double>(sample));
+      const auto points = *found.archive.points(kept->value, kMaxGroomVertices);
+      ASSERT_EQ(points.size(), expected.size());
+      const auto box = *found.archive.points((*found.archive.sample(boxes, sample))->value, 2);
+      const double room = 0.5 * 0.0004 / metres_of(unit) + 1e-4;  // strands of 0.4 mm
+      for (size_t i = 0; i < expected.size(); ++i) {
+        EXPECT_LT(glm::distance(glm::dvec3(points[i]), expected[i]) * metres_of(unit), kBinaryReimportM);
+        EXPECT_TRUE(glm::all(glm::lessThanEqual(box[0], points[i])) &&
+                    glm::all(glm::lessThanEqual(points[i], box[1])));
+      }
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto [low, high] = std::minmax_element(
+            points.begin(), points.end(), [&](const auto& a, const auto& b) { return a[axis] < b[axis]; });
+        EXPECT_NEAR(box[0][axis], (*low)[axis] - room, room);
+        EXPECT_NEAR(box[1][axis], (*high)[axis] + room, room);
+      }
+    };
+    expect_sample(0, strands.rest_points());
+    for (; frame; frame = sampler.next()) expect_sample(frame->index + 1, strands.points(frame->strands));
+    EXPECT_FALSE(*found.archive.sample(samples, 26));
+  }
+}
+
+TEST(Export, UsdcSaysWhatUsdaSays) {
+  const TemporaryFolder folder;
+  ExportOptions options;
+  options.fps = 25;
+  options.up = ExportUp::Z;
+  options.role = ExportRole::Guides;
+  for (const char* const name : {"hair.usda", "hair.usdc"}) {
+    MadeStates states(61);
+    options.path = folder.path() / name;
+    exported(states, options);
+  }
+  const std::string text = *load_text(folder.path() / "hair.usda", 1 << 24);
+  const auto written = read_usda_stage(text);
+  const auto read = read_usdc_stage(*GroomSource::open(options.path));
+  ASSERT_TRUE(read) << read.error().to_string();
+  EXPECT_EQ(read->meters_per_unit, written->meters_per_unit);
+  EXPECT_EQ(read->is_z_up, written->is_z_up);
+  ASSERT_EQ(read->prim.size(), written->prim.size());
+  for (size_t i = 0; i < read->prim.size(); ++i) EXPECT_EQ(read->prim[i].name, written->prim[i].name);
+  const UsdCurves &curves = *read->prim[1].curves, &expected = *written->prim[1].curves;
+  EXPECT_EQ(curves.vertex_counts, expected.vertex_counts);
+  EXPECT_EQ(curves.type, expected.type);
+  EXPECT_EQ(curves.wrap, expected.wrap);
+  ASSERT_EQ(curves.widths.size(), expected.widths.size());
+  for (size_t i = 0; i < curves.widths.size(); ++i) EXPECT_NEAR(curves.widths[i], expected.widths[i], 1e-7);
+
+  const test::UsdcFound found(options.path);
+  const auto word = [&](const char* prim, const char* property, const char* field = "default") {
+    return *found.archive.text(found.get(prim, property, field));
+  };
+  const auto number = [&](const char* prim, const char* property, const char* field = "default") {
+    return found.archive.numbers(found.get(prim, property, field))->at(0);
+  };
+  EXPECT_EQ(word("", "", "defaultPrim"), "Hair");
+  EXPECT_THAT(text, HasSubstr(fmt::format("doc = \"{}\"", word("", "", "documentation"))));
+  EXPECT_EQ(number("", "", "startTimeCode"), 1.0);
+  EXPECT_EQ(number("", "", "endTimeCode"), 26.0);
+  EXPECT_EQ(number("", "", "timeCodesPerSecond"), 25.0);
+  EXPECT_EQ(number("", "", "framesPerSecond"), 25.0);
+  EXPECT_EQ(word("Hair", "", "kind"), "component");
+  EXPECT_EQ(number("Strands", "userProperties:groom_version_major"), 1.0);
+  EXPECT_EQ(number("Strands", "userProperties:groom_version_minor"), 5.0);
+  EXPECT_EQ(word("Strands", "widths", "interpolation"), "vertex");
+  EXPECT_EQ(word("Strands", "primvars:groom_root_uv", "interpolation"), "uniform");
+  EXPECT_EQ(*found.archive.ints(found.get("Strands", "primvars:groom_guide"), kStrands),
+            std::vector<int32_t>(kStrands, 1));
+  EXPECT_EQ(*found.archive.ints(found.get("Strands", "primvars:groom_group_id"), kStrands),
+            std::vector<int32_t>(kStrands, 0));
+  // Every property of the text is in the binary form with the same type.
+  for (const char* const typed :
+       {"token type", "token wrap", "int[] curveVertexCounts", "float[] widths", "int[] primvars:groom_guide",
+        "texCoord2f[] primvars:groom_root_uv", "point3f[] points", "float3[] extent"}) {
+    EXPECT_THAT(text, HasSubstr(fmt::format("{} = ", typed)));
+    const std::string_view both = typed;
+    const size_t space = both.find(' ');
+    EXPECT_EQ(word("Strands", std::string(both.substr(space + 1)).c_str(), "typeName"),
+              both.substr(0, space));
+  }
+}
+
+TEST(Export, UsdzIsAPackageOfOneStoredFile) {
+  const TemporaryFolder folder;
+  ExportOptions options;
+  std::string alone;
+  for (const char* const name : {"hair.usdc", "hair.usdz"}) {
+    MadeStates states(10);
+    options.path = folder.path() / name;
+    const ExportReport report = exported(states, options);
+    EXPECT_EQ(report.bytes, std::filesystem::file_size(options.path));
+    if (alone.empty()) alone = *load_text(options.path, 1 << 24);
+  }
+  const std::string zip = *load_text(options.path, 1 << 24);
+  // APPNOTE 4.3.7 and 4.3.12: checksum and both sizes, before the member and in the list.
+  const size_t begin = zip.find("PXR-USDC"), list = zip.rfind("PK\1\2");
+  EXPECT_EQ(begin % 64, 0u) << "as usdz asks for";
+  EXPECT_EQ(zip.substr(begin, alone.size()), alone);
+  EXPECT_EQ(list, begin + alone.size());
+  const auto size = static_cast<uint32_t>(alone.size());
+  const uint32_t numbers[] = {crc32(std::as_bytes(std::span(alone))), size, size};
+  const std::string_view expected(reinterpret_cast<const char*>(numbers), sizeof(numbers));
+  EXPECT_EQ(zip.substr(14, expected.size()), expected);
+  EXPECT_EQ(zip.substr(list + 16, expected.size()), expected);
+  EXPECT_EQ(zip.substr(30, 9), "hair.usdc");
+  EXPECT_EQ(zip.substr(zip.size() - 22, 4), "PK\5\6");
+  // Cut off anywhere it is no file.
+  for (size_t bytes = 0; bytes < begin + alone.size(); bytes += 97) {
+    GroomFileOptions import;
+    import.path = folder.write("cut.usdz", zip.substr(0, bytes));
+    EXPECT_FALSE(load_groom(import)) << bytes;
   }
 }
 
@@ -413,21 +555,25 @@ TEST(Export, AbcSaysWhatUnrealAsksOfAGroom) {
   }
 }
 
-TEST(Export, AbcFramesOfHairThatStandsStillTakeNoSpace) {
+TEST(Export, FramesOfHairThatStandsStillTakeNoSpace) {
   const TemporaryFolder folder;
-  const auto bytes_of = [&](size_t count, bool moves) {
+  const auto bytes_of = [&](const std::string& name, size_t count, bool moves) {
     MadeStates states(0);
     for (size_t i = 0; i < count; ++i) {
       const auto time_ns = static_cast<int64_t>(i) * kStepNs;
       states.states_.push_back(state_at(time_ns, positions_at(moves ? static_cast<double>(i) : 0.0)));
     }
     ExportOptions options;
-    options.path = folder.path() / "hair.abc";
+    options.path = folder.path() / name;
     return exported(states, options).bytes;
   };
   constexpr uint64_t kFrameBytes = kStrands * kVertices * 3 * sizeof(float);
-  EXPECT_LT(bytes_of(61, false), bytes_of(3, false) + kFrameBytes);
-  EXPECT_GT(bytes_of(61, true), bytes_of(3, true) + 28 * kFrameBytes) << "30 frames of motion against one";
+  constexpr uint64_t kTimesBytes = 29 * 4 * sizeof(double);  // USD states each frame's time and values
+  for (const std::string name : {"hair.abc", "hair.usdc"}) {
+    EXPECT_LT(bytes_of(name, 61, false), bytes_of(name, 3, false) + kFrameBytes + kTimesBytes) << name;
+    EXPECT_GT(bytes_of(name, 61, true), bytes_of(name, 3, true) + 28 * kFrameBytes)
+        << name << ": 30 frames of motion against one";
+  }
 }
 
 TEST(Export, PlySequencesAreNumberedFromTheRestShape) {
@@ -535,8 +681,9 @@ TEST(Export, WhatCannotBeWrittenIsToldTheWayOut) {
   EXPECT_EQ(refusal("a.usda"), "accepted");
   EXPECT_EQ(refusal("A.CSV"), "accepted");
   EXPECT_EQ(refusal("a.abc"), "accepted");
-  EXPECT_THAT(refusal("a.usdc"), HasSubstr("usdcat"));
-  EXPECT_THAT(refusal("a.obj"), HasSubstr("known are .usda, .abc, .ply and .csv"));
+  EXPECT_EQ(refusal("a.usdc"), "accepted");
+  EXPECT_EQ(refusal("a.UsdZ"), "accepted");
+  EXPECT_THAT(refusal("a.obj"), HasSubstr("known are .usda, .usdc, .usdz, .abc, .ply and .csv"));
   ExportOptions backwards;
   backwards.path = "a.usda";
   backwards.from_s = 2.0;

@@ -215,9 +215,11 @@ TEST(BrokenTfx, RandomHeadersNeverGiveAGroomLargerThanTheFile) {
 TEST(GroomFile, NamesTheKnownExtensionsAndWrongOptions) {
   const TemporaryFolder folder;
   const ByteFile file = small_v4();
-  EXPECT_THAT(refusal(folder, file, "groom.xyz"),
-              AllOf(HasSubstr("'.xyz'"), HasSubstr("known: .tfx, .hair, .ply, .usda, .abc")));
-  EXPECT_THAT(refusal(folder, file, "groom"), HasSubstr("known: .tfx, .hair, .ply, .usda, .abc"));
+  EXPECT_THAT(
+      refusal(folder, file, "groom.xyz"),
+      AllOf(HasSubstr("'.xyz'"), HasSubstr("known: .tfx, .hair, .ply, .usd, .usda, .usdc, .usdz, .abc")));
+  EXPECT_THAT(refusal(folder, file, "groom"),
+              HasSubstr("known: .tfx, .hair, .ply, .usd, .usda, .usdc, .usdz, .abc"));
   GroomFileOptions options;
   options.path = folder.path() / "missing.tfx";
   EXPECT_EQ(load_groom(options).error().code, ErrorCode::NotFound);

@@ -81,7 +81,7 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"client/web",
        with({"common/groom", "common/replay", "common/simd", "common/render", "common/scene"}, kStrands)},
       {"client/window", kAll},
-      {"client/export", with({"common/replay", "common/log"}, kStrands)},
+      {"client/export", with({"common/replay", "common/log", "common/groom"}, kStrands)},
       {"client/app", with({"client/net", "client/window", "client/export", "common/chaos", "common/client",
                            "common/page", "common/record"},
                           kAll)},

@@ -6,9 +6,9 @@
 #include <cstring>
 #include <random>
 
+#include "common/base/crc32.h"
 #include "common/base/file.h"
 #include "common/record/chunk_list.h"
-#include "common/record/crc32.h"
 #include "common/record/record_file.h"
 #include "common/record/recording_check.h"
 #include "common/record/recording_reader.h"
@@ -80,6 +80,10 @@ TEST(Crc32, IsThatOfZlib) {
   EXPECT_EQ(crc32(bytes_of(text)), 0x414FA339u);
   for (size_t cut = 0; cut <= text.size(); ++cut)
     EXPECT_EQ(crc32(bytes_of(text).subspan(cut), crc32(bytes_of(text).first(cut))), 0x414FA339u);
+  for (size_t cut = 0; cut <= text.size(); ++cut)
+    EXPECT_EQ(
+        joined_crc32(crc32(bytes_of(text).first(cut)), crc32(bytes_of(text).subspan(cut)), text.size() - cut),
+        0x414FA339u);
 }
 
 /// A second of a run: steps, states and inputs that have nothing in common, and deltas likewise.

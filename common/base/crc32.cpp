@@ -1,4 +1,4 @@
-#include "common/record/crc32.h"
+#include "common/base/crc32.h"
 
 #include <array>
 #include <cstring>
@@ -26,6 +26,16 @@ constexpr std::array<std::array<uint32_t, 256>, kSlices> make_tables() {
 
 constexpr auto kTables = make_tables();
 
+/// Product of two polynomials, highest coefficient last, modulo the CRC's.
+uint32_t product(uint32_t a, uint32_t b) {
+  uint32_t sum = 0;
+  for (; a != 0; a <<= 1) {
+    if ((a >> 31) != 0) sum ^= b;
+    b = (b >> 1) ^ ((b & 1u) != 0 ? kPolynomial : 0u);
+  }
+  return sum;
+}
+
 }  // namespace
 
 uint32_t crc32(std::span<const std::byte> bytes, uint32_t before) {
@@ -41,6 +51,15 @@ uint32_t crc32(std::span<const std::byte> bytes, uint32_t before) {
   for (; i < bytes.size(); ++i)
     crc = (crc >> 8) ^ kTables[0][(crc ^ static_cast<uint32_t>(bytes[i])) & 0xffu];
   return ~crc;
+}
+
+uint32_t joined_crc32(uint32_t first, uint32_t second, uint64_t second_bytes) {
+  uint32_t power = 1u << 23;  // x^8: what a byte more multiplies with
+  for (; second_bytes > 0; second_bytes >>= 1) {
+    if ((second_bytes & 1) != 0) first = product(first, power);
+    power = product(power, power);
+  }
+  return first ^ second;
 }
 
 }  // namespace strandcast
