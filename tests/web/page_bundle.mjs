@@ -88,7 +88,7 @@ await runAll({
     const tab = await open(page);
     const state = await tab.until((now) => now.wrong > 0, 'a refusal');
     assert.ok(state.states >= right, `${state.states} states, ${right} before the one that was changed`);
-    assert.match(state.rejected, /hash|needs frame/);
+    assert.match(state.rejected, /announced|needs frame/);
     assert.deepEqual([state.codec, state.error, tab.errors], ['step', '', []]);
     assert.deepEqual(tab.requests.filter(({ url }) => !/^(file|blob|data):/.test(url)), [], 'nothing is asked of any server');
     await tab.close();

@@ -21,7 +21,6 @@ using std::chrono::milliseconds;
 constexpr double kStartTimeoutS = 60.0;   // a large groom is loaded and its kernels are made
 constexpr double kAnswerTimeoutS = 30.0;  // a solver is made anew
 constexpr double kLastStateS = 2.0;       // for viewers, behind the last step
-constexpr double kStateS = 0.5;           // likewise behind the others
 constexpr int kMostMisses = 3;            // then a viewer is waited for no more
 constexpr double kSeenRateHz = 60.0;      // of the states that viewers see while it is stepped
 constexpr uint64_t kBlindChunk = 64;      // steps at once where nobody watches
@@ -217,8 +216,8 @@ Status ScenarioRun::carry_out(const ScenarioSteps& steps) {
     RETURN_IF_ERROR(step_chunk(tick_ + count));
     left -= count;
     const double waits_s = elapsed_s();
-    if (misses < kMostMisses) await_viewers(tick_, kStateS);
-    if (elapsed_s() - waits_s >= kStateS) ++misses;
+    if (misses < kMostMisses) await_viewers(tick_, options_.state_patience_s);
+    if (elapsed_s() - waits_s >= options_.state_patience_s) ++misses;
     trace();
   }
   await_viewers(tick_, kLastStateS);

@@ -25,6 +25,7 @@ struct ScenarioOptions {
   std::filesystem::path out;         // folder for what failed
   bool renews_goldens = false;       // pictures are written instead of compared
   const std::atomic<bool>* stop = nullptr;
+  double state_patience_s = 0.5;  // for viewers, behind steps that are not the last
 };
 
 /// Receives every check when it is done.

@@ -10,6 +10,7 @@ namespace strandcast {
 namespace {
 
 constexpr double kStartLimitS = 120.0;
+constexpr double kPatienceS = 60.0;        // with a machine that is busy: no state is left out
 constexpr double kLimitPerSecond = 120.0;  // a scene that is simulated so much slower than in real time
 
 bool is_scene_file(const std::filesystem::path& path) {
@@ -30,9 +31,10 @@ Result<Scenario> scenario_of(const SceneRecordingOptions& options, const std::fi
   ScenarioFeed feed;
   feed.motion = options.motion;
   feed.wind = options.wind;
-  // Steps wait for who sees them: the recording has them all.
+  // Steps wait for who sees them by the same codec: the recording has them all.
   ScenarioView view;
   view.name = "recording";
+  view.codec = scene.stream.codec;
   const double steps = std::max(1.0, std::ceil(options.seconds * scene.step_rate_hz));
   Scenario scenario;
   scenario.name = "recording";
@@ -47,8 +49,8 @@ Status record_scene(const SceneRecordingOptions& options, const std::filesystem:
                     const std::atomic<bool>& stop) {
   ASSIGN_OR_RETURN(const std::filesystem::path server, find_server_program(options.server));
   ASSIGN_OR_RETURN(const Scenario scenario, scenario_of(options, out));
-  const ScenarioResult result =
-      ScenarioRun(scenario, {{}, server, out.parent_path(), false, &stop}, [](const CheckResult&) {}).run();
+  const ScenarioOptions run{{}, server, out.parent_path(), false, &stop, kPatienceS};
+  const ScenarioResult result = ScenarioRun(scenario, run, [](const CheckResult&) {}).run();
   for (const CheckResult& check : result.checks)
     if (!check.has_passed) return make_error(ErrorCode::Unavailable, "{}", check.measured);
   return {};
