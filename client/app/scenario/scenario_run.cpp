@@ -7,12 +7,12 @@
 #include <thread>
 #include <utility>
 
-#include "client/net/datagram_sender.h"
 #include "client/net/http_get.h"
 #include "common/base/file.h"
 #include "common/base/hash.h"
 #include "common/base/text.h"
 #include "common/base/units.h"
+#include "common/client/datagram_sender.h"
 #include "common/scene/scenario_file.h"
 
 namespace strandcast {
