@@ -76,7 +76,7 @@ add_library(Strandcast::core ALIAS strandcast_core)
 
 # What a program needs that decodes a stream, and what these headers include.
 set(core_headers
-  base/profile.h base/result.h base/version.h base/worker_pool.h
+  base/frame_rate.h base/profile.h base/result.h base/timecode.h base/version.h base/worker_pool.h
   math/bust.h math/pose.h math/strand_guides.h
   replay/clock_offset.h replay/interpolation.h replay/playout_clock.h replay/position_blend.h replay/snapshot_timeline.h
   replay/state_blend.h replay/strand_fill.h replay/strand_replay.h

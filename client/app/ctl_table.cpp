@@ -7,6 +7,7 @@
 #include "client/app/script_command.h"
 #include "client/app/step_command.h"
 #include "common/base/command_line_error.h"
+#include "common/base/frame_rate.h"
 #include "common/motion/mocap_packet.h"
 
 namespace strandcast {
@@ -47,8 +48,9 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
          "--seconds", feed.seconds,
          "Stop after this long (default: at the end of the motion file; without one, or with --loop, never)")
       ->check(without_nan(CLI::Range(0.0, 1e6)));
-  app.add_option("--rate", feed.rate_hz, "Samples per second")
-      ->check(without_nan(CLI::Range(kMinFeedRateHz, kMaxDatagramRateHz)))
+  app.add_option("--rate", feed.rate_hz, "Samples per second, such as 120, 59.94 or 60000/1001")
+      ->transform(CLI::Validator(
+          [](std::string& text) { return make_frame_rate(text, kMinFeedRateHz, kMaxDatagramRateHz); }, ""))
       ->capture_default_str();
   app.add_option_function<std::vector<float>>(
          "--wind-mean",

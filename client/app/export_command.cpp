@@ -7,7 +7,6 @@
 
 #include "client/app/ctl_commands.h"
 #include "client/app/drawn_states.h"
-#include "client/app/frame_rate.h"
 #include "client/app/live_states.h"
 #include "client/app/recorded_states.h"
 #include "client/export/export_strands.h"
@@ -16,7 +15,6 @@
 namespace strandcast {
 namespace {
 
-constexpr double kUsualFps = 30.0;
 constexpr double kMostSeconds = 86'400.0;
 
 std::string size_text(uint64_t bytes) {
@@ -28,7 +26,7 @@ void print(const ExportOptions& options, const ExportReport& report) {
   const std::string frames = report.frame_count == 1
                                  ? fmt::format("the frame at {:.3f} s", report.first_s)
                                  : fmt::format("{} frames at {} fps from {:.3f} s on", report.frame_count,
-                                               frame_rate_text(options.fps), report.first_s);
+                                               frame_rate_text(options.fps.hz()), report.first_s);
   std::cout << fmt::format(
       "{} strands x {} vertices, {}, {} in {}{}\n", report.strand_count, report.vertex_count, frames,
       size_text(report.bytes),
@@ -62,8 +60,8 @@ void declare_export(CLI::App& app, ExportCommand& command) {
       ->required()
       ->expected(1, 2);
   app.add_option("--fps", command.fps, "Frames per second, such as 24, 23.976 or 24000/1001 (default: 30)")
-      ->transform(CLI::Validator(
-          [](std::string& text) { return make_frame_rate(text, kLeastFrameRate, kMostFrameRate); }, ""));
+      ->check(CLI::Validator(
+          [](std::string text) { return make_frame_rate(text, kLeastFrameRate, kMostFrameRate); }, ""));
   app.add_option("--units", command.unit, "Unit of the file")
       ->check(CLI::IsMember({"cm", "m"}))
       ->capture_default_str();
@@ -95,7 +93,9 @@ void declare_export(CLI::App& app, ExportCommand& command) {
 Result<ExportOptions> export_options(const ExportCommand& command) {
   ExportOptions options;
   options.path = command.paths.back();
-  options.fps = command.fps.value_or(kUsualFps);
+  if (command.fps) {
+    ASSIGN_OR_RETURN(options.fps, parse_frame_rate(*command.fps));
+  }
   options.unit = command.unit == "m" ? ExportUnit::Metre : ExportUnit::Centimetre;
   options.up = command.up == "z" ? ExportUp::Z : ExportUp::Y;
   options.space = command.space == "world" ? ExportSpace::World : ExportSpace::Head;

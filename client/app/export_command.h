@@ -17,7 +17,7 @@ namespace strandcast {
 
 struct ExportCommand {
   std::vector<std::string> paths;  // the file to write; before it a recording, instead of a server
-  std::optional<double> fps;
+  std::optional<std::string> fps;
   std::string unit = "cm";
   std::string up = "y";
   std::string space = "head";

@@ -5,8 +5,8 @@
 #include <optional>
 #include <utility>
 
-#include "client/app/frame_rate.h"
 #include "client/app/recording_player.h"
+#include "common/base/frame_rate.h"
 #include "common/log/progress.h"
 #include "common/pictures/webm_writer.h"
 #include "common/render/renderer.h"

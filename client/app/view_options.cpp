@@ -5,7 +5,7 @@
 #include <charconv>
 #include <iostream>
 
-#include "client/app/frame_rate.h"
+#include "common/base/frame_rate.h"
 #include "client/app/recording_film.h"
 #include "client/app/step_speed.h"
 #include "common/base/command_line_error.h"

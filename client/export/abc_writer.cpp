@@ -56,7 +56,7 @@ class AbcWriter : public StrandWriter {
         "schema=AbcGeom_Curve_v2;schemaBaseType=AbcGeom_GeomBase_v1;schemaObjTitle=AbcGeom_Curve_v2:.geom";
     RETURN_IF_ERROR(add_curves(curves));
     if (!strands_.head_triangles().empty()) RETURN_IF_ERROR(add_head(hair.items.emplace_back()));
-    const AbcEvenTimes moving{0.0, 1.0 / options_.fps};
+    const AbcEvenTimes moving{0.0, 1.0 / options_.fps.hz()};
     ASSIGN_OR_RETURN(const uint64_t bytes, file_.finish(top, description(), std::span(&moving, 1)));
     return WrittenBytes{1, bytes, options_.path};
   }
@@ -178,7 +178,7 @@ class AbcWriter : public StrandWriter {
     return fmt::format(
         "_ai_Application=Strandcast {};_ai_DCC_FPS={:.6f};_ai_Description={} strands of {} vertices, root "
         "first, in {}. Sample 0 is the rest shape, the motion begins at sample 1.;unit_m={};up_axis={}",
-        version(), options_.fps, strands_.strand_count(), strands_.vertex_count(),
+        version(), options_.fps.hz(), strands_.strand_count(), strands_.vertex_count(),
         options_.space == ExportSpace::Head ? "the head's own space" : "the world", metres_of(options_.unit),
         options_.up == ExportUp::Y ? 'Y' : 'Z');
   }

@@ -4,6 +4,9 @@
 #include <filesystem>
 #include <optional>
 
+#include "common/base/frame_rate.h"
+#include "common/base/timecode.h"
+
 namespace strandcast {
 
 enum class ExportUnit { Centimetre, Metre };
@@ -17,7 +20,7 @@ enum class ExportRole {
 
 struct ExportOptions {
   std::filesystem::path path;  // .usda, .abc, .ply or .csv
-  double fps = 30.0;           // frames per second
+  FrameRate fps;
   ExportUnit unit = ExportUnit::Centimetre;
   ExportUp up = ExportUp::Y;
   ExportSpace space = ExportSpace::Head;

@@ -39,7 +39,7 @@ class Export {
                  StrandFill(source.scene().asset->rest_position_m, source.scene().asset->vertex_count)),
         progress_({"export", options.is_quiet, "frame"}) {
     if (options.to_s) {
-      const auto frames = static_cast<uint32_t>((*options.to_s - options.from_s) * options.fps) + 1;
+      const auto frames = static_cast<uint32_t>((*options.to_s - options.from_s) * options.fps.hz()) + 1;
       progress_.expect(frames, frames);
     }
   }

@@ -13,7 +13,8 @@ FrameSampler::FrameSampler(const SampleRange& range, StrandFill fill)
 }
 
 int64_t FrameSampler::time_ns(uint64_t index) const {
-  const double after_s = range_.from_s + static_cast<double>(index) / range_.fps;
+  const double after_s =
+      range_.from_s + static_cast<double>(index) * range_.fps.denominator / range_.fps.numerator;
   return *first_ns_ + std::llround(after_s * kNsPerS);
 }
 

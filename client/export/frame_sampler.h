@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "common/base/frame_rate.h"
 #include "common/replay/state_blend.h"
 
 namespace strandcast {
@@ -18,7 +19,7 @@ struct SampledFrame {
 };
 
 struct SampleRange {
-  double fps = 30.0;
+  FrameRate fps;
   double from_s = 0.0;         // after the first state
   std::optional<double> to_s;  // likewise; empty: to the last state
   std::optional<int64_t> first_ns =

@@ -83,8 +83,8 @@ class UsdaWriter : public StrandWriter {
     // How many frames there will be is known at the end.
     text.append(20, ' ');
     text += '\n';
-    text +=
-        fmt::format("    timeCodesPerSecond = {}\n    framesPerSecond = {}\n", options_.fps, options_.fps);
+    text += fmt::format("    timeCodesPerSecond = {}\n    framesPerSecond = {}\n", options_.fps.hz(),
+                        options_.fps.hz());
     text += ")\n\ndef Xform \"Hair\" (\n    kind = \"component\"\n)\n{\n";
     return text;
   }

@@ -93,7 +93,7 @@ const OptionRow kCommandRows[] = {
     {"--live", {}, {{"feed.is_live", "true"}}, {}, "feed"},
     {"--speed", {"2"}, {{"feed.speed", "2"}}, {}, "feed"},
     {"--seconds", {"2.5"}, {{"feed.seconds", "2.5"}}, {}, "feed"},
-    {"--rate", {"25"}, {{"feed.rate_hz", "25"}}, {}, "feed"},
+    {"--rate", {"25/2"}, {{"feed.rate_hz", "12.5"}}, {}, "feed"},
     {"--wind-mean", {"3", "4", "5"}, {{"feed.wind_mps", "3 4 5"}}, {}, "feed"},
     {"--gust-intensity", {"1.25"}, {{"feed.gust_intensity", "1.25"}}, {}, "feed"},
     {"--seed", {"7"}, {{"feed.seed", "7"}}, {}, "feed"},
