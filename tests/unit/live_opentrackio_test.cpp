@@ -113,6 +113,8 @@ TEST(OpenTrackIo, TellsWhoWhenAndWhatTheTrackerDoes) {
   EXPECT_EQ(pose.subject, "3");
   EXPECT_EQ(pose.frame, 7u);
   EXPECT_EQ(pose.source_time_ns, 12'500'000'000);
+  EXPECT_EQ(pose.timecode, make_timecode({1, 2, 3, 4}, {30'000, 1001}, false).value())
+      << "at the samples' rate";
   EXPECT_THAT(parser->describe(), ElementsAre("source 3", HasSubstr("pan 0.000"), HasSubstr("x 0.0000"),
                                               "sample 7", "29.970 samples a second", "timecode 01:02:03:04",
                                               "records", "slate A101", "status good"));
@@ -122,6 +124,25 @@ TEST(OpenTrackIo, TellsWhoWhenAndWhatTheTrackerDoes) {
   EXPECT_THAT(parser->take_notes(), IsEmpty()) << "each is told once";
   (void)only_pose(*parser, opentrackio(sample(head)));
   EXPECT_THAT(parser->take_notes(), ElementsAre("the tracker has stopped recording"));
+}
+
+TEST(OpenTrackIo, TimecodesHaveARateOfTheirOwn) {
+  const auto parser = live_parser_of("opentrackio");
+  const auto told = [&](const std::string& fields) {
+    return only_pose(*parser, opentrackio(sample(
+                                  transform("{\"x\":0,\"y\":0,\"z\":0}", kAtRest),
+                                  ",\"timing\":{\"sampleRate\":{\"num\":240,\"denom\":1},\"timecode\":{" +
+                                      fields + "}}")))
+        .timecode;
+  };
+  const std::string drop = "\"frameRate\":{\"num\":60000,\"denom\":2002},\"dropFrame\":true";
+  const std::string at = "\"hours\":10,\"minutes\":1,\"seconds\":0,\"frames\":";
+  EXPECT_EQ(told(at + "2," + drop), make_timecode({10, 1, 0, 2}, {30'000, 1001}, true).value());
+  EXPECT_THAT(parser->describe(), Contains("timecode 10:01:00;02"));
+  EXPECT_FALSE(told(at + "1," + drop)) << "a number that is left out";
+  EXPECT_FALSE(told(at + "1")) << "no timecode counts 240 frames a second";
+  EXPECT_FALSE(told(at + "1.5," + drop));
+  EXPECT_FALSE(told("\"hours\":10," + drop));
 }
 
 TEST(OpenTrackIo, NumbersGoOnWhereSixteenBitsBeginAnew) {

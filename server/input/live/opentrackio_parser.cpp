@@ -3,8 +3,10 @@
 // `sampleTimestamp`, else the number of the sample over its rate. Segments of a sample are put together in
 // order; where one is missing or another sample begins, it is dropped and counted as ignored.
 #include <array>
+#include <cmath>
 #include <initializer_list>
 #include <limits>
+#include <numeric>
 #include <string_view>
 #include <utility>
 
@@ -18,7 +20,6 @@ namespace strandcast {
 namespace {
 
 constexpr size_t kMaxShownTextChars = 60;
-constexpr double kMaxSourceNumber = 1e9;
 
 /// The value at a path of keys; null where there is none.
 const ValueTree* find_at(const ValueTree& tree, std::initializer_list<std::string_view> path) {
@@ -43,38 +44,50 @@ glm::dvec3 triple_of(const ValueTree& tree, const std::array<const char*, 3>& ke
     if (const auto number = number_at(tree, {keys[static_cast<size_t>(i)]})) triple[i] = *number;
   return triple;
 }
-/// A ratio of two numbers above 0; empty if it is none.
-std::optional<double> ratio_at(const ValueTree& tree, std::initializer_list<std::string_view> path) {
-  const ValueTree* found = find_at(tree, path);
-  if (found == nullptr) return std::nullopt;
-  const auto above = number_at(*found, {"num"}), below = number_at(*found, {"denom"});
-  if (!above || !below || !(*above > 0.0) || !(*below > 0.0)) return std::nullopt;
-  return *above / *below;
-}
-
 /// What a sample says, in its own units.
 struct TrackFields {
   std::optional<TrackPose> pose;  // of the last transform within the one before
   Pose world_from_subject;
   bool has_position = false;
   std::string subject;
-  std::optional<double> number;
+  std::optional<uint32_t> number;
   std::optional<double> time_s;  // of the sampleTimestamp
   std::optional<double> rate_hz;
+  std::optional<Timecode> timecode;
   std::optional<bool> is_recording;
-  std::string slate, status, timecode;
+  std::string slate, status;
 };
 
-std::string timecode_of(const ValueTree& tree) {
-  const ValueTree* timecode = find_at(tree, {"timing", "timecode"});
-  if (timecode == nullptr) return {};
-  std::string text;
-  for (const char* key : {"hours", "minutes", "seconds", "frames"}) {
-    const auto number = number_at(*timecode, {key});
-    if (!number || !(*number >= 0.0 && *number < 1000.0)) return {};
-    text += fmt::format("{}{:02.0f}", text.empty() ? "" : ":", *number);
-  }
-  return text;
+/// A whole number that fits; empty for any other.
+std::optional<uint32_t> count_at(const ValueTree& tree, std::initializer_list<std::string_view> path) {
+  const auto number = number_at(tree, path);
+  if (!number || !(*number >= 0.0 && *number <= std::numeric_limits<uint32_t>::max()) ||
+      *number != std::floor(*number))
+    return std::nullopt;
+  return static_cast<uint32_t>(*number);
+}
+std::optional<FrameRate> rate_at(const ValueTree& tree, std::initializer_list<std::string_view> path) {
+  const ValueTree* found = find_at(tree, path);
+  if (found == nullptr) return std::nullopt;
+  const auto above = count_at(*found, {"num"}), below = count_at(*found, {"denom"});
+  if (above.value_or(0) == 0 || below.value_or(0) == 0) return std::nullopt;
+  const uint32_t common = std::gcd(*above, *below);
+  return FrameRate{*above / common, *below / common};
+}
+
+/// Of a rate of its own, else of the samples; empty for what is no timecode.
+std::optional<Timecode> timecode_of(const ValueTree& tree) {
+  const ValueTree* told = find_at(tree, {"timing", "timecode"});
+  auto rate = rate_at(tree, {"timing", "timecode", "frameRate"});
+  if (!rate) rate = rate_at(tree, {"timing", "sampleRate"});
+  if (told == nullptr || !rate) return std::nullopt;
+  const auto hours = count_at(*told, {"hours"}), minutes = count_at(*told, {"minutes"});
+  const auto seconds = count_at(*told, {"seconds"}), frames = count_at(*told, {"frames"});
+  if (!hours || !minutes || !seconds || !frames) return std::nullopt;
+  const ValueTree* drop = told->find("dropFrame");
+  const auto timecode = make_timecode({*hours, *minutes, *seconds, *frames}, *rate,
+                                      drop != nullptr && drop->truth().value_or(false));
+  return timecode ? std::optional(*timecode) : std::nullopt;
 }
 
 class OpenTrackIoParser : public LiveParser {
@@ -110,9 +123,9 @@ class OpenTrackIoParser : public LiveParser {
                             fields.pose->tilt_deg, fields.pose->roll_deg));
       lines.add(fmt::format("x {:.4f} y {:.4f} z {:.4f} m", p.x, p.y, p.z));
     }
-    if (fields.number) lines.add(fmt::format("sample {:.0f}", *fields.number));
+    if (fields.number) lines.add(fmt::format("sample {}", *fields.number));
     if (fields.rate_hz) lines.add(fmt::format("{:.3f} samples a second", *fields.rate_hz));
-    if (!fields.timecode.empty()) lines.add("timecode " + fields.timecode);
+    if (fields.timecode) lines.add("timecode " + timecode_text(*fields.timecode));
     if (fields.is_recording) lines.add(*fields.is_recording ? "records" : "does not record");
     if (!fields.slate.empty()) lines.add("slate " + fields.slate);
     if (!fields.status.empty()) lines.add("status " + fields.status);
@@ -185,16 +198,13 @@ class OpenTrackIoParser : public LiveParser {
 
   TrackFields read_fields(const ValueTree& tree) const {
     TrackFields fields;
-    if (const auto number = number_at(tree, {"sourceNumber"});
-        number && *number >= 0.0 && *number <= kMaxSourceNumber)
-      fields.subject = fmt::format("{:.0f}", *number);
-    fields.number = number_at(tree, {"timing", "sequenceNumber"});
-    if (fields.number && !(*fields.number >= 0.0 && *fields.number <= 4294967295.0)) fields.number.reset();
+    if (const auto number = count_at(tree, {"sourceNumber"})) fields.subject = fmt::format("{}", *number);
+    fields.number = count_at(tree, {"timing", "sequenceNumber"});
     const auto seconds = number_at(tree, {"timing", "sampleTimestamp", "seconds"});
     if (seconds)
       fields.time_s =
           *seconds + number_at(tree, {"timing", "sampleTimestamp", "nanoseconds"}).value_or(0.0) * kSPerNs;
-    fields.rate_hz = ratio_at(tree, {"timing", "sampleRate"});
+    if (const auto rate = rate_at(tree, {"timing", "sampleRate"})) fields.rate_hz = rate->hz();
     if (const ValueTree* recording = find_at(tree, {"tracker", "recording"}))
       fields.is_recording = recording->truth();
     fields.slate = text_at(tree, {"tracker", "slate"});
@@ -235,7 +245,8 @@ class OpenTrackIoParser : public LiveParser {
     pose.subject = fields.subject;
     pose.world_from_subject = fields.world_from_subject;
     pose.has_position = fields.has_position;
-    if (fields.number) pose.frame = unwrapped(static_cast<uint32_t>(*fields.number));
+    if (fields.number) pose.frame = unwrapped(*fields.number);
+    pose.timecode = fields.timecode;
     if (fields.time_s)
       pose.source_time_ns = nanoseconds_of(*fields.time_s);
     else if (pose.frame && fields.rate_hz)
