@@ -15,17 +15,17 @@
 #include <variant>
 
 #include "client/app/line_budget.h"
-#include "client/app/mocap_packet.h"
 #include "client/app/save_scene.h"
 #include "client/app/steady_client.h"
 #include "client/app/step_speed.h"
 #include "client/app/stream_check.h"
 #include "client/app/view_options.h"
-#include "client/net/datagram_sender.h"
 #include "client/net/http_get.h"
 #include "common/base/text.h"
 #include "common/base/units.h"
 #include "common/client/client_token.h"
+#include "common/client/datagram_sender.h"
+#include "common/motion/mocap_packet.h"
 #include "common/motion/wind_csv.h"
 #include "common/scene/scene_file.h"
 
@@ -263,7 +263,7 @@ Result<std::vector<std::unique_ptr<SteadyClient>>> connect_sources(const CtlTarg
 /// As a program of motion capture would.
 int run_mocap_feed(const FeedOptions& options, const FeedPlan& plan, const std::atomic<bool>& stop) {
   const auto encoding = find_mocap_encoding(options.as);
-  if (!encoding) return ctl_failure(encoding.error());
+  if (!encoding) return ctl_failure(at("--as", encoding.error()));
   // What names no port gets the protocol's own.
   auto to = parse_address(options.to);
   if (!to) return ctl_failure(to.error());
@@ -272,8 +272,9 @@ int run_mocap_feed(const FeedOptions& options, const FeedPlan& plan, const std::
   if (!sender) return ctl_failure(sender.error());
   std::cerr << fmt::format("sending {} to {}: motion {}, {} packets per second\n", encoding->name,
                            to->to_string(), options.motion, options.rate_hz);
+  uint32_t number = 0;
   const auto send = [&](double time_s, const Pose& pose, const std::optional<glm::vec3>& wind_mps) {
-    return (*sender)->send(encoding->encode({time_s, pose, wind_mps}));
+    return (*sender)->send(encoding->encode({time_s, pose, wind_mps, number++, options.rate_hz}));
   };
   const FeedProgress done = feed_moments(send, plan, stop, progress_listener());
   std::cout << fmt::format("sent {:.1f} s: {} packets, at most {:.1f} ms late, {} skipped, {} unsent\n",

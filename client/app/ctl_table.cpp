@@ -8,6 +8,7 @@
 #include "client/app/step_command.h"
 #include "common/base/command_line_error.h"
 #include "common/base/frame_rate.h"
+#include "common/motion/mocap_packet.h"
 
 namespace strandcast {
 namespace {
@@ -50,7 +51,7 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
       ->capture_default_str();
   app.add_option("--seed", feed.seed, "Seed of the gusts")->capture_default_str();
   auto* as = app.add_option(
-      "--as", feed.as, "Send packets of motion capture instead, as a stage would: vmc, opentrack or freed");
+      "--as", feed.as, "Send packets of motion capture instead, as a stage would: " + mocap_encoding_names());
   app.add_option("--to", feed.to, "Who gets them, as HOST or HOST:PORT")->needs(as)->capture_default_str();
 }
 

@@ -48,6 +48,7 @@ void ChaosPipe::push_segment(std::span<const std::byte> bytes, int64_t time_us) 
   int64_t due_us = crossed_us + plan_.delay_us;
   if (plan_.jitter_us > 0)
     due_us += static_cast<int64_t>(unit(jitter_random_) * static_cast<double>(plan_.jitter_us));
+  due_us += resends_us();
   if (plan_.writes == Writes::Merged) due_us = (due_us / kMergeWindowUs + 1) * kMergeWindowUs;
   last_due_us_ = std::max(last_due_us_, due_us);
   if (plan_.writes == Writes::Merged && !pieces_.empty() && pieces_.back().due_us == last_due_us_) {
@@ -56,6 +57,14 @@ void ChaosPipe::push_segment(std::span<const std::byte> bytes, int64_t time_us) 
   } else {
     pieces_.push_back({crossed_us, last_due_us_, std::move(copy), 0});
   }
+}
+
+/// How much later a segment comes that is lost, and lost again.
+int64_t ChaosPipe::resends_us() {
+  constexpr int kMostResends = 16;
+  int64_t resends = 0;
+  while (plan_.loss > 0.0 && resends < kMostResends && unit(loss_random_) < plan_.loss) ++resends;
+  return resends * (2 * plan_.delay_us + kResendUs);
 }
 
 /// The gaps between wrong bytes are drawn, not the bytes one by one, so they do not depend on how bytes

@@ -18,7 +18,11 @@ inline constexpr size_t kSegmentBytes = 1'448;
 class ChaosPipe {
  public:
   ChaosPipe(const LinkPlan& plan, uint64_t seed)
-      : plan_(plan), corrupt_random_(seed), cut_random_(~seed), jitter_random_(seed + 1) {}
+      : plan_(plan),
+        corrupt_random_(seed),
+        cut_random_(~seed),
+        jitter_random_(seed + 1),
+        loss_random_(seed + 2) {}
 
   void set_plan(const LinkPlan& plan) { plan_ = plan; }
   const LinkPlan& plan() const { return plan_; }
@@ -49,11 +53,13 @@ class ChaosPipe {
   void corrupt(std::span<std::byte> bytes);
   void push_segment(std::span<const std::byte> bytes, int64_t time_us);
   size_t cut_bytes() const;
+  int64_t resends_us();
 
   LinkPlan plan_;
   std::mt19937_64 corrupt_random_;
   std::mt19937_64 cut_random_;
   std::mt19937_64 jitter_random_;
+  std::mt19937_64 loss_random_;
   std::deque<Piece> pieces_;
   size_t held_bytes_ = 0;
   uint64_t pushed_bytes_ = 0;

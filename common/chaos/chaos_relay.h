@@ -23,11 +23,15 @@ enum class Writes {
 };
 inline constexpr size_t kMaxSplitBytes = 61;
 inline constexpr int64_t kMergeWindowUs = 20'000;
+/// From the moment that a lost segment is missed to the one when it is sent again.
+inline constexpr int64_t kResendUs = 10'000;
 
 /// Faults of one direction of every connection.
 struct LinkPlan {
   int64_t delay_us = 0;
   int64_t jitter_us = 0;            // added to the delay, uniform in 0..jitter; order is kept, as in TCP
+  double loss = 0.0;                // share of segments that come a round trip and kResendUs later, as TCP
+                                    // sends them again; those behind them wait
   uint64_t bytes_per_s = 0;         // 0 = as fast as it goes
   size_t queue_bytes = 128u << 10;  // may wait for the rate; beyond it the relay stops reading
   int64_t freeze_every_us = 0;      // 0 = never; else nothing passes for freeze_us at the end of each period

@@ -18,6 +18,7 @@ struct ScenarioStart {
   std::vector<std::string> overrides;
   bool is_lockstep = false;
   std::vector<std::string> options;  // further words of the server's command line
+  bool has_relay = false;            // between viewers and server
 };
 
 struct ScenarioFeed {
@@ -39,7 +40,7 @@ struct ScenarioRunTime {
 struct ScenarioSet {
   std::string assignment;
 };
-enum class ScenarioCommand { None, Pause, Resume, Reset, Restart };
+enum class ScenarioCommand { None, Pause, Resume, Reset, Restart, RestartRelay };
 
 struct ScenarioView {
   std::string name = "viewer";
@@ -50,6 +51,15 @@ struct ScenarioView {
   std::string codec;
   std::string draws;     // what it says of itself: hardware, software, none; empty = nothing
   double draw_ms = 0.0;  // likewise; 0 = nothing
+};
+enum class ScenarioFault { None, Stall, HalfOpen, Cut };
+/// The line between a viewer and the server, from now on.
+struct ScenarioLink {
+  std::string viewer;  // empty: the first
+  ScenarioFault fault = ScenarioFault::None;
+  double loss = 0.0;  // share of packets that are sent again
+  double delay_ms = 0.0;
+  double link_mbit = 0.0;  // 0 = as fast as it goes
 };
 struct ScenarioLeave {
   std::string viewer;
@@ -82,6 +92,7 @@ struct ScenarioExpect {
   std::optional<double> stretch_below;
   bool has_no_quarantine = false;
   std::optional<uint64_t> hash;
+  std::filesystem::path hash_file;  // with a hash; empty: none
   std::string same_as;
   std::optional<ScenarioPicture> picture;
   std::optional<double> kbit_below, bits_per_vertex_below, realtime_above, hz_above, back_within_s;
@@ -102,7 +113,7 @@ struct ScenarioRefusal {
 
 using ScenarioWork = std::variant<ScenarioStart, ScenarioFeed, ScenarioSteps, ScenarioRunTime, ScenarioSet,
                                   ScenarioCommand, ScenarioView, ScenarioLeave, ScenarioExpect,
-                                  ScenarioRefusal, ScenarioRemember, ScenarioSend>;
+                                  ScenarioRefusal, ScenarioRemember, ScenarioSend, ScenarioLink>;
 
 struct ScenarioAction {
   ScenarioWork work;

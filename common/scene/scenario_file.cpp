@@ -38,6 +38,7 @@ constexpr Range kWind{-200.0, 200.0, "m/s"};
 constexpr Range kShare{0.0, 2.0, ""};
 constexpr Range kLink{0.01, 10'000.0, "Mbit/s"};
 constexpr Range kDelay{0.0, 5'000.0, "ms"};
+constexpr Range kLoss{0.0, 0.5, ""};
 constexpr Range kDrawing{0.0, 60'000.0, "ms"};
 constexpr Range kSide{16, 4'096, "pixels"};
 constexpr Range kStretch{1e-6, 100.0, ""};
@@ -184,6 +185,7 @@ class ScenarioReader {
   ScenarioStart read_start(const Part& part) const;
   ScenarioFeed read_feed(const Part& part) const;
   static ScenarioView read_view(const Part& part);
+  static ScenarioLink read_link(const Part& part);
   ScenarioExpect read_expect(const Part& part) const;
   static ScenarioRefusal read_refusal(const Part& part);
   ScenarioSend read_send(const Part& part) const;
@@ -226,6 +228,7 @@ ScenarioStart ScenarioReader::read_start(const Part& part) const {
   start.scene = file(part, "scene");
   start.overrides = part.texts("set", kMaxWords);
   start.is_lockstep = part.flag("lockstep");
+  start.has_relay = part.flag("relay");
   start.options = part.texts("option", kMaxWords);
   for (const std::string& word : start.options)
     if (word.starts_with('-') && !is_scenario_option(word))
@@ -260,11 +263,22 @@ ScenarioView ScenarioReader::read_view(const Part& part) {
   return view;
 }
 
+ScenarioLink ScenarioReader::read_link(const Part& part) {
+  ScenarioLink link;
+  link.viewer = part.text("viewer", "", kMaxWordBytes);
+  if (part.has("fault")) link.fault = part.choice("fault", ScenarioFault::Cut);
+  link.loss = part.number("loss", link.loss, kLoss);
+  link.delay_ms = part.number("delay_ms", link.delay_ms, kDelay);
+  if (part.has("link_mbit")) link.link_mbit = part.number("link_mbit", 0.0, kLink);
+  return link;
+}
+
 ScenarioExpect ScenarioReader::read_expect(const Part& part) const {
   ScenarioExpect expect;
   expect.viewer = part.text("viewer", "", kMaxWordBytes);
   expect.stretch_below = part.some("stretch_below", kStretch);
   expect.has_no_quarantine = part.flag("no_quarantine");
+  expect.hash_file = file(part, "hash_file");
   expect.same_as = part.text("same_as", "", kMaxWordBytes);
   expect.kbit_below = part.some("kbit_below", kMeasure);
   expect.bits_per_vertex_below = part.some("bits_per_vertex_below", kMeasure);
@@ -366,9 +380,11 @@ ScenarioAction ScenarioReader::read_action(const Part& part) const {
   } else if (part.has("set")) {
     action.work = ScenarioSet{part.text("set", "", kMaxTextBytes)};
   } else if (part.has("command")) {
-    action.work = part.choice("command", ScenarioCommand::Restart);
+    action.work = part.choice("command", ScenarioCommand::RestartRelay);
   } else if (part.has("view")) {
     action.work = read_view(part.group("view"));
+  } else if (part.has("link")) {
+    action.work = read_link(part.group("link"));
   } else if (part.has("leave")) {
     action.work = ScenarioLeave{part.text("leave", "", kMaxWordBytes)};
   } else if (part.has("expect")) {

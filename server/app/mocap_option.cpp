@@ -11,25 +11,25 @@ namespace {
 constexpr size_t kMaxOptionChars = 100;
 constexpr uint32_t kMaxPort = 65'535;
 
-Error not_understood(const std::string& text, const char* why) {
+Error not_understood(const char* option, const std::string& text, const char* why) {
   return make_error(ErrorCode::BadInput,
-                    "--mocap {}: {}; it is PROTOCOL, PROTOCOL:PORT or PROTOCOL://HOST:PORT, such as vmc, "
+                    "{} {}: {}; it is PROTOCOL, PROTOCOL:PORT or PROTOCOL://HOST:PORT, such as vmc, "
                     "opentrack:4242, natnet://10.0.0.5 or vrpn://HOST",
-                    excerpt(text, kMaxOptionChars), why);
+                    option, excerpt(text, kMaxOptionChars), why);
 }
 
 /// The port behind a colon.
-Result<uint32_t> parse_port(const std::string& text, std::string_view digits) {
+Result<uint32_t> parse_port(const char* option, const std::string& text, std::string_view digits) {
   uint32_t port = 0;
   const auto [end, failure] = std::from_chars(digits.data(), digits.data() + digits.size(), port);
   if (failure != std::errc{} || end != digits.data() + digits.size() || port == 0 || port > kMaxPort)
-    return not_understood(text, "its port is not within 1 .. 65535");
+    return not_understood(option, text, "its port is not within 1 .. 65535");
   return port;
 }
 
 }  // namespace
 
-Result<LiveDesc> parse_mocap(const std::string& text) {
+Result<LiveDesc> parse_mocap(const std::string& text, const char* option) {
   LiveDesc live;
   const size_t scheme = text.find("://");
   std::string rest = scheme == std::string::npos ? text : text.substr(scheme + 3);
@@ -39,16 +39,16 @@ Result<LiveDesc> parse_mocap(const std::string& text) {
   const size_t colon = rest.rfind(':');
   const bool has_port = colon != std::string::npos && (bracket == std::string::npos || colon > bracket);
   if (has_port) {
-    ASSIGN_OR_RETURN(live.port, parse_port(text, std::string_view(rest).substr(colon + 1)));
+    ASSIGN_OR_RETURN(live.port, parse_port(option, text, std::string_view(rest).substr(colon + 1)));
     rest.resize(colon);
   }
   if (scheme == std::string::npos) {
     live.protocol = rest;
   } else {
     live.host = rest.starts_with('[') && rest.ends_with(']') ? rest.substr(1, rest.size() - 2) : rest;
-    if (live.host.empty()) return not_understood(text, "it names no host");
+    if (live.host.empty()) return not_understood(option, text, "it names no host");
   }
-  if (live.protocol.empty()) return not_understood(text, "it names no protocol");
+  if (live.protocol.empty()) return not_understood(option, text, "it names no protocol");
   return live;
 }
 

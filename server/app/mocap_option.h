@@ -1,4 +1,4 @@
-// Parses strandcast-server's option --mocap. Pure functions.
+// Parses strandcast-server's option --mocap, and places of its form. Pure functions.
 #pragma once
 
 #include <string>
@@ -17,8 +17,8 @@ struct MocapOptions {
   double scale = 1.0;  // LiveDesc::scale
 };
 
-/// Parses one value of --mocap. BadInput explains the accepted forms.
-Result<LiveDesc> parse_mocap(const std::string& text);
+/// Parses one value of --mocap, or of another `option` of that form. BadInput explains the accepted forms.
+Result<LiveDesc> parse_mocap(const std::string& text, const char* option = "--mocap");
 
 /// Returns the scene with the given inputs instead of its own; unchanged if there are none. `overrides` of
 /// live inputs are applied afterwards.

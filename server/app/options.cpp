@@ -138,6 +138,7 @@ struct RawRunOptions {
   std::vector<std::string> trusted_proxies;
   bool has_proxy_protocol = false;
   std::vector<std::string> mocap_allowed;
+  std::vector<std::string> sends;
   std::string record_path;
   std::string record_folder;
   bool replaces_recording = false;
@@ -148,10 +149,10 @@ struct RawRunOptions {
 };
 
 /// What a relay leaves to the server that it stands in for.
-constexpr const char* kNotForRelays[] = {"--scene",        "--set",        "--groom",       "--check",
-                                         "--list-solvers", "--explain",    "--print-scene", "--mocap",
-                                         "--record",       "--replay",     "--sim-device",  "--renderer",
-                                         "--gl-device",    "--shader-dir", "--trace",       "--lockstep"};
+constexpr const char* kNotForRelays[] = {
+    "--scene",       "--set",       "--groom",      "--check",  "--list-solvers", "--explain",
+    "--print-scene", "--mocap",     "--send",       "--record", "--replay",       "--sim-device",
+    "--renderer",    "--gl-device", "--shader-dir", "--trace",  "--lockstep"};
 
 void add_relay_options(CLI::App& app, RawRunOptions& raw) {
   constexpr const char* kGroup = "Relay";
@@ -216,6 +217,13 @@ void add_mocap_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw
       ->group(kGroup);
   app.add_option("--mocap-allow", raw.mocap_allowed,
                  "ADDRESS or ADDRESS/BITS that may send besides this machine; repeatable")
+      ->expected(1)
+      ->take_all()
+      ->group(kGroup);
+  app.add_option("--send", raw.sends,
+                 "send the head to who follows it, with every step: PROTOCOL, PROTOCOL:PORT or "
+                 "PROTOCOL://HOST (" +
+                     mocap_encoding_names() + "); repeatable")
       ->expected(1)
       ->take_all()
       ->group(kGroup);
@@ -347,6 +355,10 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
     const auto range = parse_address_range(text);
     if (!range) return at("--mocap-allow", range.error());
     options.config.live_allowed.push_back(*range);
+  }
+  for (const std::string& text : raw.sends) {
+    ASSIGN_OR_RETURN(HeadSend send, parse_head_send(text));
+    options.config.sends.push_back(std::move(send));
   }
   ASSIGN_OR_RETURN(options.upstream, upstream_of(app, raw));
   if (raw.has_proxy_protocol) options.config.net.proxy_protocol = ProxyProtocol::Version2;

@@ -1,6 +1,7 @@
 #include "server/app/record_desk.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <ctime>
 #include <utility>
@@ -30,6 +31,28 @@ bool is_letter_or_digit(char character) {
 bool may_be_in_name(char character) {
   return is_letter_or_digit(character) || std::string_view(" ._-+").find(character) != std::string_view::npos;
 }
+
+/// Tells two recordings of every step.
+class TapPair : public StepTap {
+ public:
+  TapPair(StepTap& first, StepTap& second) : taps_{&first, &second} {}
+
+  void on_step(const TakenStep& step) override {
+    for (StepTap* tap : taps_) tap->on_step(step);
+  }
+  void on_change(const PostedChange& change) override {
+    for (StepTap* tap : taps_) tap->on_change(change);
+  }
+  void on_answer(const Notice& answer) override {
+    for (StepTap* tap : taps_) tap->on_answer(answer);
+  }
+  void on_lattice(const LatticeChange& change) override {
+    for (StepTap* tap : taps_) tap->on_lattice(change);
+  }
+
+ private:
+  const std::array<StepTap*, 2> taps_;
+};
 
 /// Describes a recording; `end` says why it ended by itself, empty = it goes on.
 std::string text_of(const Recorder& recorder, const std::string& end) {
@@ -97,7 +120,7 @@ Result<std::unique_ptr<RecordDesk>> RecordDesk::make(const std::optional<RecordC
   }
   std::unique_ptr<RecordDesk> desk(new RecordDesk(std::move(whole)));
   if (first) {
-    ASSIGN_OR_RETURN(desk->recorder_, Recorder::make(*first));
+    ASSIGN_OR_RETURN(desk->whole_, Recorder::make(*first));
   }
   return desk;
 }
@@ -108,11 +131,11 @@ RecordDesk::~RecordDesk() {
 
 Status RecordDesk::attach(Stream stream) {
   stream_.emplace(std::move(stream));
-  return recorder_ != nullptr ? recorder_->attach(stream_->hub) : Status();
+  return whole_ != nullptr ? whole_->attach(stream_->hub) : Status();
 }
 
 void RecordDesk::begin() {
-  if (recorder_ != nullptr) recorder_->begin(stream_->describe(), stream_->asset());
+  if (whole_ != nullptr) whole_->begin(stream_->describe(), stream_->asset());
   if (!folder_) return;
   if (folder_->file_ending.empty())
     log_info("record", "who controls may record into {}", folder_->path.string());
@@ -129,12 +152,14 @@ void RecordDesk::stop() {
   }
   changed_.notify_all();
   if (thread_.joinable()) thread_.join();
-  if (const auto recorder = this->recorder()) recorder->stop();
+  for (const auto& recorder : recorders()) recorder->stop();
 }
 
-std::shared_ptr<Recorder> RecordDesk::recorder() const {
+std::vector<std::shared_ptr<Recorder>> RecordDesk::recorders() const {
   const std::lock_guard lock(mutex_);
-  return recorder_;
+  std::vector<std::shared_ptr<Recorder>> all = {whole_, take_};
+  std::erase(all, nullptr);
+  return all;
 }
 
 void RecordDesk::obey(const RecordCommand& command, Reply reply) {
@@ -154,7 +179,7 @@ void RecordDesk::run() {
   std::unique_lock lock(mutex_);
   while (!is_stopping_) {
     const auto has_news = [this] { return is_stopping_ || order_.has_value(); };
-    if (recorder_ != nullptr)
+    if (whole_ != nullptr || take_ != nullptr)
       changed_.wait_for(lock, kRoomInterval, has_news);
     else
       changed_.wait(lock, has_news);
@@ -184,7 +209,7 @@ Notice RecordDesk::carry_out(const RecordCommand& command) {
     const Result<std::string> begun = start_recording(command.name);
     return begun ? Notice{false, *begun} : Notice{true, begun.error().to_string()};
   }
-  if (recorder() != nullptr) return Notice{false, end()};
+  if (const auto all = recorders(); !all.empty()) return Notice{false, end(all.back())};
   const std::lock_guard lock(mutex_);
   if (!ended_.empty()) return Notice{true, std::exchange(ended_, {})};
   return Notice{true, "Nothing is being recorded: record start begins it."};
@@ -263,30 +288,37 @@ Result<uint64_t> RecordDesk::change_tap(StepTap* tap, std::function<void()> at_c
 
 /// One sentence of where it is.
 Result<std::string> RecordDesk::start_recording(const std::string& name) {
-  const std::shared_ptr<Recorder> present = recorder();
-  if (present != nullptr && !present->failure())
-    return make_error(ErrorCode::BadInput, "{} is being recorded already: record stop ends it.",
-                      present->path().filename().string());
-  if (present != nullptr) end();
-  ASSIGN_OR_RETURN(std::shared_ptr<Recorder> recorder, make_recorder(name));
-  RETURN_IF_ERROR(recorder->attach(stream_->hub));
-  ASSIGN_OR_RETURN(const uint64_t tick, change_tap(recorder.get()));
-  recorder->begin(stream_->describe(), stream_->asset());
+  for (const auto& present : recorders()) {
+    if (present->failure()) {
+      end(present);
+    } else if (present != whole_) {
+      return make_error(ErrorCode::BadInput, "{} is being recorded already: record stop ends it.",
+                        present->path().filename().string());
+    }
+  }
+  ASSIGN_OR_RETURN(std::shared_ptr<Recorder> take, make_recorder(name));
+  RETURN_IF_ERROR(take->attach(stream_->hub));
+  std::unique_ptr<StepTap> both;
+  if (whole_ != nullptr) both = std::make_unique<TapPair>(*whole_, *take);
+  ASSIGN_OR_RETURN(const uint64_t tick, change_tap(both != nullptr ? both.get() : take.get()));
+  take->begin(stream_->describe(), stream_->asset());
   const std::lock_guard lock(mutex_);
-  recorder_ = std::move(recorder);
+  take_ = std::move(take);
+  both_ = std::move(both);
   ended_.clear();
-  return fmt::format("Recording {} from step {} on.", recorder_->path().string(), tick);
+  return fmt::format("Recording {} from step {} on.", take_->path().string(), tick);
 }
 
 /// One sentence of what was recorded.
-std::string RecordDesk::end() {
-  const std::shared_ptr<Recorder> recorder = this->recorder();
+std::string RecordDesk::end(const std::shared_ptr<Recorder>& recorder) {
+  Recorder* const other = recorder == whole_ ? take_.get() : whole_.get();
   // Steps and states end together. Without an answer the source has stopped, and tells nobody anything.
-  static_cast<void>(change_tap(nullptr, [recorder] { recorder->refuse(); }));
+  static_cast<void>(change_tap(other, [recorder] { recorder->refuse(); }));
   recorder->stop();
   {
     const std::lock_guard lock(mutex_);
-    recorder_.reset();
+    (recorder == whole_ ? whole_ : take_).reset();
+    both_.reset();
   }
   const std::string what = fmt::format("{}: {:.1f} s, {}", recorder->path().string(),
                                        recorder->counters().length_s, recorder->summary());
@@ -298,46 +330,71 @@ std::string RecordDesk::end() {
 std::string RecordDesk::reason_to_end(const Recorder& recorder) const {
   if (const std::optional<Error> failure = recorder.failure()) return failure->to_string();
   // The one of --record is the owner's.
-  if (recorder.path().parent_path() != folder_->path) return {};
+  if (&recorder == whole_.get()) return {};
   const auto free_bytes = folder_->free_bytes(folder_->path);
   if (!free_bytes || *free_bytes >= kMinFreeRecordBytes / 2) return {};
   return fmt::format("{:.1f} GB are free on its disk", static_cast<double>(*free_bytes) / kBytesPerGb);
 }
 
 void RecordDesk::watch() {
-  const std::shared_ptr<Recorder> recorder = this->recorder();
-  const std::string reason = recorder != nullptr ? reason_to_end(*recorder) : std::string();
-  if (reason.empty()) return;
-  log_warn("record", "{}: the recording ends: {}", recorder->path().string(), reason);
-  end();
-  const std::lock_guard lock(mutex_);
-  ended_ = text_of(*recorder, reason);
+  for (const auto& recorder : recorders()) {
+    const std::string reason = reason_to_end(*recorder);
+    if (reason.empty()) continue;
+    log_warn("record", "{}: the recording ends: {}", recorder->path().string(), reason);
+    end(recorder);
+    const std::lock_guard lock(mutex_);
+    ended_ = text_of(*recorder, reason);
+  }
 }
 
 std::string RecordDesk::text() const {
+  std::string text;
+  for (const auto& recorder : recorders()) {
+    const std::optional<Error> failure = recorder->failure();
+    text += (text.empty() ? "" : "; ") + text_of(*recorder, failure ? failure->to_string() : std::string());
+  }
+  if (!text.empty()) return text;
   const std::lock_guard lock(mutex_);
-  if (recorder_ == nullptr) return ended_;
-  const std::optional<Error> failure = recorder_->failure();
-  return text_of(*recorder_, failure ? failure->to_string() : std::string());
+  return ended_;
 }
 
 void RecordDesk::add(const ServerStatus& status) {
-  const auto recorder = this->recorder();
-  if (recorder == nullptr) return;
+  const auto all = recorders();
+  if (all.empty()) return;
   const SimStats simulated = stream_->source.stats();
-  recorder->set_step_cost(simulated.step_cost * std::max<uint32_t>(simulated.substeps, 1));
-  recorder->add(status);
+  for (const auto& recorder : all) {
+    recorder->set_step_cost(simulated.step_cost * std::max<uint32_t>(simulated.substeps, 1));
+    recorder->add(status);
+  }
 }
 
 std::optional<Error> RecordDesk::failure() const {
-  const auto recorder = this->recorder();
-  if (recorder == nullptr || !recorder->failure()) return std::nullopt;
-  return at(recorder->path().string(), *recorder->failure());
+  for (const auto& recorder : recorders())
+    if (const auto failure = recorder->failure()) return at(recorder->path().string(), *failure);
+  return std::nullopt;
 }
 
 std::optional<RecordCounters> RecordDesk::counters() const {
-  const auto recorder = this->recorder();
-  return recorder != nullptr ? std::optional(recorder->counters()) : std::nullopt;
+  std::optional<RecordCounters> sum;
+  for (const auto& recorder : recorders()) {
+    const RecordCounters one = recorder->counters();
+    if (!sum) {
+      sum = one;
+      continue;
+    }
+    sum->written_bytes += one.written_bytes;
+    sum->waiting_bytes += one.waiting_bytes;
+    sum->frame_bytes += one.frame_bytes;
+    sum->frames += one.frames;
+    sum->states += one.states;
+    sum->last_tick = std::max(sum->last_tick, one.last_tick);
+    sum->lost_frames += one.lost_frames;
+    sum->lost_messages += one.lost_messages;
+    sum->length_s = std::max(sum->length_s, one.length_s);
+    sum->lag_ms = std::max(sum->lag_ms, one.lag_ms);
+    sum->has_failed = sum->has_failed || one.has_failed;
+  }
+  return sum;
 }
 
 }  // namespace strandcast

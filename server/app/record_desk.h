@@ -1,6 +1,6 @@
-// RecordDesk: the recordings of one head: the one that --record starts with it, and those that controllers
-// start and stop in the folder of --record-dir, one at a time. Work that may wait for the disk runs on a
-// thread of its own, which exists only with such a folder.
+// RecordDesk: the recordings of one head: the one that --record starts with it, and takes that controllers
+// start and stop in the folder of --record-dir, one at a time, beside it or without it. Work that may wait
+// for the disk runs on a thread of its own, which exists only with such a folder.
 #pragma once
 
 #include <condition_variable>
@@ -12,6 +12,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "common/base/result.h"
 #include "server/record/recorder.h"
@@ -69,24 +70,25 @@ class RecordDesk {
   RecordDesk& operator=(const RecordDesk&) = delete;
 
   /// Returns the tap of the recording that starts with the server; null without one.
-  StepTap* first_tap() { return recorder_.get(); }
+  StepTap* first_tap() { return whole_.get(); }
   /// Connects the desk to the stream; call it before the source starts.
   Status attach(Stream stream);
   /// Begins recording; call it after the source has started.
   void begin();
-  /// Ends the recording. The source must have stopped already.
+  /// Ends all recordings. The source must have stopped already.
   void stop();
 
   // From any thread; return at once.
-  /// Starts or stops a recording. The reply comes on another thread, unless the command is refused at once.
+  /// Starts or stops a take; without one, stops the recording that began with the server. The reply comes on
+  /// another thread, unless the command is refused at once.
   void obey(const RecordCommand& command, Reply reply);
-  /// Describes the recording for a person: "take 5.mcap: 12.5 s, 3.2 MB", or why it ended; empty = nothing is
-  /// recorded.
+  /// Describes the recordings for a person: "take 5.mcap: 12.5 s, 3.2 MB", or why they ended; empty = nothing
+  /// is recorded.
   std::string text() const;
   void add(const ServerStatus& status);
-  /// Returns the counters of the recording; empty if nothing is recorded.
+  /// Returns the counters of the recordings together; empty if nothing is recorded.
   std::optional<RecordCounters> counters() const;
-  /// Why the recording in hand is not whole; nothing while all is well, or without one. Any thread.
+  /// Why a recording in hand is not whole; nothing while all is well, or without one. Any thread.
   std::optional<Error> failure() const;
 
  private:
@@ -106,17 +108,20 @@ class RecordDesk {
   Result<uint64_t> change_tap(StepTap* tap, std::function<void()> at_change = {});
   std::string reason_to_end(const Recorder& recorder) const;
   void watch();
-  std::string end();
-  std::shared_ptr<Recorder> recorder() const;
+  std::string end(const std::shared_ptr<Recorder>& recorder);
+  /// Returns those in hand, the one that began with the server first.
+  std::vector<std::shared_ptr<Recorder>> recorders() const;
 
   const std::optional<RecordFolder> folder_;
   std::optional<Stream> stream_;
 
   mutable std::mutex mutex_;  // guards the block below
   std::condition_variable changed_;
-  std::shared_ptr<Recorder> recorder_;  // null: nothing is recorded
-  std::string ended_;                   // how the last one ended by itself; until somebody asks for another
-  std::optional<Order> order_;          // that is carried out, or waits for it
+  std::shared_ptr<Recorder> whole_;  // of --record; null: none
+  std::shared_ptr<Recorder> take_;   // of a command; likewise
+  std::unique_ptr<StepTap> both_;    // tells them both, while there are two
+  std::string ended_;                // how the last one ended by itself; until somebody asks for another
+  std::optional<Order> order_;       // that is carried out, or waits for it
   bool is_stopping_ = false;
 
   std::thread thread_;

@@ -37,6 +37,8 @@ Status ServedHead::load(OtherHeads others) {
     ASSIGN_OR_RETURN(records_, RecordDesk::make(config_.record, config_.record_folder));
     config_.tap = records_->first_tap();
   }
+  ASSIGN_OR_RETURN(sender_,
+                   HeadSender::open(config_.sends, static_cast<uint32_t>(number_), scene.step_rate_hz));
   config_.shared = &shared_;
   ASSIGN_OR_RETURN(source_, config_.make_source(config_, inputs_));
   if (const std::optional<SceneDesc> loaded = source_->scene()) scene.camera = loaded->camera;
@@ -135,6 +137,11 @@ Status ServedHead::start(NetServer& net) {
   RETURN_IF_ERROR(source_->start(*stage_sink_, config_.scene.stream));
   if (records_ != nullptr) records_->begin();
   hub_->set_picture_budget(is_drawn_by_processors_ ? kSoftwareBudget : kHardwareBudget);
+  if (!sender_->is_empty()) {
+    Demand every_state;
+    every_state.has_states = true;
+    RETURN_IF_ERROR(hub_->set_demand(hub_->add(*sender_), every_state));
+  }
   hub_->set_source([source = source_.get()](const SourceDemand& demand) { source->set_demand(demand); });
   return {};
 }

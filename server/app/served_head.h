@@ -92,6 +92,7 @@ class ServedHead {
   NetServer* net_ = nullptr;
   // In the order in which each is used by those below it.
   SharedSlot shared_;  // outlives who uses it
+  std::unique_ptr<HeadSender> sender_;
   std::unique_ptr<StreamHub> hub_;
   std::optional<StageSink> stage_sink_;
   std::unique_ptr<StateSource> source_;

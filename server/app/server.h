@@ -12,6 +12,7 @@
 
 #include "common/base/result.h"
 #include "common/scene/scene_desc.h"
+#include "server/app/head_sender.h"
 #include "server/app/record_desk.h"
 #include "server/encode/picture_painter.h"
 #include "server/input/input_hub.h"
@@ -50,6 +51,7 @@ struct ServerConfig {
   std::optional<std::string> fallback_codec;
   /// Addresses, besides this machine, that may send to the scene's live inputs.
   std::vector<AddressRange> live_allowed;
+  std::vector<HeadSend> sends;                // programs that follow the heads
   std::optional<RecordConfig> record;         // from the first state on
   std::optional<RecordFolder> record_folder;  // who controls may record into it
   StepTap* tap = nullptr;  // of the simulation from the first step on; set by the server where it records

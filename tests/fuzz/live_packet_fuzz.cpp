@@ -1,12 +1,13 @@
 // libFuzzer entry: packets of the live protocols that are not OSC; over TCP the stream in pieces of any size
 // too.
+#include "common/motion/opentrackio.h"
 #include "tests/fuzz/fuzz_input.h"
 #include "tests/fuzz/live_checks.h"
 
 namespace strandcast::live_packet_fuzz {
 namespace {
 
-constexpr const char* kProtocols[] = {"opentrack", "freed", "natnet", "vrpn", "livelinkface"};
+constexpr const char* kProtocols[] = {"opentrack", "freed", "natnet", "vrpn", "livelinkface", "opentrackio"};
 constexpr const char* kVersions[] = {"", "3.0", "4.0", "4.1", "2.5", "2.9"};
 
 /// A stream says the same however it is cut, unless a piece was refused.
@@ -27,6 +28,18 @@ void check_cuts(const LiveParserConfig& config, std::span<const std::byte> strea
   for (size_t i = 0; i < poses.size(); ++i) CHECK(is_same(poses[i], packet->poses[i]));
 }
 
+/// With the checksum that it should have, so that documents are reached.
+std::span<const std::byte> with_checksum(std::vector<std::byte>& packet) {
+  if (packet.size() < kTrackHeaderBytes) return packet;
+  const size_t length = (packet.size() - kTrackHeaderBytes) & kMaxTrackPayloadBytes;
+  packet[12] = (packet[12] & std::byte{0x80}) | static_cast<std::byte>(length >> 8);
+  packet[13] = static_cast<std::byte>(length & 0xFF);
+  const uint16_t sum = fletcher16(std::span(packet).first(14), std::span(packet).subspan(kTrackHeaderBytes));
+  packet[14] = static_cast<std::byte>(sum >> 8);
+  packet[15] = static_cast<std::byte>(sum & 0xFF);
+  return packet;
+}
+
 }  // namespace
 
 extern "C" int FUZZ_ENTRY(live_packet)(const uint8_t* data, size_t size) {
@@ -39,7 +52,9 @@ extern "C" int FUZZ_ENTRY(live_packet)(const uint8_t* data, size_t size) {
   config.protocol_version = kVersions[(settings >> 1) % std::size(kVersions)];
   LiveParserPair parsers(config);
   while (!input.is_empty()) {
-    const auto piece = input.take_piece();
+    auto piece = input.take_piece();
+    std::vector<std::byte> summed(piece.begin(), piece.end());
+    if (config.protocol == "opentrackio" && (settings & 2) != 0) piece = with_checksum(summed);
     parsers.parse(piece);
     if (config.protocol == "vrpn") check_cuts(config, piece, 1 + (settings >> 3));
   }

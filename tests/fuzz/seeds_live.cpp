@@ -84,7 +84,7 @@ void add_live_osc(const SeedFolder& seeds) {
 
 /// The other live protocols: right packets, cut ones, wrong checksums, counts beyond all bounds.
 void add_live_packets(const SeedFolder& seeds) {
-  enum Protocol : uint8_t { kOpentrack, kFreed, kNatnet, kVrpn, kFace };
+  enum Protocol : uint8_t { kOpentrack, kFreed, kNatnet, kVrpn, kFace, kTrack };
   const auto add = [&](Protocol protocol, uint8_t settings, const std::string& name,
                        std::initializer_list<Bytes> packets) {
     seeds.add("live_packet", name,
@@ -127,6 +127,21 @@ void add_live_packets(const SeedFolder& seeds) {
   add(kFace, 0, "face", {face, cut(face, 245), cut(face, 1), with(face, 0, 7), with(face, 1, 0xff)});
   add(kFace, 1, "face_sized",
       {test::PacketWriter(std::endian::big).put(static_cast<uint32_t>(face.size())).append(face).bytes()});
+  const std::string track =
+      R"({"sourceNumber":1,"timing":{"sequenceNumber":2,"sampleRate":{"num":60,"denom":1}},"transforms":[)"
+      R"({"translation":{"x":1,"y":2,"z":3},"rotation":{"pan":1,"tilt":2,"roll":3},"scale":{"x":1,"y":1,"z":1}}]})";
+  const Bytes whole = test::opentrackio(track);
+  const auto piece = [&](size_t at, size_t size) {
+    return test::opentrackio(track.substr(at, size),
+                             {.offset = static_cast<uint32_t>(at), .is_last = at + size >= track.size()});
+  };
+  add(kTrack, 0, "opentrackio", {whole, cut(whole, 1), with(whole, 14, 0), with(whole, 5, 0x80)});
+  add(kTrack, 2, "opentrackio_segments",
+      {piece(0, 50), piece(50, 50), piece(50, 50), piece(100, 50), piece(150, track.size() - 150)});
+  const std::string cbor("\xBF\x6Atransforms\x9F\xA1\x68rotation\xA1\x63pan\xF9\x3E\x00\xFF\xFF", 33);
+  add(kTrack, 2, "opentrackio_cbor",
+      {test::opentrackio(cbor, {.encoding = 2}),
+       test::opentrackio(std::string(60, '\x81'), {.encoding = 2})});
 }
 
 }  // namespace

@@ -104,6 +104,34 @@ TEST(ChaosPipe, DelayAndJitterStayWithinTheirBounds) {
   EXPECT_NEAR(mean, 55'000.0, 4.0 * 10'000.0 / std::sqrt(12.0 * 200.0)) << "four standard errors";
 }
 
+TEST(ChaosPipe, WhatIsLostComesARoundTripLater) {
+  constexpr int kSegments = 2'000;
+  LinkPlan plan;
+  plan.delay_us = 5'000;
+  const auto late_of = [&](double loss) {
+    plan.loss = loss;
+    ChaosPipe pipe(plan, kSeed);
+    int late = 0;
+    for (int64_t i = 0; i < kSegments; ++i) {
+      const int64_t sent_us = i * kSInUs;  // none waits for one before
+      pipe.push(numbers(100), sent_us);
+      const int64_t more_us = drain(pipe, sent_us).times_us.front() - sent_us - plan.delay_us;
+      EXPECT_EQ(more_us % (2 * plan.delay_us + kResendUs), 0);
+      late += more_us > 0 ? 1 : 0;
+    }
+    return late;
+  };
+  EXPECT_EQ(late_of(0.0), 0);
+  EXPECT_NEAR(late_of(0.05), 0.05 * kSegments, 4.0 * std::sqrt(0.05 * 0.95 * kSegments)) << "four deviations";
+  // Those behind it wait: a second of segments 1 ms apart comes in order.
+  plan.loss = 0.05;
+  ChaosPipe pipe(plan, kSeed);
+  const auto sent = numbers(100'000);
+  for (size_t i = 0; i < 1'000; ++i)
+    pipe.push(std::span(sent).subspan(i * 100, 100), static_cast<int64_t>(i) * 1'000);
+  EXPECT_EQ(drain(pipe, kSInUs).bytes, sent);
+}
+
 TEST(ChaosPipe, CorruptionDependsOnSeedAndPlaceOnly) {
   LinkPlan plan;
   plan.corrupt_per_byte = 1e-3;

@@ -276,7 +276,6 @@ TEST_F(RecordCommands, EndTheRecordingThatBeganWithTheServer) {
   both.record = RecordConfig{file("run.mcap"), IfPresent::Refuse};
   if (!start(both)) return;
   run_to(20);
-  EXPECT_THAT(start_recording("take").text, HasSubstr("run.mcap is being recorded already"));
   EXPECT_EQ(run_command(ctl_target(), SetParameter{"substeps=2"}), kDoneExit);
   run_to(30);
   EXPECT_FALSE(stop_recording().is_error);
@@ -295,6 +294,29 @@ TEST_F(RecordCommands, EndTheRecordingThatBeganWithTheServer) {
   EXPECT_THAT(compared->notes, testing::Contains(HasSubstr("the second one begins at step")));
   EXPECT_THAT(compared->notes, testing::Contains(HasSubstr("no step in common")));
   EXPECT_FALSE(compared->first_different_tick);
+}
+
+TEST_F(RecordCommands, TakeAPartOfTheRecordingThatBeganWithTheServer) {
+  ServerConfig both = config();
+  both.record = RecordConfig{file("run.mcap"), IfPresent::Refuse};
+  if (!start(both)) return;
+  run_to(20);
+  EXPECT_FALSE(start_recording("take").is_error);
+  EXPECT_THAT(start_recording("other").text, HasSubstr("take.mcap is being recorded already"));
+  const uint64_t of_whole = server_->counters().record->states;
+  EXPECT_GT(of_whole, 20u) << "those of the whole recording too";
+  run_to(60);
+  EXPECT_THAT(stop_recording().text, HasSubstr("take.mcap"));
+  const uint64_t end_tick = tick();
+  run_to(end_tick + 20);
+  EXPECT_THAT(stop_recording().text, HasSubstr("run.mcap"));
+  EXPECT_GT(check(file("take.mcap")).states, 20u);
+  EXPECT_GT(check(file("run.mcap")).states, end_tick);
+  EXPECT_EQ(replayed(file("run.mcap")), "equal") << "takes leave no gap in it";
+  const auto compared = compare_recordings(file("run.mcap"), file("take.mcap"));
+  ASSERT_TRUE(compared) << compared.error().to_string();
+  EXPECT_FALSE(compared->first_different_tick);
+  EXPECT_THAT(compared->notes, testing::Not(testing::Contains(HasSubstr("no step in common"))));
 }
 
 TEST_F(RecordCommands, BeginWhereTimeStandsStill) {

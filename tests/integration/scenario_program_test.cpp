@@ -116,13 +116,16 @@ TEST_F(ScenarioProgram, AnExpectationThatFailsIsExitCodeOneWithEvidence) {
                            "do { refuse { set: \"substeps=2\" } }\n"
                            "do { expect { metric { name: \"strandcast_sim_steps_total\" equals: 6 } } }\n");
   EXPECT_EQ(run({"--scenario", path.string()}), 1) << text_of("said");
-  EXPECT_THAT(text_of("said"),
-              AllOf(HasSubstr("FAIL  line 5    state at step 6: wanted 0000000000000001"),
-                    HasSubstr("FAIL  line 5    frames per second of a: wanted above 1e+06"),
-                    HasSubstr("FAIL  line 6    no_such"), HasSubstr("FAIL  line 7    set substeps=2"),
-                    HasSubstr("ok    line 8"), HasSubstr("bad: 1 of 5 checks hold")));
+  EXPECT_THAT(
+      text_of("said"),
+      AllOf(HasSubstr("FAIL  line 5    state at step 6: is "), HasSubstr(", wanted 0000000000000001\n"),
+            HasSubstr("FAIL  line 5    frames per second of a: measured "),
+            HasSubstr(", wanted above 1e+06, it sees strands ("), HasSubstr("FAIL  line 6    no_such"),
+            HasSubstr("FAIL  line 7    set substeps=2"), HasSubstr("ok    line 8"),
+            HasSubstr("bad: 1 of 5 checks hold")));
   EXPECT_THAT(text_of("results.xml"), HasSubstr("failures=\"4\""));
-  EXPECT_THAT(text_of("out/bad_plot.svg"), HasSubstr("largest stretch"));
+  EXPECT_THAT(text_of("out/bad_plot.svg"),
+              AllOf(HasSubstr("largest stretch"), HasSubstr("wanted above 1e+06")));
   EXPECT_TRUE(std::filesystem::exists(folder_.path() / "out/bad_a.png"));
   EXPECT_TRUE(std::filesystem::exists(folder_.path() / "out/bad_server.log"));
 }
@@ -147,6 +150,46 @@ TEST_F(ScenarioProgram, AStretchThatFailsSaysWhereAndWhatHelps) {
   EXPECT_THAT(text_of("said"), testing::ContainsRegex("wanted below 1e-06" + where +
                                                       "a stream.bound_m that is [0-9]+ times finer"));
   EXPECT_THAT(text_of("results.xml"), testing::ContainsRegex("<failure message=\"measured [0-9.]+ .seen"));
+}
+
+TEST_F(ScenarioProgram, AStateIsComparedWithAKeptOne) {
+  const auto scenario = [](const char* set) {
+    return std::string("name: \"kept\"\ndo { start { set: \"groom.procedural.strand_count=20\" set: \"") +
+           set +
+           "\" lockstep: true } }\ndo { feed { motion: \"builtin\" } }\ndo { step: 6 }\n"
+           "do { expect { hash_file: \"kept/hash.txt\" } }\n";
+  };
+  std::filesystem::create_directories(folder_.path() / "kept");
+  const auto path = write("kept.textproto", scenario("substeps=2"));
+  EXPECT_EQ(run({"--scenario", path.string()}), 1);
+  EXPECT_THAT(text_of("said"), HasSubstr("(--renew writes it)"));
+  EXPECT_EQ(run({"--scenario", path.string(), "--renew"}), 0) << text_of("said");
+  EXPECT_EQ(run({"--scenario", path.string()}), 0) << text_of("said");
+  EXPECT_THAT(text_of("said"), testing::ContainsRegex("wanted [0-9a-f]+ of hash.txt, is [0-9a-f]+"));
+  write("kept.textproto", scenario("substeps=3"));
+  EXPECT_EQ(run({"--scenario", path.string()}), 1);
+  EXPECT_THAT(text_of("said"), testing::ContainsRegex("is [0-9a-f]+, wanted [0-9a-f]+ of hash.txt, solver"));
+}
+
+// Nothing comes through a line that stalls; it comes when the line is whole again.
+TEST_F(ScenarioProgram, WhatIsWrongWithALineIsSeen) {
+  const auto path = write("line.textproto", std::string("name: \"line\"\n") + kStart +
+                                                "do { view { name: \"a\" } }\n"
+                                                "do { step: 6 }\n"
+                                                "do { expect { back_within_s: 1 } }\n"
+                                                "do { link { fault: STALL } }\n"
+                                                "do { run_s: 0.2 }\n"
+                                                "do { expect { hz_above: 0 } }\n"
+                                                "do { link {} } do { step: 6 }\n"
+                                                "do { expect { back_within_s: 5 } }\n"
+                                                "do { command: RESTART_RELAY }\n");
+  EXPECT_EQ(run({"--scenario", path.string()}), 1) << text_of("said");
+  EXPECT_THAT(
+      text_of("said"),
+      AllOf(HasSubstr("FAIL  line 5    a comes back: neither its server was restarted nor its link changed"),
+            HasSubstr("FAIL  line 8    frames per second of a: measured 0.0, wanted above 0, it sees"),
+            HasSubstr("ok    line 10   a comes back: wanted within 5 s, was back after"),
+            HasSubstr("FAIL  line 11"), HasSubstr("relay: true")));
 }
 
 // What is needed for the rest is not there: the rest is not done, and the limit ends what would take for
@@ -205,8 +248,9 @@ TEST_P(ShippedScenario, Holds) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedScenario,
-                         testing::Values("auto_mode", "bad_input", "calm_stream", "hostile", "look", "pace",
-                                         "restart", "same_bits", "shake", "slow_motion", "thin_line"),
+                         testing::Values("auto_mode", "bad_input", "broken_line", "calm_stream", "hostile",
+                                         "look", "lossy_line", "pace", "relay_dies", "restart", "same_bits",
+                                         "shake", "slow_motion", "thin_line"),
                          [](const auto& one) { return std::string(one.param); });
 
 }  // namespace

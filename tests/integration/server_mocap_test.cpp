@@ -3,11 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <mutex>
 #include <thread>
 
-#include "client/app/mocap_packet.h"
+#include "common/motion/mocap_packet.h"
 #include "common/motion/motion_clip.h"
 #include "common/scene/scene_file.h"
 #include "server/input/input_hub.h"
@@ -25,6 +26,12 @@ namespace {
 using test::UdpSocket;
 using testing::AllOf;
 using testing::HasSubstr;
+
+Result<std::unique_ptr<LiveParser>> parser_of(const std::string& protocol) {
+  LiveParserConfig config;
+  config.protocol = protocol;
+  return make_live_parser(config);
+}
 
 /// A server that hears one protocol on a port of its own.
 class LiveMocap : public test::ServerFixture {
@@ -254,14 +261,43 @@ TEST_F(LiveMocap, SendersThatMayNotAreRefused) {
   EXPECT_GE(log.count(stranger.name() + " may not send"), 1u);
 }
 
-Result<std::unique_ptr<LiveParser>> parser_of(const std::string& protocol) {
-  LiveParserConfig config;
-  config.protocol = protocol;
-  return make_live_parser(config);
+// What comes by one protocol goes on by others, as the head moves.
+TEST_F(LiveMocap, OtherProgramsFollowTheHead) {
+  const std::array<UdpSocket, 3> sockets;
+  const std::array<std::string, 3> protocols = {"opentrackio", "opentrackio-cbor", "vmc"};
+  const bool is_there = listen({.protocol = "opentrack"}, [&](ServerConfig& config) {
+    for (size_t i = 0; i < sockets.size(); ++i)
+      config.sends.push_back({protocols[i], {"127.0.0.1", sockets[i].port()}});
+  });
+  if (!is_there) return;
+  UdpSocket tracker;
+  ASSERT_TRUE(sends_until(tracker, tracked(30.0, 90.0), [&] { return is_head_at({0.3, 0.0, 0.0}); }));
+  for (size_t i = 0; i < sockets.size(); ++i) {
+    auto parser = parser_of(protocols[i].substr(0, protocols[i].find('-'))).value();
+    EXPECT_TRUE(sends_until(tracker, tracked(30.0, 90.0), [&] {
+      const auto packet = parser->parse(sockets[i].take(), 0);
+      return packet && packet->poses.size() == 1 &&
+             glm::distance(packet->poses[0].world_from_subject.position_m, glm::dvec3(0.3, 0, 0)) < 1e-3 &&
+             angle_between_rad(packet->poses[0].world_from_subject.rotation, head().rotation) < 1e-2;
+    })) << protocols[i];
+  }
+}
+
+TEST(HeadSends, AreOneSentenceWhereTheyAreWrong) {
+  EXPECT_EQ(parse_head_send("opentrackio://239.135.1.7").value(),
+            (HeadSend{"opentrackio", {"239.135.1.7", 55555}}));
+  EXPECT_EQ(parse_head_send("vmc:5").value(), (HeadSend{"vmc", {"127.0.0.1", 5}}));
+  EXPECT_THAT(parse_head_send("natnet").error().to_string(), AllOf(HasSubstr("--send"), HasSubstr("freed")));
+  EXPECT_THAT(parse_head_send("vmc:0").error().to_string(), HasSubstr("--send vmc:0"));
+  // Of further heads, what numbers them.
+  const auto second = HeadSender::open({{"vmc", {}}, {"opentrack", {}}}, 1, 60.0);
+  ASSERT_TRUE(second);
+  EXPECT_TRUE((*second)->is_empty());
+  EXPECT_FALSE(HeadSender::open({{"freed", {}}}, 1, 60.0).value()->is_empty());
 }
 
 TEST(MocapPackets, SayWhatTheirParsersRead) {
-  for (const char* name : {"vmc", "opentrack", "freed"}) {
+  for (const char* name : {"vmc", "opentrack", "freed", "opentrackio"}) {
     SCOPED_TRACE(name);
     const auto encoding = find_mocap_encoding(name);
     ASSERT_TRUE(encoding);

@@ -136,6 +136,27 @@ inline PacketBytes freed(const FreedPacket& packet) {
   return writer.put(static_cast<uint8_t>(sum & 0xFF)).bytes();
 }
 
+struct TrackPacketFields {
+  uint8_t encoding = 1;  // JSON
+  uint16_t sequence = 0;
+  uint32_t offset = 0;  // of the payload in its sample
+  bool is_last = true;
+};
+/// A segment of OpenTrackIO around a payload, with Fletcher-16 over header and payload.
+inline PacketBytes opentrackio(const std::string& payload, const TrackPacketFields& fields = {}) {
+  PacketWriter header(std::endian::big);
+  header.text("OTrk").put(uint8_t{0}).put(fields.encoding).put(fields.sequence).put(fields.offset);
+  header.put(static_cast<uint16_t>(payload.size() + (fields.is_last ? 0x8000 : 0)));
+  const PacketBytes summed = PacketWriter(header).text(payload).bytes();
+  uint32_t sum = 0, sums = 0;
+  for (const std::byte byte : summed) {
+    sum = (sum + std::to_integer<uint32_t>(byte)) % 255;
+    sums = (sums + sum) % 255;
+  }
+  header.put(static_cast<uint8_t>(sums)).put(static_cast<uint8_t>(sum));
+  return header.text(payload).bytes();
+}
+
 struct NatnetPacketBody {
   uint32_t id = 1;
   Triple position_m{};

@@ -45,6 +45,13 @@ class UdpSocket {
     pollfd waiting{socket_, POLLIN, 0};
     return poll(&waiting, 1, kMostMs) == 1;
   }
+  /// Takes a datagram that has come; empty when there is none.
+  std::vector<std::byte> take() const {
+    std::vector<std::byte> bytes(65'536);
+    const ssize_t size = recv(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT);
+    bytes.resize(size > 0 ? static_cast<size_t>(size) : 0);
+    return bytes;
+  }
   uint16_t port() const { return port_; }
   /// As a receiver names it.
   std::string name() const { return address_ + ":" + std::to_string(port_); }

@@ -15,6 +15,7 @@ LinkPlan plan_of(const ChaosOptions& options) {
   LinkPlan plan;
   plan.delay_us = static_cast<int64_t>(options.delay_ms * kUsPerMs);
   plan.jitter_us = static_cast<int64_t>(options.jitter_ms * kUsPerMs);
+  plan.loss = options.loss;
   plan.bytes_per_s = static_cast<uint64_t>(options.rate_mbit * kBytesPerMbit);
   plan.queue_bytes = static_cast<size_t>(options.queue_kb * 1e3);
   plan.freeze_every_us = static_cast<int64_t>(options.freeze_every_ms * kUsPerMs);
@@ -40,6 +41,9 @@ void declare_chaos(CLI::App& app, ChaosOptions& options) {
       ->capture_default_str();
   app.add_option("--delay-ms", options.delay_ms, "Delay of each direction")->check(ms);
   app.add_option("--jitter-ms", options.jitter_ms, "Up to this much more, order kept")->check(ms);
+  app.add_option("--loss", options.loss,
+                 "Share of packets that TCP has to send again, with those behind waiting")
+      ->check(without_nan(CLI::Range(0.0, 0.5)));
   app.add_option("--rate-mbit", options.rate_mbit, "Rate of each direction, 0 = unlimited")
       ->check(without_nan(CLI::Range(0.0, 1e5)));
   app.add_option("--queue-kb", options.queue_kb, "Bytes that may wait for the rate")
@@ -58,7 +62,7 @@ void declare_chaos(CLI::App& app, ChaosOptions& options) {
   app.add_option("--writes", options.writes, "How bytes leave")
       ->check(CLI::IsMember({"as-read", "one-byte", "split", "merged"}))
       ->capture_default_str();
-  app.add_option("--seed", options.seed, "Seed of corruption, cuts and jitter")->capture_default_str();
+  app.add_option("--seed", options.seed, "Seed of corruption, cuts, loss and jitter")->capture_default_str();
   app.add_option("--seconds", options.seconds, "Stop after this long, 0 = until Ctrl-C")
       ->check(without_nan(CLI::Range(0.0, 1e6)));
 }

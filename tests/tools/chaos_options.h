@@ -18,7 +18,7 @@ struct ChaosOptions {
   std::string to = "127.0.0.1:" + std::to_string(kDefaultPort);
   std::string direction = "both";
   std::string writes = "as-read";
-  double delay_ms = 0.0, jitter_ms = 0.0, rate_mbit = 0.0, queue_kb = 128.0;
+  double delay_ms = 0.0, jitter_ms = 0.0, loss = 0.0, rate_mbit = 0.0, queue_kb = 128.0;
   double freeze_every_ms = 0.0, freeze_ms = 0.0, corrupt_per_mb = 0.0, reset_every_s = 0.0, seconds = 0.0;
   uint64_t reset_after_bytes = 0, silent_after_bytes = 0, seed = 1;
 };

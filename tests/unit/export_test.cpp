@@ -391,7 +391,7 @@ TEST(Export, UsdcSamplesAreTheFramesWithinAMicrometre) {
     options.path = folder.path() / "hair.usdc";
     options.unit = unit;
     options.space = ExportSpace::World;
-    options.fps = 24;
+    options.fps = {24, 1};
     const ExportReport report = exported(states, options);
     EXPECT_EQ(report.frame_count, 25u);
     EXPECT_EQ(report.bytes, std::filesystem::file_size(options.path));
@@ -432,7 +432,7 @@ TEST(Export, UsdcSamplesAreTheFramesWithinAMicrometre) {
 TEST(Export, UsdcSaysWhatUsdaSays) {
   const TemporaryFolder folder;
   ExportOptions options;
-  options.fps = 25;
+  options.fps = {25, 1};
   options.up = ExportUp::Z;
   options.role = ExportRole::Guides;
   for (const char* const name : {"hair.usda", "hair.usdc"}) {

@@ -473,6 +473,10 @@ PacketBytes right_packet(const std::string& protocol, uint32_t number) {
   if (protocol == "opentrack") return test::opentrack({0, 160, 0, 0, 0, 0});
   if (protocol == "freed") return test::freed(freed);
   if (protocol == "livelinkface") return test::live_link_face(face);
+  if (protocol.starts_with("opentrackio"))
+    return test::opentrackio(fmt::format(
+        R"({{"timing":{{"sequenceNumber":{}}},"transforms":[{{"translation":{{"x":0,"y":0,"z":1.6}}}}]}})",
+        number));
   if (protocol != "vrpn") return test::natnet(natnet);
   return test::vrpn_pose(t_s, 0, 3, 0, {0, 1.6, 0}, {0, 0, 0, 1});
 }
@@ -510,8 +514,8 @@ PacketBytes mutated(PacketBytes bytes, std::mt19937& random) {
 }
 
 TEST(LiveSenders, AThousandDamagedPacketsCostNoStep) {
-  for (const std::string name :
-       {"vmc", "opentrack", "freed", "natnet", "natnet 2.7", "vrpn", "livelinkface"}) {
+  for (const std::string name : {"vmc", "opentrack", "freed", "natnet", "natnet 2.7", "vrpn", "livelinkface",
+                                 "opentrackio", "opentrackio document"}) {
     SCOPED_TRACE(name);
     const std::string protocol = name.substr(0, name.find(' '));
     std::mt19937 random(45);
@@ -527,7 +531,15 @@ TEST(LiveSenders, AThousandDamagedPacketsCostNoStep) {
       for (int right = 0; right < 2; ++right)
         stage.send(right_packet(name, ++number), time_ns += 10 * kMsInNs);
       const uint64_t malformed = stage.source->status(time_ns).malformed;
-      stage.send(mutated(right_packet(name, ++number), random), time_ns += 10 * kMsInNs);
+      PacketBytes wrong = right_packet(name, ++number);
+      if (name == "opentrackio document") {  // with a right header
+        const PacketBytes document = mutated(PacketBytes(wrong.begin() + 16, wrong.end()), random);
+        wrong =
+            test::opentrackio(std::string(reinterpret_cast<const char*>(document.data()), document.size()));
+      } else {
+        wrong = mutated(wrong, random);
+      }
+      stage.send(wrong, time_ns += 10 * kMsInNs);
       // A stream that said something wrong, or waits for bytes that do not come, begins anew.
       if (protocol == "vrpn") {
         if (stage.source->status(time_ns).malformed == malformed) stage.source->begin_connection();

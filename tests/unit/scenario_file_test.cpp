@@ -20,7 +20,7 @@ TEST(ScenarioFile, ReadsActionsInOrderWithTheirLines) {
 about: "a promise"
 limit_s: 12.5
 repeat: 2
-do { start { scene: "../scenes/minimal.textproto" set: "substeps=2" lockstep: true option: "--sim-device" } }
+do { start { scene: "../scenes/minimal.textproto" set: "substeps=2" lockstep: true relay: true option: "--sim-device" } }
 do { feed { motion: "walk.bvh" wind: "steady" wind_mps { x: 2 } from_s: 1.5 } }
 do { step: 240 }
 do { run_s: 0.5 }
@@ -37,19 +37,22 @@ do { expect { viewer: "thin" stretch_below: 0.01 no_quarantine: true hash: "00ff
   picture { golden: "a.png" db_above: 30 } metric { name: "x" above: 1 within_s: 2 }
   slow_motion: false realtime_below: 0.5 feed_pace_within: 0.1 head_mps_below: 12 within_s: 3 } }
 do { send { port: 39541 hex: "00 fF" hex: "7f" file: "packet.bin" random_bytes: 9 count: 3 rate_hz: 50 } }
+do { link { viewer: "thin" fault: HALF_OPEN loss: 0.05 delay_ms: 20 link_mbit: 3 } }
+do { expect { hash_file: "kept.txt" } }
 )");
   ASSERT_TRUE(scenario) << scenario.error().to_string();
   EXPECT_EQ(scenario->name, "all");
   EXPECT_EQ(scenario->about, "a promise");
   EXPECT_EQ(scenario->limit_s, 12.5);
   EXPECT_EQ(scenario->repeat, 2u);
-  ASSERT_EQ(scenario->actions.size(), 12u);
+  ASSERT_EQ(scenario->actions.size(), 14u);
   EXPECT_EQ(scenario->actions[0].line, 5);
   EXPECT_EQ(scenario->actions[10].line, 16);
   const auto& start = std::get<ScenarioStart>(scenario->actions[0].work);
   EXPECT_EQ(start.scene, "/scenes/minimal.textproto") << "from the scenario's folder";
   EXPECT_EQ(start.overrides, std::vector<std::string>{"substeps=2"});
   EXPECT_TRUE(start.is_lockstep);
+  EXPECT_TRUE(start.has_relay);
   EXPECT_EQ(start.options, std::vector<std::string>{"--sim-device"});
   const auto& feed = std::get<ScenarioFeed>(scenario->actions[1].work);
   EXPECT_EQ(feed.motion, "/folder/walk.bvh");
@@ -90,6 +93,13 @@ do { send { port: 39541 hex: "00 fF" hex: "7f" file: "packet.bin" random_bytes: 
   EXPECT_EQ(send.random_bytes, 9u);
   EXPECT_EQ(send.count, 3u);
   EXPECT_EQ(send.rate_hz, 50.0);
+  const auto& link = std::get<ScenarioLink>(scenario->actions[12].work);
+  EXPECT_EQ(link.viewer, "thin");
+  EXPECT_EQ(link.fault, ScenarioFault::HalfOpen);
+  EXPECT_EQ(link.loss, 0.05);
+  EXPECT_EQ(link.delay_ms, 20.0);
+  EXPECT_EQ(link.link_mbit, 3.0);
+  EXPECT_EQ(std::get<ScenarioExpect>(scenario->actions[13].work).hash_file, "/folder/kept.txt");
 }
 
 TEST(ScenarioFile, SaysWhereItIsWrong) {
@@ -101,6 +111,7 @@ TEST(ScenarioFile, SaysWhereItIsWrong) {
       {head + "do { expect { stretch_under: 1 } }", "known: viewer, stretch_below"},
       {head + "do { view { mode: \"both\" } }", "must be one of strands, frames, auto"},
       {head + "do { view { link_mbit: -2 } }", "link_mbit is -2"},
+      {head + "do { link { loss: 0.6 } }", "loss is 0.6, it must be within 0 .. 0.5"},
       {head + "do { view { draws: \"gpu\" } }", "must be one of hardware, software, none"},
       {head + "do { view { draw_ms: -1 } }", "draw_ms is -1"},
       {head + "do { expect { because: \"slow\" } }", "because is of a mode"},
@@ -174,7 +185,10 @@ TEST(ScenarioFile, EveryShippedScenarioParses) {
       EXPECT_TRUE(std::filesystem::exists(expect->picture->golden)) << expect->picture->golden;
     }
   }
-  EXPECT_EQ(names.size(), 11u);
+  EXPECT_EQ(names.size(), 14u);
+  const auto example = load_scenario(std::filesystem::path(STRANDCAST_SOURCE_DIR) /
+                                     "examples/ci/same_as_last_release.textproto");
+  EXPECT_TRUE(example) << example.error().to_string();
 }
 
 }  // namespace

@@ -28,6 +28,11 @@ inline void tell(FieldTexts& told, const std::string& where, const std::vector<A
     text += fmt::format("{}/{};", range.first.to_string(), range.bit_count);
   told[where + "ranges"] = text;
 }
+inline void tell(FieldTexts& told, const std::string& where, const std::vector<HeadSend>& all) {
+  std::string text;
+  for (const HeadSend& send : all) text += fmt::format("{} {};", send.protocol, send.to.to_string());
+  told[where + "all"] = text;
+}
 // No option sets these: a server's start does.
 inline void tell(FieldTexts&, const std::string&, const SceneDesc&) {}
 inline void tell(FieldTexts&, const std::string&, const PageFiles&) {}
@@ -48,7 +53,7 @@ inline void tell(FieldTexts& told, const std::string& where, const NetConfig& al
 inline void tell(FieldTexts& told, const std::string& where, const ServerConfig& all) {
   OPTION_FIELDS(all, scene, net, sim_device, gl_device, renderer, shader_folder, on_publish, is_lockstep,
                 trace_path, make_painter, is_drawn_by_processors, make_source, fallback_codec, live_allowed,
-                record, record_folder, tap, shared);
+                sends, record, record_folder, tap, shared);
 }
 inline void tell(FieldTexts& told, const std::string& where, const ServerOptions& all) {
   OPTION_FIELDS(all, scene_path, overrides, mocap, token_path, port_path, log_level, has_json_log, run_s,
@@ -98,6 +103,9 @@ const OptionRow kSceneRows[] = {
     {"--mocap-subject", {"Zoe"}, {{"mocap.subject", "Zoe"}}, {"--mocap", "vmc"}},
     {"--mocap-axes", {"ypr-xyz"}, {{"mocap.axes", "ypr-xyz"}}, {"--mocap", "vmc"}},
     {"--mocap-scale", {"0.5"}, {{"mocap.scale", "0.5"}}, {"--mocap", "vmc"}},
+    {"--send",
+     {"vmc", "--send", "freed://10.0.0.5:7"},
+     {{"config.sends.all", "vmc 127.0.0.1:39539;freed 10.0.0.5:7;"}}},
     {"--mocap-allow", {"10.0.0.0/8"}, {{"config.live_allowed.ranges", "10.0.0.0/104;"}}},
     {"--record",
      {"a.mcap"},

@@ -8,7 +8,7 @@
 namespace strandcast::test {
 
 inline void tell(FieldTexts& told, const std::string& where, const chaos::LinkPlan& all) {
-  OPTION_FIELDS(all, delay_us, jitter_us, bytes_per_s, queue_bytes, freeze_every_us, freeze_us,
+  OPTION_FIELDS(all, delay_us, jitter_us, loss, bytes_per_s, queue_bytes, freeze_every_us, freeze_us,
                 reset_after_bytes, silent_after_bytes, corrupt_per_byte, writes);
 }
 inline void tell(FieldTexts& told, const std::string& where, const chaos::RelayConfig& all) {
@@ -68,6 +68,7 @@ TEST(ToolOptionTable, OfChaos) {
       {"--direction", {"down"}, {{"up.delay_us", "0"}, {"up.queue_bytes", without}}, {"--delay-ms", "2"}},
       both_ways("--delay-ms", "2", "delay_us", "2000"),
       both_ways("--jitter-ms", "2", "jitter_us", "2000"),
+      both_ways("--loss", "0.25", "loss", "0.25"),
       both_ways("--rate-mbit", "8", "bytes_per_s", "1000000"),
       both_ways("--queue-kb", "2", "queue_bytes", "2000"),
       both_ways("--freeze-every-ms", "2", "freeze_every_us", "2000"),

@@ -22,6 +22,7 @@ using std::chrono::milliseconds;
 constexpr milliseconds kExpectPoll{50};
 constexpr size_t kMaxExpectedChars = 300;
 constexpr double kRefusalTimeoutS = 10.0;
+constexpr size_t kHashChars = 16;
 
 /// The value of a line of /metrics; none where there is no such line.
 std::vector<double> find_metric(const std::string& text, const std::string& name) {
@@ -51,6 +52,13 @@ bool holds(const ScenarioMetric& metric, double value) {
          (!metric.equals || value == *metric.equals);
 }
 
+/// What a viewer knows of why it sees less than is wanted.
+std::string why_few_frames(const ViewerLook& look) {
+  if (!look.is_connected) return look.trouble;
+  return fmt::format("it sees {} ({}), every {} of the states", to_string(look.mode), look.mode_reason,
+                     look.rate_divisor == 1 ? std::string("one") : fmt::format("{}th", look.rate_divisor));
+}
+
 /// What was sent, for a person.
 const char* name_of(ScenarioInput input) {
   constexpr const char* kNames[] = {"nothing",
@@ -60,6 +68,10 @@ const char* name_of(ScenarioInput input) {
                                     "a camera that is not a number",
                                     "an assignment beyond the limit"};
   return kNames[static_cast<size_t>(input)];
+}
+
+std::string hash_text(const std::optional<uint64_t>& hash) {
+  return hash ? fmt::format("{:016x}", *hash) : std::string("none");
 }
 
 /// Links followed.
@@ -95,7 +107,7 @@ void ScenarioRun::report(const std::string& what, const std::string& wanted, con
   if (listener_) listener_(check);
 }
 
-Result<const ScenarioViewer*> ScenarioRun::viewer(const std::string& name) const {
+Result<ScenarioViewer*> ScenarioRun::viewer(const std::string& name) const {
   if (viewer_order_.empty()) return make_error(ErrorCode::BadInput, "there is no viewer: view comes first");
   const auto found = viewers_.find(name.empty() ? viewer_order_.front() : name);
   if (found == viewers_.end()) return make_error(ErrorCode::BadInput, "there is no viewer '{}'", name);
@@ -142,9 +154,13 @@ void ScenarioRun::expect_span(const ScenarioExpect& expect) {
            now.strand_frames > seen.before.strand_frames &&
                seen.after.largest_head_mps < *expect.head_mps_below);
   if (expect.stretch_below) expect_stretch(name, seen, *expect.stretch_below);
+  add_guide(&TraceSample::stretch, "below", expect.stretch_below);
+  add_guide(&TraceSample::hz, "above", expect.hz_above);
+  add_guide(&TraceSample::kbit, "below", expect.kbit_below);
   if (expect.hz_above)
     report("frames per second of " + name, fmt::format("above {:g}", *expect.hz_above),
-           fmt::format("measured {:.1f}", frames / seconds), frames / seconds > *expect.hz_above);
+           fmt::format("measured {:.1f}", frames / seconds), frames / seconds > *expect.hz_above,
+           why_few_frames(seen.after));
   if (expect.kbit_below) {
     const double kbit =
         static_cast<double>(now.received_bytes - seen.before.received_bytes) * kBitsPerByte * 1e-3 / seconds;
@@ -162,14 +178,22 @@ void ScenarioRun::expect_span(const ScenarioExpect& expect) {
          vertices > 0.0 && bits < *expect.bits_per_vertex_below);
 }
 
+/// What is wanted, for the plot.
+void ScenarioRun::add_guide(double TraceSample::*measure, const char* word,
+                            const std::optional<double>& value) {
+  if (value) result_.wanted.push_back({measure, fmt::format("wanted {} {:g}", word, *value), *value});
+}
+
 /// How fast the simulation went, and with it what was fed.
 void ScenarioRun::expect_pace(const ScenarioExpect& expect) {
   const std::string measured = span_->realtime < 0.0
                                    ? std::string("measured nothing: run for two seconds at least")
                                    : fmt::format("measured {:.3f}", span_->realtime);
+  add_guide(&TraceSample::realtime, "above", expect.realtime_above);
+  add_guide(&TraceSample::realtime, "below", expect.realtime_below);
   if (expect.realtime_above)
     report("simulated over real time", fmt::format("above {:g}", *expect.realtime_above), measured,
-           span_->realtime > *expect.realtime_above);
+           span_->realtime > *expect.realtime_above, excerpt(status_.slow_motion, kMaxExpectedChars));
   if (expect.realtime_below)
     report("simulated over real time", fmt::format("below {:g}", *expect.realtime_below), measured,
            span_->realtime >= 0.0 && span_->realtime < *expect.realtime_below);
@@ -235,15 +259,34 @@ void ScenarioRun::expect_stretch(const std::string& name, const MeasuredSpan::Se
   report("stretch of " + name, fmt::format("below {:g}", limit), measured, has_passed, detail);
 }
 
+/// Compares with the hash that a file has, or writes it there.
+void ScenarioRun::expect_kept_state(const std::filesystem::path& path) {
+  const std::string what = fmt::format("state at step {}", tick_);
+  const std::string measured = "is " + hash_text(hash_);
+  if (options_.renews_goldens && hash_) {
+    if (!lies_below(path, scenario_.folder))
+      return report(what, "written anew",
+                    fmt::format("{} does not lie below the scenario's folder", path.string()), false);
+    const std::string text = hash_text(hash_) + "\n";
+    const Status saved = save_file(path, std::as_bytes(std::span(text)));
+    return report(what, "written anew", saved ? measured : saved.error().to_string(), saved.ok());
+  }
+  const auto kept = load_text(path, kMaxExpectedChars);
+  if (!kept)
+    return report(what, "as in " + path.string(), kept.error().to_string() + " (--renew writes it)", false);
+  const std::string wanted(trimmed(std::string_view(*kept).substr(0, kept->find('\n'))));
+  const bool is_same = hash_ && wanted == hash_text(hash_);
+  report(what, fmt::format("{} of {}", excerpt(wanted, kHashChars), path.filename().string()), measured,
+         is_same, is_same ? "" : "solver, groom, inputs or compiler are others than when it was written");
+}
+
 void ScenarioRun::expect_state(const ScenarioExpect& expect) {
+  if (!expect.hash_file.empty()) expect_kept_state(expect.hash_file);
   if (!expect.hash && expect.same_as.empty()) return;
-  const auto text = [](const std::optional<uint64_t>& hash) {
-    return hash ? fmt::format("{:016x}", *hash) : std::string("none");
-  };
   std::optional<uint64_t> wanted = expect.hash;
   if (const auto found = remembered_.find(expect.same_as); found != remembered_.end()) wanted = found->second;
   const std::string from = expect.same_as.empty() ? std::string() : fmt::format(" of '{}'", expect.same_as);
-  report(fmt::format("state at step {}", tick_), text(wanted) + from, "is " + text(hash_),
+  report(fmt::format("state at step {}", tick_), hash_text(wanted) + from, "is " + hash_text(hash_),
          wanted.has_value() && hash_ == wanted);
 }
 
@@ -251,18 +294,20 @@ void ScenarioRun::expect_back(const ScenarioExpect& expect) {
   const ScenarioViewer& who = **viewer(expect.viewer);
   const std::string& name = who.view().name;
   const double begin_s = elapsed_s();
+  const Absence absence = absences_[name];
+  const bool was_away = absence.mended_ns != 0;
   const auto is_back = [&] {
     const ViewerLook look = who.look();
-    return look.is_connected && look.counts.frames > frames_at_restart_[name];
+    return look.is_connected && look.counts.frames > absence.frames;
   };
   while (!is_back() && elapsed_s() - begin_s < *expect.back_within_s && go_on())
     std::this_thread::sleep_for(milliseconds(10));
-  const double since_s = restarted_ns_ == 0 ? 0.0 : static_cast<double>(now_ns() - restarted_ns_) * 1e-9;
-  const bool is_there = restarted_ns_ != 0 && is_back();
+  const double since_s = was_away ? static_cast<double>(now_ns() - absence.mended_ns) * kSPerNs : 0.0;
+  const bool is_there = was_away && is_back();
   report(name + " comes back", fmt::format("within {:g} s", *expect.back_within_s),
-         restarted_ns_ == 0 ? std::string("the server was not restarted")
-         : is_there         ? fmt::format("was back {:.1f} s after the server", since_s)
-                            : fmt::format("is away: {}", who.look().trouble),
+         !was_away  ? std::string("neither its server was restarted nor its link changed")
+         : is_there ? fmt::format("was back after {:.1f} s", since_s)
+                    : fmt::format("is away: {}", who.look().trouble),
          is_there);
 }
 
@@ -383,9 +428,11 @@ void ScenarioRun::save_evidence() {
   for (const auto& [name, viewer] : viewers_)
     if (const auto seen = draw(viewer->picture(), {viewer->view().width, viewer->view().height}))
       (void)save_png(options_.out / fmt::format("{}_{}.png", scenario_.name, name), *seen);
-  if (server_ == nullptr) return;
-  std::filesystem::copy_file(server_->log_file(), options_.out / (scenario_.name + "_server.log"),
-                             std::filesystem::copy_options::overwrite_existing, failure);
+  for (const auto& [process, ending] :
+       {std::pair(server_.get(), "_server.log"), {relay_.get(), "_relay.log"}})
+    if (process != nullptr)
+      std::filesystem::copy_file(process->log_file(), options_.out / (scenario_.name + ending),
+                                 std::filesystem::copy_options::overwrite_existing, failure);
 }
 
 }  // namespace strandcast

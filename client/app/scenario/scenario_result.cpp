@@ -38,13 +38,16 @@ std::string panel_svg(const ScenarioResult& result, const Panel& panel) {
   desc.y = {panel.title, PlotScale::Linear, 0.0};
   desc.width = kPlotWidth;
   desc.height = kPlotHeight;
+  for (const WantedLimit& limit : result.wanted)
+    if (limit.measure == panel.value) desc.guides.push_back({limit.name, limit.value});
   for (auto& [name, one] : series) desc.series.push_back(std::move(one));
   return make_svg_plot(desc);
 }
 
 std::string sentence_of(const CheckResult& check) {
-  if (check.detail.empty()) return fmt::format("wanted {}, {}", check.wanted, check.measured);
-  return fmt::format("{}, wanted {}, {}", check.measured, check.wanted, check.detail);
+  if (check.has_passed) return fmt::format("wanted {}, {}", check.wanted, check.measured);
+  return fmt::format("{}, wanted {}{}{}", check.measured, check.wanted, check.detail.empty() ? "" : ", ",
+                     check.detail);
 }
 
 }  // namespace

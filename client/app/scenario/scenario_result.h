@@ -15,7 +15,7 @@ struct CheckResult {
   std::string measured;
   bool has_passed = false;
   double seconds = 0.0;     // since the one before
-  std::string detail = {};  // of one that fails: where, and what helps; empty: nothing is known of it
+  std::string detail = {};  // where, and what helps, should it fail; empty: nothing is known
 };
 
 /// Measurements at one moment.
@@ -30,25 +30,33 @@ struct TraceSample {
 
 inline constexpr size_t kMaxTraceSamples = 20'000;
 
+/// A limit that a measure was held to, for its plot.
+struct WantedLimit {
+  double TraceSample::*measure = nullptr;
+  std::string name;  // "wanted below 0.01"
+  double value = 0.0;
+};
+
 struct ScenarioResult {
   std::string name;
   std::string about;
   double seconds = 0.0;
   std::vector<CheckResult> checks;
   std::vector<TraceSample> trace;
+  std::vector<WantedLimit> wanted;
   std::vector<uint64_t> hashes;  // after each step, in order
 
   size_t failed_count() const;
 };
 
-/// Formats a check: "  ok    12  stretch of viewer: wanted below 0.01, measured 0.002". Where there is a
-/// detail, what was measured comes first, and the detail last.
+/// Formats a check: "  ok    12  stretch of viewer: wanted below 0.01, measured 0.002". Of one that fails,
+/// what was measured comes first, and the detail last.
 std::string to_line(const CheckResult& check);
 
 /// Formats JUnit XML with one <testsuite> per scenario and one <testcase> per check.
 std::string to_junit(const std::vector<ScenarioResult>& results);
 
-/// Plots stretch, speed, kbit/s and frames per second over time, as SVG.
+/// Plots stretch, speed, kbit/s and frames per second over time with what was wanted of them, as SVG.
 std::string to_plot(const ScenarioResult& result);
 
 }  // namespace strandcast

@@ -5,12 +5,12 @@
 #include <thread>
 #include <utility>
 
-#include "client/net/datagram_sender.h"
 #include "client/net/http_get.h"
 #include "common/base/file.h"
 #include "common/base/hash.h"
 #include "common/base/text.h"
 #include "common/base/units.h"
+#include "common/client/datagram_sender.h"
 #include "common/scene/scenario_file.h"
 
 namespace strandcast {
@@ -25,6 +25,7 @@ constexpr int kMostMisses = 3;            // then a viewer is waited for no more
 constexpr double kSeenRateHz = 60.0;      // of the states that viewers see while it is stepped
 constexpr uint64_t kBlindChunk = 64;      // steps at once where nobody watches
 constexpr milliseconds kRunPoll{5};
+constexpr milliseconds kRelayPoll{50};
 constexpr milliseconds kHttpTimeout{3'000};
 constexpr double kTraceS = 0.25;
 constexpr double kLifetimeMarginS = 30.0;
@@ -41,6 +42,7 @@ ScenarioRun::~ScenarioRun() {
   live_feed_.reset();
   viewers_.clear();
   client_.reset();
+  relay_.reset();
   server_.reset();
   std::error_code ignored;
   if (!folder_.empty()) std::filesystem::remove_all(folder_, ignored);
@@ -89,14 +91,30 @@ Status ScenarioRun::carry_out(const ScenarioStart& start) {
   is_lockstep_ = start.is_lockstep;
   server_ = std::make_unique<ServerProcess>(std::move(config));
   RETURN_IF_ERROR(server_->start(std::min(left_s(), kStartTimeoutS), *options_.stop));
+  if (start.has_relay) RETURN_IF_ERROR(start_relay());
   return connect();
+}
+
+/// A relay of the server, by its viewers' token.
+Status ScenarioRun::start_relay() {
+  const std::filesystem::path folder = folder_ / "relay";
+  std::error_code failure;
+  std::filesystem::create_directory(folder, failure);  // the relay says what is wrong with it
+  relay_ = std::make_unique<ServerProcess>(
+      ServerProcessConfig{options_.server,
+                          {"--upstream", fmt::format("127.0.0.1:{}", server_->port()),
+                           "--upstream-token-file", server_->token_file().string()},
+                          folder,
+                          scenario_.limit_s + kLifetimeMarginS});
+  return relay_->start(std::min(left_s(), kStartTimeoutS), *options_.stop);
 }
 
 Result<ClientConfig> ScenarioRun::config_for(Role role) const {
   CtlTarget target = options_.running.value_or(CtlTarget{});
-  if (server_ != nullptr) {
-    target.connect = fmt::format("127.0.0.1:{}", server_->port());
-    target.token_file = server_->token_file();
+  const ServerProcess* server = role == Role::Viewer && relay_ != nullptr ? relay_.get() : server_.get();
+  if (server != nullptr) {
+    target.connect = fmt::format("127.0.0.1:{}", server->port());
+    target.token_file = server->token_file();
   } else if (!options_.running) {
     return make_error(ErrorCode::BadInput, "there is no server yet: begin with start, or give --connect");
   }
@@ -336,7 +354,8 @@ Status ScenarioRun::carry_out(const ScenarioSet& set) {
 }
 
 Status ScenarioRun::carry_out(ScenarioCommand command) {
-  if (command != ScenarioCommand::Restart) {
+  if (command == ScenarioCommand::Restart) return restart_server();
+  if (command != ScenarioCommand::RestartRelay) {
     const Command wanted = command == ScenarioCommand::Pause    ? Command::Pause
                            : command == ScenarioCommand::Resume ? Command::Resume
                                                                 : Command::Reset;
@@ -344,13 +363,21 @@ Status ScenarioRun::carry_out(ScenarioCommand command) {
     if (notice.is_error) return make_error(ErrorCode::Unavailable, "the server says: {}", notice.text);
     return {};
   }
+  if (relay_ == nullptr)
+    return make_error(ErrorCode::BadInput, "there is no relay to be killed: start {{ relay: true }}");
+  RETURN_IF_ERROR(relay_->restart(std::min(left_s(), kStartTimeoutS), *options_.stop));
+  for (const auto& [name, viewer] : viewers_) begin_absence(name);
+  return {};
+}
+
+/// Killed, and started again on the same port.
+Status ScenarioRun::restart_server() {
   if (server_ == nullptr)
     return make_error(ErrorCode::BadInput, "a server that was not started by the scenario is not killed");
   live_feed_.reset();
   client_.reset();
   RETURN_IF_ERROR(server_->restart(std::min(left_s(), kStartTimeoutS), *options_.stop));
-  restarted_ns_ = now_ns();
-  for (const auto& [name, viewer] : viewers_) frames_at_restart_[name] = viewer->look().counts.frames;
+  for (const auto& [name, viewer] : viewers_) begin_absence(name);
   tick_ = 0;
   hash_.reset();
   RETURN_IF_ERROR(connect());
@@ -358,11 +385,34 @@ Status ScenarioRun::carry_out(ScenarioCommand command) {
   return start_live_feed();
 }
 
+/// From now on it is waited for.
+void ScenarioRun::begin_absence(const std::string& viewer) {
+  absences_[viewer] = {now_ns(), viewers_[viewer]->look().counts.frames};
+}
+
+Status ScenarioRun::carry_out(const ScenarioLink& link) {
+  ASSIGN_OR_RETURN(ScenarioViewer* const who, viewer(link.viewer));
+  who->change_link(link);
+  begin_absence(who->view().name);
+  return {};
+}
+
 Status ScenarioRun::carry_out(const ScenarioView& view) {
   if (viewers_.contains(view.name))
     return make_error(ErrorCode::BadInput, "there is a viewer '{}' already", view.name);
-  ASSIGN_OR_RETURN(ClientConfig config, config_for(Role::Viewer));
-  ASSIGN_OR_RETURN(viewers_[view.name], ScenarioViewer::join(view, std::move(config)));
+  ASSIGN_OR_RETURN(const ClientConfig config, config_for(Role::Viewer));
+  const bool changes =
+      std::any_of(scenario_.actions.begin(), scenario_.actions.end(),
+                  [](const auto& action) { return std::holds_alternative<ScenarioLink>(action.work); });
+  const LinkUse use = changes ? LinkUse::Changes : LinkUse::Stays;
+  auto viewer = ScenarioViewer::join(view, config, use);
+  // A relay listens before it has found its server.
+  const double end_s = elapsed_s() + (relay_ != nullptr ? kStartTimeoutS : 0.0);
+  while (!viewer && elapsed_s() < end_s && go_on()) {
+    std::this_thread::sleep_for(kRelayPoll);
+    viewer = ScenarioViewer::join(view, config, use);
+  }
+  ASSIGN_OR_RETURN(viewers_[view.name], std::move(viewer));
   viewer_order_.push_back(view.name);
   // Until it has something to show it has not arrived.
   const ScenarioViewer& joined = *viewers_[view.name];

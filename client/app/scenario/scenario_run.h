@@ -71,6 +71,10 @@ class ScenarioRun {
   Status carry_out(const ScenarioExpect& expect);
   Status carry_out(const ScenarioRefusal& refusal);
   Status carry_out(const ScenarioSend& send);
+  Status carry_out(const ScenarioLink& link);
+  Status start_relay();
+  Status restart_server();
+  void begin_absence(const std::string& viewer);
 
   // The connection that commands.
   Status connect();
@@ -86,9 +90,10 @@ class ScenarioRun {
   void end_span(double seconds, double realtime);
   void trace();
 
-  Result<const ScenarioViewer*> viewer(const std::string& name) const;
+  Result<ScenarioViewer*> viewer(const std::string& name) const;
   void report(const std::string& what, const std::string& wanted, const std::string& measured,
               bool has_passed, const std::string& detail = {});
+  void add_guide(double TraceSample::*measure, const char* word, const std::optional<double>& value);
   void expect_span(const ScenarioExpect& expect);
   void expect_stretch(const std::string& name, const MeasuredSpan::Seen& seen, double limit);
   void expect_picture(const ScenarioExpect& expect);
@@ -100,6 +105,7 @@ class ScenarioRun {
   /// Waits until `condition` holds; returns false if it does not within `seconds`.
   bool await(double seconds, const std::function<bool()>& condition);
   void expect_state(const ScenarioExpect& expect);
+  void expect_kept_state(const std::filesystem::path& path);
   void save_evidence();
 
   double elapsed_s() const;
@@ -118,6 +124,7 @@ class ScenarioRun {
 
   std::filesystem::path folder_;  // of the server's files; made, and removed at the end
   std::unique_ptr<ServerProcess> server_;
+  std::unique_ptr<ServerProcess> relay_;  // that viewers watch; null: the server itself
   bool is_lockstep_ = false;
   std::unique_ptr<ViewerClient> client_;
   bool is_admin_ = false;
@@ -136,8 +143,12 @@ class ScenarioRun {
   std::optional<MeasuredSpan> span_;
   std::map<std::string, ViewerCounts> traced_;
   double traced_s_ = 0.0;
-  int64_t restarted_ns_ = 0;
-  std::map<std::string, uint64_t> frames_at_restart_;
+  /// When the server or link of a viewer was mended last, and its frames then.
+  struct Absence {
+    int64_t mended_ns = 0;
+    uint64_t frames = 0;
+  };
+  std::map<std::string, Absence> absences_;
   std::set<std::filesystem::path> renewed_;  // goldens
 };
 

@@ -8,6 +8,7 @@
 
 #include "client/app/step_speed.h"
 #include "client/app/view_options.h"
+#include "common/base/check.h"
 #include "common/base/thread_name.h"
 #include "common/base/units.h"
 
@@ -20,12 +21,21 @@ constexpr milliseconds kScenarioPumpWait{5};
 constexpr int64_t kReportNs = 1'000'000'000;
 constexpr double kBytesPerMbit = 125e3;
 
-Result<std::unique_ptr<chaos::ChaosRelay>> make_link(const ScenarioView& view, const Address& server) {
-  if (view.link_mbit <= 0.0 && view.delay_ms <= 0.0) return std::unique_ptr<chaos::ChaosRelay>();
+chaos::LinkPlan plan_of(double loss, double delay_ms) {
+  chaos::LinkPlan plan;
+  plan.loss = loss;
+  plan.delay_us = static_cast<int64_t>(delay_ms * kUsPerMs);
+  return plan;
+}
+
+Result<std::unique_ptr<chaos::ChaosRelay>> make_link(const ScenarioView& view, const Address& server,
+                                                     LinkUse use) {
+  if (use == LinkUse::Stays && view.link_mbit <= 0.0 && view.delay_ms <= 0.0)
+    return std::unique_ptr<chaos::ChaosRelay>();
   chaos::RelayConfig config;
   config.to_host = server.host;
   config.to_port = server.port;
-  config.up.delay_us = config.down.delay_us = static_cast<int64_t>(view.delay_ms * kUsPerMs);
+  config.up = config.down = plan_of(0.0, view.delay_ms);
   config.down.bytes_per_s = static_cast<uint64_t>(view.link_mbit * kBytesPerMbit);
   return chaos::ChaosRelay::start(config);
 }
@@ -38,8 +48,9 @@ DrawingDevice device_of(const std::string& draws) {
 
 }  // namespace
 
-Result<std::unique_ptr<ScenarioViewer>> ScenarioViewer::join(const ScenarioView& view, ClientConfig config) {
-  ASSIGN_OR_RETURN(auto relay, make_link(view, config.address));
+Result<std::unique_ptr<ScenarioViewer>> ScenarioViewer::join(const ScenarioView& view, ClientConfig config,
+                                                             LinkUse use) {
+  ASSIGN_OR_RETURN(auto relay, make_link(view, config.address, use));
   if (relay != nullptr) config.address = {"127.0.0.1", relay->port(), config.address.is_tls};
   ASSIGN_OR_RETURN(config.hello.mode, parse_mode(view.mode));
   config.hello.name = "scenario " + view.name;
@@ -186,6 +197,17 @@ ViewerLook ScenarioViewer::look() const {
 ViewerPicture ScenarioViewer::picture() const {
   const std::lock_guard lock(mutex_);
   return picture_;
+}
+
+void ScenarioViewer::change_link(const ScenarioLink& link) {
+  CHECK(relay_ != nullptr);
+  chaos::LinkPlan plan = plan_of(link.loss, link.delay_ms);
+  relay_->set_plan(chaos::Direction::Up, plan);
+  plan.bytes_per_s = static_cast<uint64_t>(link.link_mbit * kBytesPerMbit);
+  relay_->set_plan(chaos::Direction::Down, plan);
+  relay_->set_frozen(link.fault == ScenarioFault::Stall);
+  relay_->set_silent(link.fault == ScenarioFault::HalfOpen);
+  if (link.fault == ScenarioFault::Cut) relay_->reset_all();
 }
 
 void ScenarioViewer::begin_measure() {

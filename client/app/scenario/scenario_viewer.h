@@ -61,10 +61,15 @@ struct ViewerPicture {
   StreamMode mode = StreamMode::Strands;
 };
 
+/// Whether a viewer's link is the same from the start to the end.
+enum class LinkUse { Stays, Changes };
+
 class ScenarioViewer {
  public:
-  /// Connects, through a relay if the link is limited; errors as ViewerSession::open().
-  static Result<std::unique_ptr<ScenarioViewer>> join(const ScenarioView& view, ClientConfig config);
+  /// Connects, through a relay if the link is limited or changes; errors as
+  /// ViewerSession::open().
+  static Result<std::unique_ptr<ScenarioViewer>> join(const ScenarioView& view, ClientConfig config,
+                                                      LinkUse use);
   ~ScenarioViewer();
   ScenarioViewer(const ScenarioViewer&) = delete;
   ScenarioViewer& operator=(const ScenarioViewer&) = delete;
@@ -75,6 +80,9 @@ class ScenarioViewer {
   ViewerPicture picture() const;
   /// Restarts the measurement of the largest stretch and speed.
   void begin_measure();
+  /// Puts another line in the place of the one that it has. The viewer must have joined with
+  /// LinkUse::Changes.
+  void change_link(const ScenarioLink& link);
 
  private:
   ScenarioViewer(ScenarioView view, std::unique_ptr<chaos::ChaosRelay> relay)

@@ -75,6 +75,22 @@ inline Pose pose_from_freed(const FreedPose& pose) {
                        kRadPerDegree * pose.roll_deg})};
 }
 
+/// OpenTrackIO: right-handed, +Z up, +Y ahead, so +X is to the right, m. Pan about +Z, tilt about +X and roll
+/// about +Y, each right-handed and after the one before, degrees: pan to the left, tilt up, roll clockwise as
+/// seen from behind.
+struct TrackPose {
+  glm::dvec3 translation_m{0.0};
+  double pan_deg = 0.0;
+  double tilt_deg = 0.0;
+  double roll_deg = 0.0;
+};
+inline Pose pose_from_track(const TrackPose& pose) {
+  const glm::dvec3& p = pose.translation_m;
+  return {glm::dvec3(-p.x, p.z, p.y),
+          rotation_of(
+              {kRadPerDegree * pose.pan_deg, -kRadPerDegree * pose.tilt_deg, kRadPerDegree * pose.roll_deg})};
+}
+
 /// Up axis of systems that let the user choose it (Motive, VRPN's servers). Right-handed, m.
 enum class SystemUp { Y, Z };
 /// Converts a pose; for +Z up, a quarter turn about X maps +Z to +Y. Bodies without rotation stay so.

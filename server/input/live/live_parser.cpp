@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "common/base/text.h"
+#include "common/motion/opentrackio.h"
 #include "server/input/live/parsers_private.h"
 
 namespace strandcast {
@@ -32,6 +33,13 @@ std::span<const LiveProtocol> live_protocols() {
        0,
        {"half-turns", "radians"},
        ""},
+      {"opentrackio",
+       "OpenTrackIO 1.0 of cameras and heads, JSON or CBOR",
+       kUdp,
+       kOpenTrackIoPort,
+       0,
+       {"pan-left", "pan-right"},
+       kOpenTrackIoGroup},
   };
   return kProtocols;
 }
@@ -49,6 +57,7 @@ Result<std::unique_ptr<LiveParser>> make_live_parser(const LiveParserConfig& con
   if (config.protocol == "freed") return make_freed_parser(order);
   if (config.protocol == "natnet") return make_natnet_parser(order, config.protocol_version);
   if (config.protocol == "vrpn") return make_vrpn_parser(order);
+  if (config.protocol == "opentrackio") return make_opentrackio_parser(order);
   return make_live_link_face_parser(order);
 }
 

@@ -68,7 +68,8 @@ Result<std::unique_ptr<LiveSource>> LiveSource::make(const LiveDesc& live, size_
     return make_error(ErrorCode::BadInput,
                       "{}.host: {} is asked for, not waited for: name its server (--mocap {}://HOST)", field,
                       protocol->name, protocol->name);
-  if (!can_ask && !live.host.empty())
+  const bool has_group = *protocol->multicast_group != '\0';
+  if (!can_ask && !has_group && !live.host.empty())
     return make_error(
         ErrorCode::BadInput,
         "{}.host: senders of {} are waited for: let '{}' send to port {} here, and leave host out", field,

@@ -19,7 +19,8 @@ class DatagramSender {
   DatagramSender(const DatagramSender&) = delete;
   DatagramSender& operator=(const DatagramSender&) = delete;
 
-  /// Sends a datagram; returns false if the network did not take it. Arrival is not confirmed.
+  /// Sends a datagram without waiting; returns false if the network did not take it. Arrival is not
+  /// confirmed.
   bool send(std::span<const std::byte> bytes);
 
  private:

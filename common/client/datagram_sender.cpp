@@ -1,4 +1,4 @@
-#include "client/net/datagram_sender.h"
+#include "common/client/datagram_sender.h"
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/io_context.hpp>
@@ -31,6 +31,7 @@ Result<std::unique_ptr<DatagramSender>> DatagramSender::open(const Address& to) 
   for (const auto& one : found)
     if (one.endpoint().protocol() == udp::v4()) state->to = one.endpoint();
   state->socket.open(state->to.protocol(), error);
+  if (!error) state->socket.non_blocking(true, error);
   if (error)
     return make_error(ErrorCode::Unavailable, "cannot send to {}: {}", to.to_string(), error.message());
   return std::unique_ptr<DatagramSender>(new DatagramSender(std::move(state)));

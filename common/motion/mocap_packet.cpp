@@ -1,4 +1,4 @@
-#include "client/app/mocap_packet.h"
+#include "common/motion/mocap_packet.h"
 
 #include <algorithm>
 #include <array>
@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "common/base/units.h"
+#include "common/motion/opentrackio.h"
 
 namespace strandcast {
 namespace {
@@ -74,13 +75,13 @@ std::vector<std::byte> encode_opentrack(const MocapMoment& moment) {
 
 std::vector<std::byte> encode_freed(const MocapMoment& moment) {
   constexpr double kUnitsPerDegree = 32768.0, kUnitsPerM = 64'000.0;
-  constexpr uint8_t kType = 0xD1, kCamera = 1, kChecksumBegin = 0x40;
+  constexpr uint8_t kType = 0xD1, kChecksumBegin = 0x40;
   constexpr int kZoomFocusSpare = 8;
   const glm::dvec3& p = moment.world_from_head.position_m;
   const HeadAngles angles = angles_of(moment.world_from_head.rotation);
   Packet packet;
   packet.put(kType, std::endian::big);
-  packet.put(kCamera, std::endian::big);
+  packet.put(static_cast<uint8_t>(moment.source), std::endian::big);
   for (const double degrees : {-angles.left_deg, -angles.down_deg, angles.tilt_right_deg})
     packet.put_three(kUnitsPerDegree * degrees);
   for (const double metres : {-p.x, p.z, p.y}) packet.put_three(kUnitsPerM * metres);
@@ -129,18 +130,55 @@ std::vector<std::byte> encode_vmc(const MocapMoment& moment) {
   return bundle.bytes();
 }
 
+// ---- OpenTrackIO: a camera; +Z up, it looks along +Y, and turns right-handed about +Z, +X and +Y
+
+std::vector<std::byte> encode_track(const MocapMoment& moment, TrackEncoding encoding) {
+  const glm::dvec3& p = moment.world_from_head.position_m;
+  const HeadAngles angles = angles_of(moment.world_from_head.rotation);
+  const ValueTree document = make_track_document({{-p.x, p.z, p.y},
+                                                  {angles.left_deg, -angles.down_deg, angles.tilt_right_deg},
+                                                  moment.time_s,
+                                                  moment.number,
+                                                  moment.rate_hz,
+                                                  moment.source});
+  std::vector<std::byte> payload;
+  if (encoding == TrackEncoding::Cbor) {
+    payload = write_cbor(document);
+  } else {
+    const std::string text = write_json(document);
+    const auto bytes = std::as_bytes(std::span(text));
+    payload.assign(bytes.begin(), bytes.end());
+  }
+  TrackSegment segment;
+  segment.encoding = static_cast<uint8_t>(encoding);
+  segment.sequence = static_cast<uint16_t>(moment.number);
+  segment.payload = payload;
+  return write_track_segment(segment);
+}
+
 constexpr MocapEncoding kEncodings[] = {
-    {"vmc", 39539, encode_vmc}, {"opentrack", 4242, encode_opentrack}, {"freed", 40000, encode_freed}};
+    {"vmc", 39539, encode_vmc},
+    {"opentrack", 4242, encode_opentrack},
+    {"freed", 40000, encode_freed, true},
+    {"opentrackio", kOpenTrackIoPort,
+     [](const MocapMoment& moment) { return encode_track(moment, TrackEncoding::Json); }, true},
+    {"opentrackio-cbor", kOpenTrackIoPort,
+     [](const MocapMoment& moment) { return encode_track(moment, TrackEncoding::Cbor); }, true}};
 
 }  // namespace
 
+std::string mocap_encoding_names() {
+  std::string names;
+  for (const MocapEncoding& encoding : kEncodings)
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", encoding.name);
+  return names;
+}
+
 Result<MocapEncoding> find_mocap_encoding(const std::string& name) {
-  std::string known;
-  for (const MocapEncoding& encoding : kEncodings) {
+  for (const MocapEncoding& encoding : kEncodings)
     if (name == encoding.name) return encoding;
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", encoding.name);
-  }
-  return make_error(ErrorCode::BadInput, "--as {} is not known (known: {})", name, known);
+  return make_error(ErrorCode::BadInput, "there are no packets of {} (there are: {})", name,
+                    mocap_encoding_names());
 }
 
 }  // namespace strandcast

@@ -1,0 +1,59 @@
+// HeadSender: sends a head's pose to other programs with every state, as packets of motion capture protocols,
+// so that they follow the head. A reader of the stream; it never waits, and what the network does not take at
+// once is lost.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/client/address.h"
+#include "common/client/datagram_sender.h"
+#include "common/motion/mocap_packet.h"
+#include "server/stream/stream_reader.h"
+
+namespace strandcast {
+
+/// A program that follows the heads.
+struct HeadSend {
+  std::string protocol;  // a name of find_mocap_encoding()
+  Address to;
+
+  bool operator==(const HeadSend&) const = default;
+};
+
+/// Parses PROTOCOL, PROTOCOL:PORT or PROTOCOL://HOST[:PORT]; what names no host is this machine. BadInput
+/// explains the accepted forms, or lists the protocols.
+Result<HeadSend> parse_head_send(const std::string& text);
+
+class HeadSender : public StreamReader {
+ public:
+  /// Opens the sockets; NotFound for an unknown host. `head` is the head's number from 0 on: protocols that
+  /// do not number their sources carry the first head alone.
+  static Result<std::unique_ptr<HeadSender>> open(const std::vector<HeadSend>& sends, uint32_t head,
+                                                  double rate_hz);
+
+  void on_state(const std::shared_ptr<const Snapshot>& state) override;
+
+  bool is_empty() const { return ways_.empty(); }
+  /// Returns the packets that the network did not take. Any thread.
+  uint64_t unsent() const { return unsent_; }
+
+ private:
+  struct Way {
+    MocapEncoding encoding;
+    std::unique_ptr<DatagramSender> sender;
+  };
+  HeadSender(std::vector<Way> ways, uint32_t head, double rate_hz);
+
+  const std::vector<Way> ways_;
+  const uint32_t head_;
+  const double rate_hz_;
+  uint32_t number_ = 0;  // of the next packet
+  std::atomic<uint64_t> unsent_{0};
+};
+
+}  // namespace strandcast
