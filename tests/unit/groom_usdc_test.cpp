@@ -343,7 +343,8 @@ TEST(Usdc, WhatHasNoTimeGoesBeforeTheFirstOfTimeSamples) {
   EXPECT_EQ(timed->groom.rest_position_m, kPoints);
   EXPECT_THAT(timed->notes, Contains(HasSubstr("time code 7.5, the first")));
   EXPECT_EQ(with({{"timeSamples", samples}, {"default", still}})->groom.rest_position_m, other);
-  for (const uint64_t none : {MadeUsdc::rep(51, 0), MadeUsdc::rep(24, 0, MadeUsdc::kArray)})
+  for (const uint64_t none :
+       {MadeUsdc::rep(51, 0), MadeUsdc::inlined(51, 0), MadeUsdc::rep(24, 0, MadeUsdc::kArray)})
     EXPECT_EQ(with({{"default", none}, {"timeSamples", samples}})->groom.rest_position_m, kPoints);
 }
 
@@ -471,6 +472,25 @@ TEST(Usdc, WhatIsWrongIsNamedWithItsPrim) {
                                          MadeUsdc::kPacked);
                       }),
               HasSubstr("number 1 of a table of 1"));
+}
+
+// 16 KB that unpack to 16 million numbers count as these, each time: nine times is too often.
+TEST(Usdc, WhatIsUnpackedCountsAsRead) {
+  constexpr size_t kNumbers = 16'000'000;
+  const size_t rest = sizeof(int32_t) + kNumbers / 4 - 1 - 5 - 4 - 15;  // of a match behind one zero
+  const std::string zeros = std::string("\0\x1f\0\1\0", 5) + std::string(rest / 255, '\xff') +
+                            static_cast<char>(rest % 255) + std::string("\x50\0\0\0\0\0", 6);
+  MadeUsdc file;
+  const uint64_t value = file.array(8, kNumbers, "i" + raw_bytes(std::vector<uint64_t>{zeros.size()}) + zeros,
+                                    MadeUsdc::kPacked);
+  const std::string bytes = file.finish({});
+  const auto archive = UsdcArchive::read(std::make_shared<GroomSource>(bytes_of(bytes)));
+  ASSERT_TRUE(archive) << archive.error().to_string();
+  size_t count = 0;
+  auto numbers = archive->floats({value}, kNumbers);
+  for (; numbers; numbers = archive->floats({value}, kNumbers)) ++count;
+  EXPECT_EQ(count, kMaxGroomReadBytes / (kNumbers * sizeof(float)));
+  EXPECT_THAT(numbers.error().to_string(), HasSubstr("more than 536870912 bytes"));
 }
 
 TEST(Usdc, TreesThatAreNoneAreRefused) {
