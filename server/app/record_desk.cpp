@@ -37,7 +37,9 @@ std::string text_of(const Recorder& recorder, const std::string& end) {
   const std::string text =
       fmt::format("{}: {:.1f} s, {:.1f} MB", recorder.path().filename().string(), counts.length_s,
                   static_cast<double>(counts.written_bytes) / kBytesPerMb);
-  return end.empty() ? text : text + "; it ended by itself: " + end;
+  const std::string take = recorder.take();
+  const std::string whole = take.empty() ? text : text + ", " + take;
+  return end.empty() ? whole : whole + "; it ended by itself: " + end;
 }
 
 /// What a tap was told, for a thread that waits for it.
@@ -69,6 +71,12 @@ Result<std::string> recording_file_name(const std::string& name) {
         "without a folder, and begins with a letter or digit.",
         kMaxRecordingNameChars);
   return std::string(stem) + kEnding;
+}
+
+std::string recording_name(const RecordCommand& command) {
+  if (!command.name.empty() || (command.slate.empty() && command.take == 0)) return command.name;
+  if (command.take == 0) return command.slate;
+  return fmt::format("{}{}T{:02}", command.slate, command.slate.empty() ? "" : "-", command.take);
 }
 
 std::string recording_file_name(const std::string& scene, int64_t unix_time_s) {
@@ -181,7 +189,7 @@ void RecordDesk::answer(const Order& order) {
 
 Notice RecordDesk::carry_out(const RecordCommand& command) {
   if (command.is_wanted) {
-    const Result<std::string> begun = start_recording(command.name);
+    const Result<std::string> begun = start_recording(command);
     return begun ? Notice{false, *begun} : Notice{true, begun.error().to_string()};
   }
   if (recorder() != nullptr) return Notice{false, end()};
@@ -262,16 +270,19 @@ Result<uint64_t> RecordDesk::change_tap(StepTap* tap, std::function<void()> at_c
 }
 
 /// One sentence of where it is.
-Result<std::string> RecordDesk::start_recording(const std::string& name) {
+Result<std::string> RecordDesk::start_recording(const RecordCommand& command) {
   const std::shared_ptr<Recorder> present = recorder();
   if (present != nullptr && !present->failure())
     return make_error(ErrorCode::BadInput, "{} is being recorded already: record stop ends it.",
                       present->path().filename().string());
   if (present != nullptr) end();
-  ASSIGN_OR_RETURN(std::shared_ptr<Recorder> recorder, make_recorder(name));
+  ASSIGN_OR_RETURN(std::shared_ptr<Recorder> recorder, make_recorder(recording_name(command)));
   RETURN_IF_ERROR(recorder->attach(stream_->hub));
   ASSIGN_OR_RETURN(const uint64_t tick, change_tap(recorder.get()));
-  recorder->begin(stream_->describe(), stream_->asset());
+  RecordingStart start = stream_->describe();
+  start.slate = command.slate;
+  start.take = command.take;
+  recorder->begin(std::move(start), stream_->asset());
   const std::lock_guard lock(mutex_);
   recorder_ = std::move(recorder);
   ended_.clear();

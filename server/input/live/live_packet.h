@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/timecode.h"
 #include "common/math/pose.h"
 
 namespace strandcast {
@@ -19,6 +20,7 @@ struct LivePose {
   bool has_position = true;               // false: the sender tells how it is turned, not where it is
   std::optional<int64_t> source_time_ns;  // of the sender's clock
   std::optional<uint32_t> frame;          // the sender's number of it, which tells the order; wraps around
+  std::optional<Timecode> timecode;       // of the sender's frame
   std::optional<uint64_t> body;           // the sender's number of the subject, which names do not change
   std::vector<std::string> joint_names;   // of the body below a head
   std::vector<glm::dvec3> joint_m;        // of each, in the world
