@@ -292,7 +292,8 @@ def member(schema, field):
     if field.type == MESSAGE:
         kind = {"Vec3": "glm::vec3", "Color": "glm::vec3"}.get(field.type_name) or \
             schema.cpp_name(schema.messages[field.type_name])
-        usual = "{0.0f}" if kind == "glm::vec3" else ""
+        usual = "{0.0f}" if kind == "glm::vec3" else "{}" if kind == "Timecode" else ""
+        kind = "std::optional<Timecode>" if kind == "Timecode" else kind
     elif field.type == ENUM:
         kind = field.type_name
         usual = f"{kind}::{init or pascal(enumerators(schema.enums[kind])[0][0])}"
@@ -402,6 +403,8 @@ def field_lines(schema, field, owner, scope, indent="  "):
         kind = "vector" if field.type_name == "Vec3" else "color"
         return call_lines(f"v.{kind}({quoted}, {place}, {cpp_range(rule['range'], scope)});", indent) + \
             check_lines(field, owner, indent)
+    if field.type == MESSAGE and field.type_name == "Timecode":
+        return [f"{indent}v.timecode({quoted}, {place});"]
     if field.type == MESSAGE:
         inner = schema.messages[field.type_name]
         visit = {"Look": "visit_look", "Camera": "visit_camera", "StrandStyle": "visit_style", "HairShading": "visit_shading",

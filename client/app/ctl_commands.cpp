@@ -15,6 +15,7 @@
 #include <variant>
 
 #include "client/app/line_budget.h"
+#include "client/app/ltc.h"
 #include "client/app/save_scene.h"
 #include "client/app/steady_client.h"
 #include "client/app/step_speed.h"
@@ -133,10 +134,19 @@ Result<FeedPlan> make_feed_plan(const FeedOptions& options) {
   FeedPlan plan;
   plan.rate_hz = options.rate_hz;
   plan.speed = options.speed;
+  if (!options.timecode.empty()) {
+    ASSIGN_OR_RETURN(const FrameRate fps, parse_frame_rate(options.fps));
+    ASSIGN_OR_RETURN(const Timecode first, parse_timecode(options.timecode, fps));
+    plan.timecode = [first](double t_s) { return advanced(first, t_s * first.rate.hz()); };
+  }
+  if (!options.ltc.empty()) {
+    ASSIGN_OR_RETURN(const FrameRate fps, parse_frame_rate(options.fps));
+    ASSIGN_OR_RETURN(plan.timecode, open_ltc(options.ltc, fps));
+  }
   double length_s = 0.0;  // of a motion file; 0 = without end
   RETURN_IF_ERROR(add_motion(options, plan, length_s));
   RETURN_IF_ERROR(add_wind(options, plan));
-  if (!plan.motion && !plan.wind)
+  if (!plan.motion && !plan.wind && !plan.timecode)
     return make_error(ErrorCode::BadInput, "nothing to feed: both --motion and --wind are none");
   plan.is_live = options.is_live;
   plan.duration_s = options.seconds;
@@ -164,12 +174,13 @@ std::string some(uint64_t count, const std::string& things) {
 std::string to_line(const ServerStatus& status) {
   return fmt::format(
       "tick {:8} | step {:6.2f} ms | encode {:5.2f} ms | render {:6.2f} ms | x{:.2f} real time | {} "
-      "viewer{}{}{}{}{}{}{}",
+      "viewer{}{}{}{}{}{}{}{}",
       status.tick, status.sim_ms, status.encode_ms, status.render_ms, status.realtime_factor,
       status.viewer_count, status.viewer_count == 1 ? "" : "s", status.is_paused ? " | paused" : "",
       status.is_motion_stale ? " | no motion" : "", some(status.rejected_samples, "samples rejected"),
       some(status.quarantined_strands, "strands broken"),
       some(status.overstretched_strands, "strands over-stretched"),
+      status.timecode ? " | " + timecode_text(*status.timecode) : "",
       status.recording.empty() ? "" : " | recording " + status.recording);
 }
 

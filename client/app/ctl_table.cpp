@@ -40,6 +40,15 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
       ->transform(CLI::Validator(
           [](std::string& text) { return make_frame_rate(text, kMinFeedRateHz, kMaxDatagramRateHz); }, ""))
       ->capture_default_str();
+  auto* timecode = app.add_option("--timecode", feed.timecode,
+                                  "Timecode of the motion's beginning, which the hair carries: 01:00:00:00, "
+                                  "or 01:00:00;00 for drop-frame");
+  auto* ltc = app.add_option(
+      "--ltc", feed.ltc, "Linear timecode, which the hair carries: a WAV file, or - for sound as it comes");
+  timecode->excludes(ltc);
+  app.add_option("--fps", feed.fps,
+                 "Frames per second that --timecode or --ltc counts, such as 24, 23.976 or 24000/1001")
+      ->capture_default_str();
   app.add_option_function<std::vector<float>>(
          "--wind-mean",
          [&feed](const std::vector<float>& mps) { feed.wind_mps = glm::vec3(mps[0], mps[1], mps[2]); },
@@ -148,7 +157,10 @@ void declare_check(CLI::App& app, CtlCommandLine& line) {
 
 void declare_record_start(CLI::App& app, CtlCommandLine& line) {
   app.add_option("name", line.recording_name,
-                 "Of the file, in the folder of the server's --record-dir (default: scene, date and time)");
+                 "Of the file, in the folder of the server's --record-dir (default: slate and take, else "
+                 "scene, date and time)");
+  app.add_option("--slate", line.slate, "As on the clapperboard; the file says it, too");
+  app.add_option("--take", line.take, "Of the slate")->check(CLI::Range(1u, kMaxTake));
 }
 
 void declare_kick(CLI::App& app, CtlCommandLine& line) {
@@ -206,7 +218,7 @@ ClientMessage live(const Line& line) {
 
 template <bool kIsWanted>
 ClientMessage record(const Line& line) {
-  return RecordCommand{kIsWanted, line.recording_name};
+  return RecordCommand{kIsWanted, line.recording_name, line.slate, line.take};
 }
 
 template <AdminAction kAction>

@@ -35,6 +35,8 @@ struct CtlCommandLine {
   std::string recording;
   std::string other_recording;
   std::string recording_name;
+  std::string slate;
+  uint32_t take = 0;
   uint32_t step_count = 0;
   TestOptions test;
   ParameterOptions params;

@@ -22,6 +22,23 @@ std::string size_text(uint64_t bytes) {
   return fmt::format("{:.1f} MB", static_cast<double>(bytes) / kBytesPerMb);
 }
 
+bool is_timecode(const std::string& text) {
+  return text.find(':') != std::string::npos;
+}
+
+/// Seconds within a day; a timecode's rate is known later.
+std::optional<double> seconds_of(const std::string& text) {
+  double seconds = 0.0;
+  const bool is_number = CLI::detail::lexical_cast(text, seconds);
+  return is_number && seconds >= 0.0 && seconds <= kMostSeconds ? std::optional(seconds) : std::nullopt;
+}
+
+std::string trouble_of_moment(const std::string& text) {
+  if (is_timecode(text) || seconds_of(text)) return {};
+  return fmt::format("{} is neither a timecode (01:02:03:04) nor within 0..{:.0f} seconds", text,
+                     kMostSeconds);
+}
+
 /// From a recording where one is named, else from the server.
 Result<std::unique_ptr<ExportSource>> open_source(const CtlTarget& target, const ExportCommand& command,
                                                   const std::atomic<bool>& stop) {
@@ -41,10 +58,12 @@ Result<std::unique_ptr<ExportSource>> open_source(const CtlTarget& target, const
 }  // namespace
 
 void print_export(const ExportReport& report) {
-  const std::string frames = report.frame_count == 1
-                                 ? fmt::format("the frame at {:.3f} s", report.first_s)
-                                 : fmt::format("{} frames at {} fps from {:.3f} s on", report.frame_count,
-                                               frame_rate_text(report.fps), report.first_s);
+  const std::string frames =
+      report.frame_count == 1
+          ? fmt::format("the frame at {:.3f} s", report.first_s)
+          : fmt::format("{} frames at {} fps from {}{:.3f} s on", report.frame_count,
+                        frame_rate_text(report.fps),
+                        report.first_timecode.empty() ? "" : report.first_timecode + ", ", report.first_s);
   std::cout << fmt::format(
       "{} strands x {} vertices, {}, {} in {}{}\n", report.strand_count, report.vertex_count, frames,
       size_text(report.bytes),
@@ -64,7 +83,9 @@ void declare_export(CLI::App& app, ExportCommand& command) {
 }
 
 void declare_export_options(CLI::App& app, ExportCommand& command) {
-  app.add_option("--fps", command.fps, "Frames per second, such as 24, 23.976 or 24000/1001 (default: 30)")
+  app.add_option("--fps", command.fps,
+                 "Frames per second, such as 24, 23.976 or 24000/1001 (default: those of the states' "
+                 "timecode, else 30)")
       ->check(CLI::Validator(
           [](std::string text) { return make_frame_rate(text, kLeastFrameRate, kMostFrameRate); }, ""));
   app.add_option("--units", command.unit, "Unit of the file")
@@ -84,8 +105,12 @@ void declare_export_options(CLI::App& app, ExportCommand& command) {
       "Strands as viewers draw them, with followers, style and taper, instead of the simulated ones");
   app.add_flag("--head", command.has_head, "The head, too, as a mesh with its neck at rest; not for .csv");
   const auto seconds = without_nan(CLI::Range(0.0, kMostSeconds));
-  app.add_option("--from", command.from_s, "Begin so many seconds after the first state")->check(seconds);
-  app.add_option("--to", command.to_s, "End so many seconds after the first state")->check(seconds);
+  const CLI::Validator moment([](const std::string& text) { return trouble_of_moment(text); }, "");
+  app.add_option("--from", command.from,
+                 "Begin so many seconds after the first state, or at a timecode that it carries: 01:02:03:04")
+      ->check(moment);
+  app.add_option("--to", command.to, "End so many seconds after the first state, or at a timecode")
+      ->check(moment);
   app.add_option("--seconds", command.seconds,
                  "Length in seconds (default: to the end of the recording, or until stopped; what was "
                  "written by then is whole)")
@@ -99,21 +124,29 @@ Result<ExportOptions> export_options(const ExportCommand& command) {
   options.path = command.paths.back();
   if (command.fps) {
     ASSIGN_OR_RETURN(options.fps, parse_frame_rate(*command.fps));
+    options.has_fps = true;
   }
   options.unit = command.unit == "m" ? ExportUnit::Metre : ExportUnit::Centimetre;
   options.up = command.up == "z" ? ExportUp::Z : ExportUp::Y;
   options.space = command.space == "world" ? ExportSpace::World : ExportSpace::Head;
   options.role = command.is_guides ? ExportRole::Guides : ExportRole::Strands;
   options.has_head = command.has_head;
-  const bool is_range = command.from_s || command.to_s || command.seconds || command.fps;
+  const bool is_range = command.from || command.to || command.seconds || command.fps;
   if (command.at_s && is_range)
     return make_error(ErrorCode::BadInput,
                       "--at is one frame: --fps, --from, --to and --seconds say nothing of it");
-  if (command.to_s && command.seconds)
+  const std::string from = command.from.value_or(""), to = command.to.value_or("");
+  if (command.to && command.seconds)
     return make_error(ErrorCode::BadInput, "--to and --seconds both say where it ends: give one of them");
-  options.from_s = command.at_s.value_or(command.from_s.value_or(0.0));
+  if (command.from && command.to && is_timecode(from) != is_timecode(to))
+    return make_error(ErrorCode::BadInput, "--from and --to are both seconds, or both timecodes");
+  if (is_timecode(from) && command.seconds)
+    return make_error(ErrorCode::BadInput, "behind a timecode --to says the end, as a timecode");
+  if (is_timecode(from)) options.from_timecode = from;
+  if (is_timecode(to)) options.to_timecode = to;
+  options.from_s = command.at_s.value_or(seconds_of(from).value_or(0.0));
   if (command.seconds) options.to_s = options.from_s + *command.seconds;
-  if (command.to_s) options.to_s = command.to_s;
+  if (command.to && !is_timecode(to)) options.to_s = seconds_of(to);
   // A file holds one frame of .ply: a sequence is asked for.
   options.is_one_frame = command.at_s || (options.path.extension() == ".ply" && !is_range);
   RETURN_IF_ERROR(check_export(options));

@@ -24,7 +24,8 @@ struct ExportCommand {
   bool is_guides = false;
   bool is_drawn = false;
   bool has_head = false;
-  std::optional<double> from_s, to_s, seconds, at_s;
+  std::optional<std::string> from, to;  // seconds or timecode
+  std::optional<double> seconds, at_s;
 };
 
 /// Adds the options of the sub-command to `app`; `app` and `command` must exist until the command line is

@@ -81,6 +81,9 @@ class SessionWay {
       : heads_(heads), told_(heads.size()) {}
 
   void send(const FeedPlan& plan, int64_t sample_ns, FeedProgress& progress) {
+    const auto timecode = plan.timecode ? plan.timecode(progress.motion_s) : std::nullopt;
+    if (!plan.motion && timecode)
+      for (const auto& head : heads_) send_to(*head, MotionSamples{{}, 0.0, {}, timecode});
     if (plan.motion) {
       MotionSamples message{{{sample_ns, plan.motion(progress.motion_s)}}, 1.0 - progress.pace};
       if (plan.joints) {
@@ -88,6 +91,7 @@ class SessionWay {
         const std::vector<glm::dvec3> places = plan.joints(progress.motion_s);
         message.samples.front().joint_m.assign(places.begin(), places.end());
       }
+      message.timecode = timecode;
       for (size_t i = 0; i < heads_.size(); ++i) {
         const bool is_sent = send_to(*heads_[i], message);
         count(is_sent, progress.motion_samples, progress);

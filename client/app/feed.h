@@ -16,6 +16,7 @@
 
 #include "client/app/steady_client.h"
 #include "common/base/result.h"
+#include "common/base/timecode.h"
 #include "common/math/pose.h"
 
 namespace strandcast {
@@ -23,13 +24,14 @@ namespace strandcast {
 struct FeedPlan {
   std::function<Pose(double t_s)> motion;  // empty = none
   std::vector<std::string> joint_names;    // of the body, sent with the motion; at most kMaxMotionJoints
-  std::function<std::vector<glm::dvec3>(double t_s)> joints;  // of each, head space; empty = none
-  std::function<glm::vec3(double t_s)> wind;                  // world, m/s; empty = none
-  double rate_hz = 120.0;                                     // samples per second of each
-  double speed = 1.0;                                         // motion time per real time
-  double duration_s = 0.0;                                    // real time; 0 = until stopped
-  double motion_s = 0.0;                                      // motion time; 0 = without end
-  bool is_live = false;                                       // in real time whatever the simulation does
+  std::function<std::vector<glm::dvec3>(double t_s)> joints;    // of each, head space; empty = none
+  std::function<glm::vec3(double t_s)> wind;                    // world, m/s; empty = none
+  double rate_hz = 120.0;                                       // samples per second of each
+  double speed = 1.0;                                           // motion time per real time
+  double duration_s = 0.0;                                      // real time; 0 = until stopped
+  double motion_s = 0.0;                                        // motion time; 0 = without end
+  std::function<std::optional<Timecode>(double t_s)> timecode;  // of the motion; empty = none
+  bool is_live = false;                                         // in real time whatever the simulation does
 };
 
 /// A simulation that is slower than real time by less than this is not followed.

@@ -56,6 +56,8 @@ Status RecordedStates::read_changes(const std::filesystem::path& path) {
     if (const auto* look = std::get_if<LookChange>(message)) looks_.push_back({(*item)->time_ns, *look});
     if (const auto* stream = std::get_if<RecordedStream>(message))
       codecs_.push_back({(*item)->time_ns, stream->codec});
+    if (const auto* state = std::get_if<RecordedState>(message); state != nullptr && state->timecode)
+      timecodes_.add(state->sim_time_ns, *state->timecode);
     if (const auto* loss = std::get_if<RecordedLoss>(message)) lost_ += loss->frames;
   }
   return {};

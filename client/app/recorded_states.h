@@ -22,6 +22,7 @@ class RecordedStates : public ExportSource {
   static Result<std::unique_ptr<RecordedStates>> open(const std::filesystem::path& path);
 
   const ExportScene& scene() const override { return scene_; }
+  const TimecodeTrack& timecodes() const override { return timecodes_; }
   Result<std::optional<int64_t>> skip_to(double from_s) override;
   /// Returns the next state, null at the end. Damaged parts are skipped and counted.
   Result<std::shared_ptr<const Snapshot>> next() override;
@@ -52,9 +53,10 @@ class RecordedStates : public ExportSource {
   LookChange look_;
   std::vector<Timed<LookChange>> looks_;    // in the order of time, the first from the start on
   std::vector<Timed<std::string>> codecs_;  // likewise
-  uint64_t damaged_ = 0;                    // parts that could not be read
-  uint64_t rejected_ = 0;                   // frames that could not be decoded
-  uint64_t lost_ = 0;                       // frames that the recorder had no room for
+  TimecodeTrack timecodes_;
+  uint64_t damaged_ = 0;   // parts that could not be read
+  uint64_t rejected_ = 0;  // frames that could not be decoded
+  uint64_t lost_ = 0;      // frames that the recorder had no room for
 };
 
 }  // namespace strandcast

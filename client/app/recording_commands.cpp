@@ -101,6 +101,7 @@ int run_recording_info(const std::filesystem::path& path) {
   if (const auto tick = first_recorded_tick(path); tick && *tick > 0)
     print_line("began",
                fmt::format("at step {}, while the simulation ran: --replay cannot simulate it again", *tick));
+  if (const std::string take = take_text(start.slate, start.take); !take.empty()) print_line("take", take);
   print_line("simulated", start.sim_device_name);
   if (scene)
     print_line("scene", fmt::format("solver {}, {:g} steps/s of {} substeps, within {:g} mm",

@@ -183,6 +183,9 @@ std::vector<HudRow> HudWriter::rows(const ViewerState& now, const ViewFacts& fac
   add("dropped", fmt::format("{} server, {} missed, {} here", now.status.dropped_frames, now.missed_frames,
                              now.net.dropped_frames));
   add("window", fmt::format("answers in {:.0f} ms", facts.answer_ms));
+  if (now.status.timecode)
+    add("timecode", fmt::format("{} at {} fps", timecode_text(*now.status.timecode),
+                                frame_rate_text(now.status.timecode->rate.hz())));
   add("tick", fmt::format("{}, {} viewer{}", now.status.tick, now.status.viewer_count,
                           now.status.viewer_count == 1 ? "" : "s"));
   return all;

@@ -232,7 +232,7 @@ class WindowedView {
     if (actions.wants_pause_toggle)
       steer(ControlCommand{state_->status.is_paused ? Command::Resume : Command::Pause});
     if (actions.wants_step) steer(ControlCommand{Command::StepOnce});
-    if (actions.wants_record_toggle) steer(RecordCommand{state_->status.recording.empty(), {}});
+    if (actions.wants_record_toggle) steer(RecordCommand{state_->status.recording.empty()});
     if (actions.wants_mode_toggle) change_mode();
     if (actions.wants_playout_toggle) {
       playout_ = playout_ == Playout::Smooth ? Playout::LowLatency : Playout::Smooth;

@@ -56,7 +56,8 @@ class AbcWriter : public StrandWriter {
         "schema=AbcGeom_Curve_v2;schemaBaseType=AbcGeom_GeomBase_v1;schemaObjTitle=AbcGeom_Curve_v2:.geom";
     RETURN_IF_ERROR(add_curves(curves));
     if (!strands_.head_triangles().empty()) RETURN_IF_ERROR(add_head(hair.items.emplace_back()));
-    const AbcEvenTimes moving{0.0, 1.0 / options_.fps.hz()};
+    const AbcEvenTimes moving{static_cast<double>(options_.first_number - 1) / options_.fps.hz(),
+                              1.0 / options_.fps.hz()};
     ASSIGN_OR_RETURN(const uint64_t bytes, file_.finish(top, description(), std::span(&moving, 1)));
     return WrittenBytes{1, bytes, options_.path};
   }

@@ -18,6 +18,7 @@ class CsvWriter : public StrandWriter {
  public:
   CsvWriter(const ExportOptions& options, const StrandSet& strands, OutputFile file)
       : decimals_(options.unit == ExportUnit::Centimetre ? 4 : 6),
+        first_number_(options.first_number),
         path_(options.path),
         strands_(strands),
         file_(std::move(file)) {
@@ -27,7 +28,7 @@ class CsvWriter : public StrandWriter {
   Status begin() {
     RETURN_IF_ERROR(
         file_.append(fmt::format("frame,time_s,strand,vertex,x_{0},y_{0},z_{0},width_{0}\n", unit_)));
-    return append_rows("0,,", strands_.rest_points());
+    return append_rows(fmt::format("{},,", first_number_ - 1), strands_.rest_points());
   }
 
   Status write(const ExportFrame& frame) override {
@@ -67,6 +68,7 @@ class CsvWriter : public StrandWriter {
   }
 
   const int decimals_;
+  const int64_t first_number_;
   const std::filesystem::path path_;
   std::string unit_;
   const StrandSet& strands_;

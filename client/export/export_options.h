@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "common/base/frame_rate.h"
 #include "common/base/timecode.h"
@@ -20,17 +21,20 @@ enum class ExportRole {
 
 struct ExportOptions {
   std::filesystem::path path;  // .usda, .usdc, .usdz, .abc, .ply or .csv
-  FrameRate fps;
+  FrameRate fps;               // without has_fps: that of the states' timecode, if they carry one
+  bool has_fps = false;
   ExportUnit unit = ExportUnit::Centimetre;
   ExportUp up = ExportUp::Y;
   ExportSpace space = ExportSpace::Head;
   ExportRole role = ExportRole::Strands;
-  double from_s = 0.0;         // after the first state
-  std::optional<double> to_s;  // likewise; empty: to the last state
-  bool has_head = false;       // the head as a mesh, too; not for .csv
-  bool is_one_frame = false;   // the one at from_s, without the rest shape (.ply)
-  bool is_whole = false;       // all frames of the range or no file: an error of the source ends it
-  bool is_quiet = false;       // no progress on standard error
+  double from_s = 0.0;                               // after the first state
+  std::optional<double> to_s;                        // likewise; empty: to the last state
+  std::string from_timecode = {}, to_timecode = {};  // instead of seconds; empty: these
+  int64_t first_number = 1;   // of the first frame: frames since midnight, where states carry timecode
+  bool has_head = false;      // the head as a mesh, too; not for .csv
+  bool is_one_frame = false;  // the one at from_s, without the rest shape (.ply)
+  bool is_whole = false;      // all frames of the range or no file: an error of the source ends it
+  bool is_quiet = false;      // no progress on standard error
 };
 
 /// Returns the metres per unit of the file.

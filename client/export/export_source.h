@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "client/export/export_drawing.h"
+#include "client/export/timecode_track.h"
 #include "common/base/result.h"
 #include "common/strands/scene_asset.h"
 #include "common/strands/snapshot.h"
@@ -31,6 +32,11 @@ class ExportSource {
   /// time of the first state if it is already known. Call it before next().
   virtual Result<std::optional<int64_t>> skip_to([[maybe_unused]] double from_s) {
     return std::optional<int64_t>();
+  }
+  /// Returns the timecode of all states; that of a running server is not known beforehand.
+  virtual const TimecodeTrack& timecodes() const {
+    static const TimecodeTrack kNone;
+    return kNone;
   }
   /// Returns the next state; null if there are no more. Its time is later than the last one's, unless time
   /// began anew.

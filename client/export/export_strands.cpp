@@ -7,6 +7,7 @@
 
 #include "client/export/frame_sampler.h"
 #include "client/export/strand_writer.h"
+#include "common/base/units.h"
 #include "common/log/progress.h"
 
 namespace strandcast {
@@ -30,16 +31,76 @@ MakeWriter writer_for(const std::string& extension) {
   return nullptr;
 }
 
+/// When frames are, and how they are numbered.
+struct FramePlan {
+  ExportOptions options;
+  SampleRange range;
+  std::string first_timecode;  // empty: frames are so many seconds after the first state
+};
+
+/// Whether frames are those of the states' timecode: where it is asked for, or of all states where it counts
+/// as frames do.
+Result<bool> goes_by_timecode(const ExportOptions& options, const TimecodeTrack& track, int64_t first_ns) {
+  const std::optional<Timecode> count = track.first();
+  const bool is_asked = !options.from_timecode.empty() || !options.to_timecode.empty();
+  if (!count && is_asked)
+    return make_error(ErrorCode::BadInput, "the states carry no timecode: say seconds after the first state");
+  const bool is_of_count = count && (!options.has_fps || options.fps == count->rate);
+  if (is_asked && !is_of_count)
+    return make_error(ErrorCode::BadInput, "the states count {} frames per second: leave --fps out",
+                      frame_rate_text(count->rate.hz()));
+  const bool is_all = options.from_s == 0.0 && !options.to_s && !options.is_one_frame;
+  return is_asked || (is_of_count && is_all && track.is_whole(first_ns));
+}
+
+/// Frames at the states' timecode.
+Status plan_by_timecode(const TimecodeTrack& track, const FrameRate& rate, FramePlan& plan) {
+  std::optional<Timecode> from, to;
+  if (!plan.options.from_timecode.empty()) {
+    ASSIGN_OR_RETURN(from, parse_timecode(plan.options.from_timecode, rate));
+  }
+  if (!plan.options.to_timecode.empty()) {
+    ASSIGN_OR_RETURN(to, parse_timecode(plan.options.to_timecode, rate));
+  }
+  ASSIGN_OR_RETURN(TimecodeTrack::Frames frames, track.frames(from, to));
+  if (frames.time_ns.empty())
+    return make_error(ErrorCode::BadInput, "no whole frame lies between the states of this range");
+  plan.options.fps = plan.range.fps = rate;
+  plan.options.first_number = frames.first.frame;
+  plan.first_timecode = timecode_text(frames.first);
+  plan.range.time_ns = std::move(frames.time_ns);
+  return {};
+}
+
+Result<FramePlan> plan_frames(ExportSource& source, const ExportOptions& options) {
+  FramePlan plan{options, {options.fps, options.from_s, options.to_s}, {}};
+  const TimecodeTrack& track = source.timecodes();
+  ASSIGN_OR_RETURN(plan.range.first_ns, source.skip_to(0.0));
+  ASSIGN_OR_RETURN(const bool is_by_timecode,
+                   goes_by_timecode(options, track, plan.range.first_ns.value_or(0)));
+  if (is_by_timecode) RETURN_IF_ERROR(plan_by_timecode(track, track.first()->rate, plan));
+  if (is_by_timecode && plan.range.first_ns)
+    plan.options.from_s =
+        std::max(0.0, static_cast<double>(plan.range.time_ns.front() - *plan.range.first_ns) / kNsPerS);
+  if (plan.options.from_s > 0.0) RETURN_IF_ERROR(source.skip_to(plan.options.from_s));
+  return plan;
+}
+
 /// One export from the first state to the end of the file.
 class Export {
  public:
-  Export(ExportSource& source, const ExportOptions& options, std::optional<int64_t> first_ns)
+  Export(ExportSource& source, const FramePlan& plan)
       : source_(source),
-        options_(options),
-        sampler_({options.fps, options.from_s, options.to_s, first_ns},
+        options_(plan.options),
+        sampler_(plan.range,
                  StrandFill(source.scene().asset->rest_position_m, source.scene().asset->vertex_count)),
-        progress_({"export", options.is_quiet, "frame"}) {
-    if (options.to_s) {
+        progress_({"export", options_.is_quiet, "frame"}) {
+    report_.fps = options_.fps.hz();
+    report_.first_timecode = plan.first_timecode;
+    const ExportOptions& options = options_;
+    if (const auto count = static_cast<uint32_t>(plan.range.time_ns.size()); count > 0) {
+      progress_.expect(count, count);
+    } else if (options.to_s) {
       const auto frames = static_cast<uint32_t>((*options.to_s - options.from_s) * options.fps.hz()) + 1;
       progress_.expect(frames, frames);
     }
@@ -104,7 +165,8 @@ class Export {
     progress_.begin_run(options_.path.string());
     const std::vector<glm::dvec3> points = strands_->points(frame.strands);
     if (strands_->collapsed_count(points) > 0) ++collapsed_frames_;
-    RETURN_IF_ERROR(writer_->write({frame.index + 1, frame.time_s, points, frame.strands.world_from_head}));
+    RETURN_IF_ERROR(writer_->write({options_.first_number + static_cast<int64_t>(frame.index), frame.time_s,
+                                    points, frame.strands.world_from_head}));
     progress_.end_run(1.0);
     ++report_.frame_count;
     return {};
@@ -161,8 +223,8 @@ Status check_export(const ExportOptions& options) {
 Result<ExportReport> export_strands(ExportSource& source, const ExportOptions& options,
                                     const std::atomic<bool>& stop) {
   RETURN_IF_ERROR(check_export(options));
-  ASSIGN_OR_RETURN(const std::optional<int64_t> first_ns, source.skip_to(options.from_s));
-  Export run(source, options, first_ns);
+  ASSIGN_OR_RETURN(const FramePlan plan, plan_frames(source, options));
+  Export run(source, plan);
   RETURN_IF_ERROR(run.run(stop));
   return run.finish();
 }

@@ -18,8 +18,9 @@ struct ExportReport {
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
   uint64_t frame_count = 0;  // besides the rest shape
+  double first_s = 0.0;      // simulated time of the first frame
   double fps = 0.0;
-  double first_s = 0.0;  // simulated time of the first frame
+  std::string first_timecode;  // of the first frame; empty: frames are not by timecode
   uint64_t file_count = 0;
   uint64_t bytes = 0;
   std::filesystem::path last_path;   // of the file, or the last of them

@@ -13,12 +13,14 @@ FrameSampler::FrameSampler(const SampleRange& range, StrandFill fill)
 }
 
 int64_t FrameSampler::time_ns(uint64_t index) const {
+  if (!range_.time_ns.empty()) return range_.time_ns[std::min<size_t>(index, range_.time_ns.size() - 1)];
   const double after_s =
       range_.from_s + static_cast<double>(index) * range_.fps.denominator / range_.fps.numerator;
   return *first_ns_ + std::llround(after_s * kNsPerS);
 }
 
 bool FrameSampler::is_done() const {
+  if (!range_.time_ns.empty()) return next_index_ >= range_.time_ns.size();
   if (!first_ns_ || !range_.to_s) return false;
   // A frame at the very end belongs to it, however its time is rounded.
   return time_ns(next_index_) > *first_ns_ + std::llround(*range_.to_s * kNsPerS) + 1;

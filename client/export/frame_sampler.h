@@ -6,6 +6,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "common/base/frame_rate.h"
 #include "common/replay/state_blend.h"
@@ -23,7 +24,8 @@ struct SampleRange {
   double from_s = 0.0;         // after the first state
   std::optional<double> to_s;  // likewise; empty: to the last state
   std::optional<int64_t> first_ns =
-      {};  // time of the first state, where others before the range are left out
+      {};                             // time of the first state, where others before the range are left out
+  std::vector<int64_t> time_ns = {};  // simulated, of all frames; empty: even, by what is above
 };
 
 class FrameSampler {

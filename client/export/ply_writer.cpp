@@ -19,9 +19,9 @@ class PlyWriter : public StrandWriter {
   PlyWriter(const ExportOptions& options, const StrandSet& strands) : options_(options), strands_(strands) {}
 
   Status begin() {
-    return options_.is_one_frame
-               ? Status()
-               : write_file(0, "the rest shape", strands_.rest_points(), strands_.rest_head_points());
+    return options_.is_one_frame ? Status()
+                                 : write_file(options_.first_number - 1, "the rest shape",
+                                              strands_.rest_points(), strands_.rest_head_points());
   }
 
   Status write(const ExportFrame& frame) override {
@@ -33,7 +33,7 @@ class PlyWriter : public StrandWriter {
 
  private:
   /// "out.ply", or of a sequence "out_0001.ply".
-  std::filesystem::path path_of(uint64_t number) const {
+  std::filesystem::path path_of(int64_t number) const {
     if (options_.is_one_frame) return options_.path;
     return options_.path.parent_path() / fmt::format("{}_{:04}{}", options_.path.stem().string(), number,
                                                      options_.path.extension().string());
@@ -60,7 +60,7 @@ class PlyWriter : public StrandWriter {
     return text + "end_header\n";
   }
 
-  Status write_file(uint64_t number, const std::string& moment, std::span<const glm::dvec3> points,
+  Status write_file(int64_t number, const std::string& moment, std::span<const glm::dvec3> points,
                     const std::vector<glm::dvec3>& head) {
     std::string bytes = header(moment, head.size());
     const auto put = [&bytes](auto value) {

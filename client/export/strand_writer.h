@@ -17,7 +17,7 @@ namespace strandcast {
 
 /// A frame in the file's units and axes.
 struct ExportFrame {
-  uint64_t number = 0;                 // from 1
+  int64_t number = 0;                  // from ExportOptions::first_number on
   double time_s = 0.0;                 // simulated
   std::span<const glm::dvec3> points;  // strand after strand, root first
   Pose world_from_head = {};
@@ -41,7 +41,8 @@ class StrandWriter {
 inline constexpr int kUsdGroomMajor = 1, kUsdGroomMinor = 5;
 std::string usd_description(const ExportOptions& options, const StrandSet& strands);
 
-/// Make the writer of each format; the rest shape is written as frame 0. `strands` must outlive them.
+/// Make the writer of each format; the rest shape is written as the frame before the first. `strands` must
+/// outlive them.
 Result<std::unique_ptr<StrandWriter>> make_abc_writer(const ExportOptions& options, const StrandSet& strands);
 Result<std::unique_ptr<StrandWriter>> make_usda_writer(const ExportOptions& options,
                                                        const StrandSet& strands);

@@ -41,7 +41,7 @@ class UsdaWriter : public StrandWriter {
     RETURN_IF_ERROR(file_.append("        point3f[] points = "));
     RETURN_IF_ERROR(append_points(rest));
     RETURN_IF_ERROR(file_.append("\n        point3f[] points.timeSamples = {\n"));
-    return append_sample(0, rest);
+    return append_sample(options_.first_number - 1, rest);
   }
 
   Status write(const ExportFrame& frame) override {
@@ -56,7 +56,7 @@ class UsdaWriter : public StrandWriter {
         file_.append(extent_text(extents_.front()) + "\n        float3[] extent.timeSamples = {\n"));
     for (size_t frame = 0; frame < extents_.size(); ++frame)
       RETURN_IF_ERROR(
-          file_.append(fmt::format("            {}: {},\n", frame, extent_text(extents_[frame]))));
+          file_.append(fmt::format("            {}: {},\n", number_of(frame), extent_text(extents_[frame]))));
     RETURN_IF_ERROR(file_.append("        }\n    }\n"));
     RETURN_IF_ERROR(append_head());
     RETURN_IF_ERROR(file_.append("}\n"));
@@ -73,7 +73,7 @@ class UsdaWriter : public StrandWriter {
     text += fmt::format("    doc = \"{}\"\n", usd_description(options_, strands_));
     text += fmt::format("    metersPerUnit = {}\n", metres_of(options_.unit));
     text += fmt::format("    upAxis = \"{}\"\n", options_.up == ExportUp::Y ? 'Y' : 'Z');
-    text += "    startTimeCode = 1\n    endTimeCode = ";
+    text += fmt::format("    startTimeCode = {}\n    endTimeCode = ", options_.first_number);
     end_time_at_ = text.size();
     // How many frames there will be is known at the end.
     text.append(20, ' ');
@@ -123,6 +123,9 @@ class UsdaWriter : public StrandWriter {
                        high.y, high.z);
   }
 
+  /// Of a sample; the first is the rest shape.
+  int64_t number_of(size_t sample) const { return options_.first_number - 1 + static_cast<int64_t>(sample); }
+
   bool has_moving_head() const { return options_.has_head && options_.space == ExportSpace::World; }
 
   /// Adds the head as a mesh, with samples where it moves.
@@ -139,10 +142,11 @@ class UsdaWriter : public StrandWriter {
     RETURN_IF_ERROR(file_.append(text + "        point3f[] points = "));
     RETURN_IF_ERROR(append_points(rest));
     if (!head_poses_.empty()) {
-      RETURN_IF_ERROR(file_.append("\n        point3f[] points.timeSamples = {\n            0: "));
+      RETURN_IF_ERROR(file_.append(
+          fmt::format("\n        point3f[] points.timeSamples = {{\n            {}: ", number_of(0))));
       RETURN_IF_ERROR(append_points(rest));
       for (size_t i = 0; i < head_poses_.size(); ++i) {
-        RETURN_IF_ERROR(file_.append(fmt::format(",\n            {}: ", i + 1)));
+        RETURN_IF_ERROR(file_.append(fmt::format(",\n            {}: ", number_of(i + 1))));
         RETURN_IF_ERROR(append_points(strands_.head_points(head_poses_[i])));
       }
       RETURN_IF_ERROR(file_.append(",\n        }"));
@@ -150,7 +154,7 @@ class UsdaWriter : public StrandWriter {
     return file_.append("\n    }\n");
   }
 
-  Status append_sample(uint64_t time_code, std::span<const glm::dvec3> points) {
+  Status append_sample(int64_t time_code, std::span<const glm::dvec3> points) {
     Extent extent{points.front(), points.front()};
     for (const glm::dvec3& point : points)
       extent = {glm::min(extent.low, point), glm::max(extent.high, point)};
@@ -194,7 +198,7 @@ class UsdaWriter : public StrandWriter {
   OutputFile file_;
   double half_width_ = 0.0;
   uint64_t end_time_at_ = 0;
-  uint64_t last_frame_ = 1;
+  int64_t last_frame_ = 1;
   std::vector<std::string> pieces_;  // of points, kept for their memory
   std::vector<Pose> head_poses_;     // of all frames, where the head moves
   std::vector<Extent> extents_;      // of all frames: 48 bytes for each
@@ -204,9 +208,10 @@ class UsdaWriter : public StrandWriter {
 
 std::string usd_description(const ExportOptions& options, const StrandSet& strands) {
   return fmt::format(
-      "{} strands of {} vertices, root first, in {}. Time code 0 is the rest shape, the motion begins at 1.",
+      "{} strands of {} vertices, root first, in {}. Time code {} is the rest shape, the motion begins at {}.",
       strands.strand_count(), strands.vertex_count(),
-      options.space == ExportSpace::Head ? "the head's own space" : "the world");
+      options.space == ExportSpace::Head ? "the head's own space" : "the world", options.first_number - 1,
+      options.first_number);
 }
 
 Result<std::unique_ptr<StrandWriter>> make_usda_writer(const ExportOptions& options,

@@ -23,7 +23,7 @@ class UsdcWriter : public StrandWriter {
     half_width_ = 0.5 * *std::max_element(strands.widths().begin(), strands.widths().end());
   }
 
-  Status begin() { return append_frame(0, strands_.rest_points(), strands_.rest_head_points()); }
+  Status begin() { return append_frame(options_.first_number - 1, strands_.rest_points(), strands_.rest_head_points()); }
 
   Status write(const ExportFrame& frame) override {
     const bool has_moving_head = options_.has_head && options_.space == ExportSpace::World;
@@ -51,7 +51,7 @@ class UsdcWriter : public StrandWriter {
   }
 
  private:
-  Status append_frame(uint64_t time_code, std::span<const glm::dvec3> points,
+  Status append_frame(int64_t time_code, std::span<const glm::dvec3> points,
                       const std::vector<glm::dvec3>& head) {
     times_.push_back(static_cast<double>(time_code));
     glm::dvec3 low = points.front(), high = low;
@@ -105,12 +105,13 @@ class UsdcWriter : public StrandWriter {
   }
 
   Status describe_layer(UsdcItem& root) {
+    const auto first = static_cast<double>(options_.first_number);
     root.fields = {{"defaultPrim", file_.token("Hair")},
                    {"documentation", file_.string(usd_description(options_, strands_))},
                    {"upAxis", file_.token(options_.up == ExportUp::Y ? "Y" : "Z")}};
     for (const auto& [name, value] : {std::pair("metersPerUnit", metres_of(options_.unit)),
-                                      {"startTimeCode", 1.0},
-                                      {"endTimeCode", std::max(times_.back(), 1.0)},
+                                      {"startTimeCode", first},
+                                      {"endTimeCode", std::max(times_.back(), first)},
                                       {"timeCodesPerSecond", options_.fps.hz()},
                                       {"framesPerSecond", options_.fps.hz()}}) {
       ASSIGN_OR_RETURN(const UsdcValue number, file_.number(value));

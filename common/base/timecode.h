@@ -50,7 +50,7 @@ Result<Timecode> parse_timecode(std::string_view text, const FrameRate& rate);
 /// Formats a timecode as parse_timecode() reads it, without the part of the frame.
 std::string timecode_text(const Timecode& timecode);
 
-/// Returns the timecode so many frames later, or earlier; it goes on past midnight.
+/// Returns the timecode `frames` later, or earlier where that is negative; it goes on past midnight.
 Timecode advanced(const Timecode& timecode, double frames);
 
 /// Returns the frames from one timecode to another of the same rate and counting, by the shorter way round

@@ -8,6 +8,7 @@
 #include <charconv>
 #include <optional>
 
+#include "common/base/frame_rate.h"
 #include "common/base/text.h"
 #include "common/groom/groom.h"
 #include "common/scene/scene_desc.h"
@@ -51,6 +52,18 @@ std::string known_values(const pb::EnumDescriptor& type) {
   return list;
 }
 
+/// The exact rate that a quotient, or a rounded rate of television, means; other numbers stay as they are.
+Result<std::string> as_number(const pb::FieldDescriptor& field, const std::string& value) {
+  constexpr double kMostSceneRateHz = 1e4;
+  constexpr uint32_t kTelevision = 1001;
+  if (!field.name().ends_with("_hz")) return value;
+  const bool is_quotient = value.find('/') != std::string::npos;
+  const auto rate = parse_frame_rate(value, kLeastFrameRate, kMostSceneRateHz);
+  if (is_quotient && !rate) return rate.error();
+  const bool is_exact = rate && (is_quotient || rate->denominator == kTelevision);
+  return is_exact ? fmt::format("{}", rate->hz()) : value;
+}
+
 Status set_value(Cursor& cursor, const pb::FieldDescriptor& field, const std::string& value) {
   if (field.cpp_type() == pb::FieldDescriptor::CPPTYPE_STRING) {
     cursor.message->GetReflection()->SetString(cursor.message, &field, value);
@@ -62,10 +75,11 @@ Status set_value(Cursor& cursor, const pb::FieldDescriptor& field, const std::st
   if (field.cpp_type() == pb::FieldDescriptor::CPPTYPE_MESSAGE && !value.starts_with('{'))
     return make_error(ErrorCode::BadInput, "{} is a group of fields, name one of them ({})", field.name(),
                       known_fields(*field.message_type()));
+  ASSIGN_OR_RETURN(const std::string number, as_number(field, value));
   FirstError error;
   pb::TextFormat::Parser parser;
   parser.RecordErrorsTo(&error);
-  if (parser.ParseFieldValueFromString(value, &field, cursor.message)) return {};
+  if (parser.ParseFieldValueFromString(number, &field, cursor.message)) return {};
   return make_error(ErrorCode::BadInput, "\"{}\" is not a value for {}{}{}", value, field.name(),
                     error.text().empty() ? "" : ": ", error.text());
 }

@@ -6,9 +6,11 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "common/base/timecode.h"
 #include "common/math/bust.h"
 #include "common/math/pose.h"
 
@@ -29,6 +31,7 @@ struct SnapshotInfo {
   /// Steps that led to this state, for codecs that predict by simulating them; nullptr = not known. Not part
   /// of the state hash.
   std::shared_ptr<const StepTrail> trail = {};
+  std::optional<Timecode> timecode = {};  // of the motion that it shows, at the server; likewise
 
   size_t plane_size() const { return static_cast<size_t>(strand_count) * vertex_count; }
 };

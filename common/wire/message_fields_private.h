@@ -13,6 +13,7 @@
 //   secret      exact text that is never printed
 //   places      points of three numbers each, without limits
 //   names       distinct names, none of them empty
+//   timecode    a frame of a rate that timecode counts, or none
 //   group, repeated, require, and the parts of looks and cameras: as in common/scene/scene_fields.h
 #pragma once
 
@@ -58,6 +59,7 @@ void visit(Visitor& v, MotionSamples& m) {
   });
   v.number("held_back", m.held_back, kHeldBack);
   v.names("joint_names", m.joint_names, kMaxMotionJoints, kMaxJointNameBytes);
+  v.timecode("timecode", m.timecode);
 }
 
 template <class Visitor>
@@ -201,6 +203,8 @@ template <class Visitor>
 void visit(Visitor& v, RecordCommand& m) {
   v.value("is_wanted", m.is_wanted);
   v.text("name", m.name, kMaxNameChars);
+  v.text("slate", m.slate, kMaxSlateChars);
+  v.number("take", m.take, Range{0, kMaxTake, ""});
 }
 template <>
 inline constexpr const char* kKind<WindowChange> = "window";
@@ -292,6 +296,7 @@ void visit(Visitor& v, ServerStatus& m) {
     });
   });
   v.text("recording", m.recording, kMaxTextChars);
+  v.timecode("timecode", m.timecode);
 }
 template <>
 inline constexpr const char* kKind<Goodbye> = "goodbye";
@@ -397,6 +402,7 @@ void visit(Visitor& v, StateTimes& m) {
     v.value("motion_ns", one.motion_ns);
     v.value("published_ns", one.published_ns);
     v.value("encoded_ns", one.encoded_ns);
+    v.timecode("timecode", one.timecode);
   });
 }
 template <>

@@ -18,6 +18,7 @@
 
 #include "common/base/check.h"
 #include "common/base/text.h"
+#include "common/base/timecode.h"
 #include "common/wire/message_fields_private.h"
 
 namespace strandcast {
@@ -155,6 +156,16 @@ class MessageWriter {
     for (const glm::dvec3& value : values)
       for (int axis = 0; axis < 3; ++axis) at_.reflection->AddDouble(at_.message, &field, value[axis]);
   }
+  void timecode(const char* name, const std::optional<Timecode>& timecode) {
+    if (!timecode) return;
+    group(name, [&] {
+      value("rate_numerator", timecode->rate.numerator);
+      value("rate_denominator", timecode->rate.denominator);
+      value("is_drop", timecode->is_drop);
+      value("frame", timecode->frame);
+      value("part", timecode->part);
+    });
+  }
   template <class Variant>
   void one_of(const char*, const Variant& whole) {
     std::visit(
@@ -279,6 +290,21 @@ class MessageReader {
     read_places(name, values, limit, [this](const pb::FieldDescriptor& field, int i) {
       return at_.reflection->GetRepeatedDouble(*at_.message, &field, i);
     });
+  }
+  void timecode(const char* name, std::optional<Timecode>& timecode) {
+    if (!at_.reflection->HasField(*at_.message, &field_of(name))) return;
+    Timecode& given = timecode.emplace();
+    group(name, [&] {
+      value("rate_numerator", given.rate.numerator);
+      value("rate_denominator", given.rate.denominator);
+      value("is_drop", given.is_drop);
+      value("frame", given.frame);
+      value("part", given.part);
+    });
+    if (!is_timecode_rate(given.rate, given.is_drop) ||
+        given.frame >= frames_per_day(given.rate, given.is_drop) || !(given.part >= 0.0 && given.part < 1.0))
+      fail(name, make_error(ErrorCode::BadInput, "is no frame of a day of {}/{} frames per second",
+                            given.rate.numerator, given.rate.denominator));
   }
   template <class Variant>
   void one_of(const char* name, Variant& whole) {

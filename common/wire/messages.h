@@ -7,12 +7,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/base/timecode.h"
 #include "common/math/pose.h"
 #include "common/pictures/picture.h"
 #include "common/scene/scene_desc.h"
@@ -45,6 +47,8 @@ inline constexpr size_t kMaxLiveValues = 16;
 inline constexpr size_t kMaxLiveValueChars = 120;
 inline constexpr double kMaxStepNs = 1'000'000.0;  // Hello
 inline constexpr uint32_t kMaxStepCount = 100'000;  // ControlCommand
+inline constexpr size_t kMaxSlateChars = 32;  // RecordCommand
+inline constexpr uint32_t kMaxTake = 9999;
 inline constexpr double kMaxBanS = 604'800.0;  // AdminCommand
 inline constexpr uint32_t kMaxListedParameters = 64;  // a full ParameterList stays below kMaxControlBytes
 inline constexpr size_t kMaxParameterPathBytes = 96;
@@ -70,6 +74,7 @@ struct MotionSamples {  // from a Source
   double held_back = 0.0;
   // Of the body, at most kMaxMotionJoints of 1 .. kMaxJointNameBytes bytes, each once.
   std::vector<std::string> joint_names = {};
+  std::optional<Timecode> timecode = {};  // of the first sample; without one, of the arrival
   bool operator==(const MotionSamples&) const = default;
 };
 struct WindSamples {  // from a Source
@@ -198,7 +203,9 @@ struct StateTimesRequest {
 /// Begins or ends a recording; answered by a Notice.
 struct RecordCommand {
   bool is_wanted = true;  // to begin; false: to end the recording
-  std::string name = {};  // of the file; empty = the server's choice
+  std::string name = {};  // of the file; empty = of slate and take, or the server's choice
+  std::string slate = {};  // as on the clapperboard; empty = none
+  uint32_t take = 0;  // of the slate; 0 = none
   bool operator==(const RecordCommand&) const = default;
 };
 /// How large the window is that shows the stream, and whether anybody can see it.
@@ -294,6 +301,7 @@ struct ServerStatus {
   std::string detail = {};  // for a person: how much is simulated, and why not all of it; empty = all
   std::vector<LiveInputStatus> live_inputs = {};  // at most kMaxLiveInputs
   std::string recording = {};  // for a person: the file that is written; empty = none
+  std::optional<Timecode> timecode{};  // of the newest state; none where nobody counts
   bool operator==(const ServerStatus&) const = default;
 };
 /// The server closes right after it.
@@ -392,6 +400,7 @@ struct StateTime {
   int64_t motion_ns = 0;  // when that arrived
   int64_t published_ns = 0;  // when it was simulated
   int64_t encoded_ns = 0;  // when its first frame of strands was encoded
+  std::optional<Timecode> timecode{};  // of the motion that it shows; none where nobody counts
   bool operator==(const StateTime&) const = default;
 };
 /// When each new state was where on its way.

@@ -18,6 +18,8 @@ void visit(Visitor& v, RecordingStart& m) {
   v.value("server_time_ns", m.server_time_ns);
   v.value("unix_time_ns", m.unix_time_ns);
   v.value("asset_hash", m.asset_hash);
+  v.text("slate", m.slate, kMaxSlateChars);
+  v.number("take", m.take, Range{0, kMaxTake, ""});
 }
 
 template <class Visitor>
@@ -59,6 +61,7 @@ void visit(Visitor& v, RecordedStep& m) {
   v.value("motion_speed", m.motion_speed);
   v.value("motion_time_ns", m.motion_time_ns);
   v.value("rejected_samples", m.rejected_samples);
+  v.timecode("timecode", m.timecode);
 }
 
 template <class Visitor>
@@ -81,6 +84,7 @@ void visit(Visitor& v, RecordedState& m) {
   v.value("tick", m.tick);
   v.value("sim_time_ns", m.sim_time_ns);
   v.value("state_hash", m.state_hash);
+  v.timecode("timecode", m.timecode);
 }
 
 template <class Visitor>

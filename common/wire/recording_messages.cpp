@@ -15,6 +15,12 @@
 #include "strandcast/v1/recording.pb.h"
 
 namespace strandcast {
+std::string take_text(const std::string& slate, uint32_t take) {
+  std::string text = slate.empty() ? std::string() : "slate " + slate;
+  if (take > 0) text += fmt::format("{}take {}", text.empty() ? "" : ", ", take);
+  return text;
+}
+
 namespace {
 
 /// The message of each kind, in the order of RecordedMessage.

@@ -6,12 +6,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/base/timecode.h"
 #include "common/math/pose.h"
 #include "common/scene/body_desc.h"
 #include "common/scene/scene_file.h"
@@ -34,8 +36,13 @@ struct RecordingStart {
   int64_t server_time_ns = 0;   // server clock at the start, which all times below but sim_time_ns go by
   int64_t unix_time_ns = 0;     // the same moment for people
   uint64_t asset_hash = 0;      // hash_bytes of the asset's payload
+  std::string slate = {};
+  uint32_t take = 0;  // 0 = none
   bool operator==(const RecordingStart&) const = default;
 };
+
+/// Names slate and take for people: "slate 12A, take 3"; empty without either.
+std::string take_text(const std::string& slate, uint32_t take);
 
 /// A motion or wind message as it was received.
 struct RecordedMotion {
@@ -67,6 +74,7 @@ struct RecordedStep {
   double motion_speed = 1.0;
   int64_t motion_time_ns = 0;
   uint64_t rejected_samples = 0;
+  std::optional<Timecode> timecode = {};
   bool operator==(const RecordedStep&) const = default;
 };
 
@@ -92,6 +100,7 @@ struct RecordedState {
   uint64_t tick = 0;
   int64_t sim_time_ns = 0;
   uint64_t state_hash = 0;  // of the published state, before a codec changed it
+  std::optional<Timecode> timecode = {};
   bool operator==(const RecordedState&) const = default;
 };
 

@@ -46,7 +46,7 @@ void FrameStages::note_state(const SnapshotInfo& state, int64_t time_ns) {
   while (open_.size() >= kMaxOpenStates) close_row();
   const int64_t motion_ns = state.motion_time_ns;
   const int64_t source_ns = source_times_ && motion_ns != 0 ? source_times_(motion_ns) : 0;
-  open_.push_back({{state.tick, state.sim_time_ns, source_ns, motion_ns, time_ns, 0}, false});
+  open_.push_back({{state.tick, state.sim_time_ns, source_ns, motion_ns, time_ns, 0, state.timecode}, false});
   if (state.motion_time_ns == 0 || state.motion_time_ns == last_motion_ns_) return;
   last_motion_ns_ = state.motion_time_ns;
   motion_to_state_.add_ms(ms_between(state.motion_time_ns, time_ns));

@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "common/base/command_line_error.h"
+#include "common/base/timecode.h"
 #include "common/base/version.h"
 #include "common/log/log.h"
 #include "common/scene/scene_file.h"
@@ -152,7 +153,7 @@ struct RawRunOptions {
 constexpr const char* kNotForRelays[] = {
     "--scene",       "--set",       "--groom",      "--check",  "--list-solvers", "--explain",
     "--print-scene", "--mocap",     "--send",       "--record", "--replay",       "--sim-device",
-    "--renderer",    "--gl-device", "--shader-dir", "--trace",  "--lockstep"};
+    "--renderer",    "--gl-device", "--shader-dir", "--trace",  "--lockstep",     "--timecode"};
 
 void add_relay_options(CLI::App& app, RawRunOptions& raw) {
   constexpr const char* kGroup = "Relay";
@@ -250,6 +251,15 @@ void add_record_options(CLI::App& app, ServerOptions& options, RawRunOptions& ra
       ->needs(replay);
 }
 
+/// How timecode counts that this machine's clock gives: a rate, with "df" behind it for drop-frame.
+Result<Timecode> timecode_count(std::string_view text) {
+  constexpr std::string_view kDrop = "df";
+  const bool is_drop = text.ends_with(kDrop);
+  if (is_drop) text.remove_suffix(kDrop.size());
+  ASSIGN_OR_RETURN(const FrameRate rate, parse_frame_rate(text));
+  return make_timecode({}, rate, is_drop);
+}
+
 void add_proxy_options(CLI::App& app, RawRunOptions& raw) {
   auto* proxies = app.add_option("--trusted-proxy", raw.trusted_proxies,
                                  "ADDRESS or ADDRESS/BITS of a proxy that may say for whom it connects, in "
@@ -313,6 +323,14 @@ void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) 
       "--trace", options.config.trace_path,
       "write a line per state to this file, of further heads to states-ben.csv and the like: when its motion "
       "came, when it was published and encoded");
+  app.add_option_function<std::string>(
+      "--timecode",
+      [&options](const std::string& text) {
+        const auto count = timecode_count(text);
+        if (!count) throw CLI::ValidationError("--timecode", count.error().message);
+        options.config.timecode = *count;
+      },
+      "frames per second of a timecode by this machine's clock, where nobody sends one: 24, 23.976, 29.97df");
   app.add_flag("--lockstep", options.config.is_lockstep,
                "simulated time goes on by strandcast-ctl step N only, and inputs are for simulated times");
   app.add_option("--seconds", options.run_s, "stop after so many seconds")->check(in_range(0.0, kMaxRunS));

@@ -60,7 +60,9 @@ std::string text_of(const Recorder& recorder, const std::string& end) {
   const std::string text =
       fmt::format("{}: {:.1f} s, {:.1f} MB", recorder.path().filename().string(), counts.length_s,
                   static_cast<double>(counts.written_bytes) / kBytesPerMb);
-  return end.empty() ? text : text + "; it ended by itself: " + end;
+  const std::string take = recorder.take();
+  const std::string whole = take.empty() ? text : text + ", " + take;
+  return end.empty() ? whole : whole + "; it ended by itself: " + end;
 }
 
 /// What a tap was told, for a thread that waits for it.
@@ -92,6 +94,12 @@ Result<std::string> recording_file_name(const std::string& name) {
         "without a folder, and begins with a letter or digit.",
         kMaxRecordingNameChars);
   return std::string(stem) + kEnding;
+}
+
+std::string recording_name(const RecordCommand& command) {
+  if (!command.name.empty() || (command.slate.empty() && command.take == 0)) return command.name;
+  if (command.take == 0) return command.slate;
+  return fmt::format("{}{}T{:02}", command.slate, command.slate.empty() ? "" : "-", command.take);
 }
 
 std::string recording_file_name(const std::string& scene, int64_t unix_time_s) {
@@ -206,7 +214,7 @@ void RecordDesk::answer(const Order& order) {
 
 Notice RecordDesk::carry_out(const RecordCommand& command) {
   if (command.is_wanted) {
-    const Result<std::string> begun = start_recording(command.name);
+    const Result<std::string> begun = start_recording(command);
     return begun ? Notice{false, *begun} : Notice{true, begun.error().to_string()};
   }
   if (const auto all = recorders(); !all.empty()) return Notice{false, end(all.back())};
@@ -287,7 +295,7 @@ Result<uint64_t> RecordDesk::change_tap(StepTap* tap, std::function<void()> at_c
 }
 
 /// One sentence of where it is.
-Result<std::string> RecordDesk::start_recording(const std::string& name) {
+Result<std::string> RecordDesk::start_recording(const RecordCommand& command) {
   for (const auto& present : recorders()) {
     if (present->failure()) {
       end(present);
@@ -296,12 +304,15 @@ Result<std::string> RecordDesk::start_recording(const std::string& name) {
                         present->path().filename().string());
     }
   }
-  ASSIGN_OR_RETURN(std::shared_ptr<Recorder> take, make_recorder(name));
+  ASSIGN_OR_RETURN(std::shared_ptr<Recorder> take, make_recorder(recording_name(command)));
   RETURN_IF_ERROR(take->attach(stream_->hub));
   std::unique_ptr<StepTap> both;
   if (whole_ != nullptr) both = std::make_unique<TapPair>(*whole_, *take);
   ASSIGN_OR_RETURN(const uint64_t tick, change_tap(both != nullptr ? both.get() : take.get()));
-  take->begin(stream_->describe(), stream_->asset());
+  RecordingStart start = stream_->describe();
+  start.slate = command.slate;
+  start.take = command.take;
+  take->begin(std::move(start), stream_->asset());
   const std::lock_guard lock(mutex_);
   take_ = std::move(take);
   both_ = std::move(both);

@@ -45,6 +45,9 @@ struct RecordFolder {
 /// Returns the file name of a recording: its name plus .mcap. A name may contain letters, digits, space and .
 /// _ - + as every file system accepts them; BadInput explains this.
 Result<std::string> recording_file_name(const std::string& name);
+/// Returns the name that a command gives its recording: its own, else of slate and take ("12A-T03"), else
+/// none.
+std::string recording_name(const RecordCommand& command);
 /// Returns the file name of an unnamed recording, for example "builtin-20261126T151259Z.mcap".
 std::string recording_file_name(const std::string& scene, int64_t unix_time_s);
 
@@ -101,7 +104,7 @@ class RecordDesk {
   void run();
   void answer(const Order& order);
   Notice carry_out(const RecordCommand& command);
-  Result<std::string> start_recording(const std::string& name);
+  Result<std::string> start_recording(const RecordCommand& command);
   Result<std::filesystem::path> choose_path(const std::string& name) const;
   Result<std::unique_ptr<Recorder>> make_recorder(const std::string& name) const;
   Status check_room() const;

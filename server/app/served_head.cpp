@@ -1,6 +1,8 @@
 #include "server/app/served_head.h"
 
 #include <algorithm>
+#include <chrono>
+#include <ctime>
 #include <utility>
 
 #include "common/base/profile.h"
@@ -14,6 +16,22 @@
 #include "server/encode/picture_passes.h"
 
 namespace strandcast {
+namespace {
+
+/// The timecode of now by this machine's clock, local time, counted like `count`.
+Timecode time_of_day(const Timecode& count) {
+  const auto now = std::chrono::system_clock::now();
+  const std::time_t seconds = std::chrono::system_clock::to_time_t(now);
+  std::tm parts{};
+  ::localtime_r(&seconds, &parts);
+  const auto whole = std::chrono::system_clock::from_time_t(seconds);
+  const double part_s = std::chrono::duration<double>(now - whole).count();
+  const double day_s = parts.tm_hour * 3600.0 + parts.tm_min * 60.0 + parts.tm_sec + part_s;
+  return advanced({count.rate, count.is_drop}, day_s * count.rate.hz());
+}
+
+}  // namespace
+
 Result<std::unique_ptr<ServedHead>> ServedHead::load(const ServerConfig& config, size_t number,
                                                      OtherHeads others) {
   std::unique_ptr<ServedHead> head(new ServedHead(config, number));
@@ -168,6 +186,7 @@ void ServedHead::stop() {
 }
 
 void ServedHead::tell_status() {
+  count_by_the_clock();
   const ServerCounters now = counters();
   watch_speed(now);
   ServerStatus status;
@@ -180,6 +199,7 @@ void ServedHead::tell_status() {
   status.is_motion_stale = now.sim.is_motion_stale;
   status.viewer_count = now.viewers;
   status.rejected_samples = now.input.rejected();
+  status.timecode = now.sim.timecode;
   status.quarantined_strands = now.sim.quarantined;
   status.overstretched_strands = now.sim.overstretched;
   status.slow_motion = slow_motion_;
@@ -191,6 +211,11 @@ void ServedHead::tell_status() {
   desk_->tell_status(std::move(status));
   desk_->tell_state_times();
   desk_->tell_streams();
+}
+
+/// Where nobody sends timecode, this machine's clock counts.
+void ServedHead::count_by_the_clock() {
+  if (config_.timecode) inputs_.push(time_of_day(*config_.timecode), now_ns());
 }
 
 void ServedHead::watch_speed(const ServerCounters& now) {

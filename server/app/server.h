@@ -36,8 +36,9 @@ struct ServerConfig {
   std::string renderer = "auto";                       // as RenderDeviceConfig
   std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
   SnapshotObserver on_publish;                         // may be empty; of every head
-  bool is_lockstep = false;                            // simulated time goes on by commands only
-  std::filesystem::path trace_path;                    // CSV of what each state took; empty = none
+  std::optional<Timecode> timecode;  // how this machine's clock counts where nobody does; empty = not at all
+  bool is_lockstep = false;          // simulated time goes on by commands only
+  std::filesystem::path trace_path;  // CSV of what each state took; empty = none
   std::function<MakePicturePainter(PainterConfig)> make_painter =
       device_picture_painter;  // of the frame thread, where the scene has one head
   /// Returns whether the painter uses processor cores; this decides the largest picture size and the guessed

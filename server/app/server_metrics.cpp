@@ -37,6 +37,10 @@ constexpr Row kRows[] = {
      [](const ServerCounters& all) { return all.is_slow ? 1.0 : 0.0; }},
     {"sim_slow_motions_total", "Times that slow motion began.",
      [](const ServerCounters& all) { return static_cast<double>(all.slow_motions); }},
+    {"sim_timecode_frames", "Timecode of the newest step, in frames since midnight; -1 where nobody counts.",
+     [](const ServerCounters& all) {
+       return all.sim.timecode ? static_cast<double>(all.sim.timecode->frame) : -1.0;
+     }},
     {"sim_dropped_steps_total", "Steps left out because the simulation was late.",
      [](const ServerCounters& all) { return static_cast<double>(all.sim.dropped_steps); }},
     {"publish_read_median_ms", "Time to read a state back from the GPU, median.",

@@ -8,12 +8,12 @@
 namespace strandcast {
 namespace {
 
-/// The message without its samples.
-MotionSamples frame_of(const MotionSamples& samples) {
-  return {{}, samples.held_back, samples.joint_names};
+/// The message with one of its samples.
+MotionSamples with_one(const MotionSamples& samples, const MotionSamples::Sample& sample) {
+  return {{sample}, samples.held_back, samples.joint_names, timecode_of(samples, sample)};
 }
-WindSamples frame_of(const WindSamples&) {
-  return {};
+WindSamples with_one(const WindSamples&, const WindSamples::Sample& sample) {
+  return {{sample}};
 }
 
 HeldInputs::Due due_of(uint64_t source_id, int64_t due_ns, MotionSamples one) {
@@ -53,13 +53,11 @@ uint64_t HeldInputs::hold_each(uint64_t source_id, const Message& samples, int64
       source.newest_ns = sample_ns;
     }
     source.newest_ns = std::max(source.newest_ns, sample_ns);
-    Message one = frame_of(samples);
-    one.samples.push_back(sample);
     const int64_t due_ns = sample_ns + source.offset_ns;
     const auto place =
         std::upper_bound(source.waiting.begin(), source.waiting.end(), due_ns,
                          [](int64_t before_ns, const Due& due) { return before_ns < due.arrival_ns; });
-    source.waiting.insert(place, due_of(source_id, due_ns, std::move(one)));
+    source.waiting.insert(place, due_of(source_id, due_ns, with_one(samples, sample)));
     --room;
   }
   return refused;

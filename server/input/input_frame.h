@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 
+#include "common/base/timecode.h"
 #include "common/math/pose.h"
 #include "common/scene/body_desc.h"
 
@@ -20,6 +22,8 @@ struct InputFrame {
   double motion_speed = 1.0;      // played at this share of real time, to go with a slow simulation
   int64_t motion_time_ns = 0;     // server clock at arrival of the newest sample used, 0 = none
   uint64_t rejected_samples = 0;  // since start
+  std::optional<Timecode> timecode =
+      {};  // of the motion that it shows, else of the clock; none: nobody counts
 
   bool operator==(const InputFrame&) const = default;
 };

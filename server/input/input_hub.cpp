@@ -48,6 +48,18 @@ double blend_at(const Sample& before, const Sample& after, int64_t time_ns) {
   return std::clamp(static_cast<double>(time_ns - before.time_ns) / whole, 0.0, 1.0);
 }
 
+/// The timecode on the way from one sample to the next, or the first one's where one does not go on into the
+/// other.
+std::optional<Timecode> timecode_between(const TimedSample<HeadSample>& a, const TimedSample<HeadSample>& b,
+                                         double blend) {
+  const auto &from = a.value.timecode, &to = b.value.timecode;
+  if (!from || !to || !is_same_count(*from, *to)) return from;
+  const double frames = frames_between(*from, *to);
+  const double passed_s = static_cast<double>(b.time_ns - a.time_ns) * kSPerNs;
+  const bool goes_on = std::abs(frames / from->rate.hz() - passed_s) <= kTimecodeJumpS;
+  return goes_on ? advanced(*from, blend * frames) : *from;
+}
+
 JointPlaces joints_of(const HeadSample& sample) {
   JointPlaces joints;
   if (sample.joint_m.empty()) return joints;
@@ -156,6 +168,12 @@ void InputHub::push(uint64_t source_id, const MotionSamples& samples, int64_t ar
   counters_.over_rate += held_->hold(source_id, samples, last_frame_ns_.value_or(0));
 }
 
+void InputHub::push(const Timecode& timecode, int64_t arrival_ns) {
+  const std::lock_guard lock(mutex_);
+  newest_arrival_ns_ = std::max(newest_arrival_ns_, bounded(arrival_ns));
+  if (!held_) timecodes_.add(timecode, newest_arrival_ns_);
+}
+
 void InputHub::push(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns) {
   const std::lock_guard lock(mutex_);
   if (!held_) return take(source_id, samples, arrival_ns);
@@ -168,6 +186,7 @@ void InputHub::take(uint64_t source_id, const MotionSamples& samples, int64_t ar
   const auto names = samples.joint_names.empty()
                          ? nullptr
                          : std::make_shared<const std::vector<std::string>>(samples.joint_names);
+  if (samples.timecode && samples.samples.empty()) timecodes_.add(*samples.timecode, newest_arrival_ns_);
   for (const MotionSamples::Sample& sample : samples.samples) {
     if (!take_allowance(motion_, source_id, newest_arrival_ns_)) {
       ++counters_.over_rate;
@@ -179,7 +198,9 @@ void InputHub::take(uint64_t source_id, const MotionSamples& samples, int64_t ar
       Pose pose = sample.world_from_head;
       pose.rotation = glm::normalize(pose.rotation);
       accept(motion_, source_id,
-             {sample.time_ns, newest_arrival_ns_, HeadSample{pose, names, sample.joint_m}}, kMotionStaleNs);
+             {sample.time_ns, newest_arrival_ns_,
+              HeadSample{pose, names, sample.joint_m, timecode_of(samples, sample)}},
+             kMotionStaleNs);
     }
   }
   if (motion_.owner == source_id) motion_speed_ = 1.0 - std::clamp(samples.held_back, 0.0, 1.0);
@@ -243,16 +264,21 @@ InputHub::SeenHead InputHub::see_head(int64_t server_time_ns) {
   const HeadSample& sample = samples[index].value;
   Pose pose = sample.pose;
   frame_.joints = joints_of(sample);
+  frame_.timecode = sample.timecode;
   if (interpolates) {
     const HeadSample& next = samples[newest].value;
     const double blend = blend_at(samples[index], samples[newest], time_ns);
     pose = interpolate(pose, next.pose, blend);
+    frame_.timecode = timecode_between(samples[index], samples[newest], blend);
     const bool is_same_body =
         !sample.joint_m.empty() && !next.joint_m.empty() &&
         (sample.joint_names == next.joint_names || *sample.joint_names == *next.joint_names);
     for (size_t i = 0; is_same_body && i < frame_.joints.place_m.size(); ++i)
       frame_.joints.place_m[i] = glm::mix(frame_.joints.place_m[i], glm::dvec3(next.joint_m[i]), blend);
   }
+  // A head that is not heard moves on, and so does the count.
+  if (seen.is_silent && frame_.timecode)
+    frame_.timecode = later(*frame_.timecode, std::max<int64_t>(time_ns - samples[newest].time_ns, 0));
   // Both signs are the same rotation; consecutive frames keep to one so that their difference is small.
   if (glm::dot(pose.rotation, frame_.world_from_head.rotation) < 0.0) pose.rotation = -pose.rotation;
   seen.pose = pose;
@@ -363,6 +389,7 @@ InputFrame InputHub::sample(int64_t server_time_ns) {
   frame_.motion_speed = motion_speed_;
   show_head(seen, now_ns);
   frame_.is_motion_stale = !motion_.owner || now_ns - motion_.accepted_ns > kMotionStaleNs;
+  if (frame_.is_motion_stale || !frame_.timecode) frame_.timecode = timecodes_.at(now_ns);
 
   const auto& winds = wind_.track.samples();
   frame_.has_wind_stream = !winds.empty() && now_ns - wind_.accepted_ns <= kWindStaleNs;

@@ -41,6 +41,7 @@
 #include "server/input/held_inputs.h"
 #include "server/input/input_frame.h"
 #include "server/input/sample_track.h"
+#include "server/input/timecode_clock.h"
 
 namespace strandcast {
 
@@ -87,6 +88,7 @@ struct HeadSample {
   Pose pose;
   std::shared_ptr<const std::vector<std::string>> joint_names;  // of one message; null = none
   std::vector<glm::vec3> joint_m = {};                          // head space
+  std::optional<Timecode> timecode = {};
 };
 
 class InputHub {
@@ -99,6 +101,8 @@ class InputHub {
   /// was read.
   void push(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns);
   void push(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns);
+  /// Takes a timecode that comes without motion. It is shown while the head's motion has none of its own.
+  void push(const Timecode& timecode, int64_t arrival_ns);
 
   /// Delays a source's head motion by `delay_ns`, so that samples exist before and after each used time.
   /// Initially 0; lasts until the next call.
@@ -183,6 +187,7 @@ class InputHub {
   double steady_delay_ns_ = 0.0;  // by which uneven samples are shown later
   bool has_left_ = false;         // the source that drove the head, since the last frame
   double motion_speed_ = 1.0;     // as the owner said last
+  TimecodeClock timecodes_;       // that came without motion
   InputFrame frame_;              // the last one given out
   InputCounters counters_;
 };

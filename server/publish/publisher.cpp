@@ -109,6 +109,7 @@ std::shared_ptr<const Snapshot> Publisher::quantise(const PublishInput& input) {
   snapshot->vertex_count = vertex_count_;
   snapshot->quantum_m = quantum_m_;
   snapshot->trail = input.trail;
+  snapshot->timecode = input.timecode;
   snapshot->lattice.resize(3 * rest_position_m_.size());
 
   const glm::dmat3 head_from_world = glm::transpose(world_from_head_rotation_);

@@ -43,7 +43,8 @@ struct PublishInput {
   Pose world_from_head;               // pose at the end of the step
   BustCode bust = kRigidBust;         // likewise
   glm::dvec3 head_velocity_mps{0.0};  // of the head joint, world: what a strand at rest moves with
-  std::shared_ptr<const StepTrail> trail = {};  // for Snapshot
+  std::shared_ptr<const StepTrail> trail = {};  // for Snapshot, like the next
+  std::optional<Timecode> timecode = {};
 };
 
 /// Resources for publishing; they change no bit.

@@ -18,6 +18,7 @@ RecordedStep to_recorded(const TakenStep& step) {
   recorded.motion_speed = input.motion_speed;
   recorded.motion_time_ns = input.motion_time_ns;
   recorded.rejected_samples = input.rejected_samples;
+  recorded.timecode = input.timecode;
   return recorded;
 }
 
@@ -34,6 +35,7 @@ TakenStep to_taken(const RecordedStep& recorded) {
   input.motion_speed = recorded.motion_speed;
   input.motion_time_ns = recorded.motion_time_ns;
   input.rejected_samples = recorded.rejected_samples;
+  input.timecode = recorded.timecode;
   return step;
 }
 

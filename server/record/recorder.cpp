@@ -195,7 +195,7 @@ void Recorder::write(const Item& item) {
     vertex_count_ = snapshot.plane_size();
     tick_ = snapshot.tick;
     writer_->add(item.time_ns, sim_time_ns_,
-                 RecordedState{snapshot.tick, snapshot.sim_time_ns, state_hash(snapshot)});
+                 RecordedState{snapshot.tick, snapshot.sim_time_ns, state_hash(snapshot), snapshot.timecode});
     const std::lock_guard lock(mutex_);
     ++counters_.states;
     counters_.last_tick = snapshot.tick;

@@ -85,6 +85,8 @@ class Recorder : public StreamReader, public StepTap {
 
   RecordCounters counters() const;
   const std::filesystem::path& path() const { return config_.path; }
+  /// Names slate and take for people; empty without either. Not before begin().
+  std::string take() const { return take_text(start_.slate, start_.take); }
   /// Describes the file: "3.2 MB, 750 states up to step 812, 748 frames, nothing lost".
   std::string summary() const;
   /// Returns why recording ended by itself; empty while it runs.

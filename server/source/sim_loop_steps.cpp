@@ -176,6 +176,7 @@ PublishInput SimLoop::publish_input() const {
   input.motion_time_ns = config_.is_lockstep ? 0 : input_.motion_time_ns;
   input.world_from_head = builder_->world_from_head();
   input.bust = builder_->bust();
+  input.timecode = input_.timecode;
   return input;
 }
 
@@ -189,6 +190,7 @@ void SimLoop::publish_carried() {
   snapshot->world_from_head = input.world_from_head;
   snapshot->bust = input.bust;
   snapshot->trail = nullptr;
+  snapshot->timecode = input.timecode;
   if (config_.on_publish) config_.on_publish(snapshot);
   sink_.put(std::move(snapshot));
   published_tick_ = tick_;
@@ -262,6 +264,7 @@ void SimLoop::update_stats() {
   stats.is_paused = clock_->is_paused();
   stats.is_motion_stale = input_.is_motion_stale;
   stats.rejected_samples = input_.rejected_samples;
+  stats.timecode = input_.timecode;
   stats.dropped_steps = clock_->dropped_steps();
   stats.published = published_count_;
   stats.quarantined = publisher_->quarantine_count();

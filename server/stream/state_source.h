@@ -32,6 +32,7 @@ struct SimStats {
   bool is_paused = false;
   bool is_motion_stale = true;
   uint64_t rejected_samples = 0;
+  std::optional<Timecode> timecode = {};  // of the newest step
   uint64_t dropped_steps = 0;
   uint64_t published = 0;
   uint64_t quarantined = 0;                // strands put back to rest because they had no usable numbers

@@ -164,6 +164,69 @@ TEST_F(RecordCommands, BeginAndEndRecordingsOfAServerThatRuns) {
               HasSubstr(fmt::format("it began while the simulation ran, at step {}", *first)));
 }
 
+// A take on a stage: its file has slate, take and timecode, of each state and of the replay.
+TEST_F(RecordCommands, SaySlateTakeAndTheTimecodeOfStates) {
+  if (!start(config())) return;
+  const auto viewer = open(client_config());
+  ASSERT_TRUE(viewer);
+  ClientConfig source_config = client_config(StreamMode::Strands, Role::Source);
+  source_config.hello.gets_no_stream = true;
+  const auto source = ViewerClient::connect(source_config);
+  ASSERT_TRUE(source);
+  const Timecode hour = *parse_timecode("01:00:00:00", {24, 1});
+  const int64_t begin_ns = now_ns();
+  const auto feed_one = [&] {
+    const int64_t time_ns = now_ns();
+    MotionSamples samples{{{time_ns, Pose{}}}};
+    samples.timecode = advanced(hour, static_cast<double>(time_ns - begin_ns) * 1e-9 * 24.0);
+    EXPECT_TRUE((*source)->send(samples));
+  };
+  const std::vector<ViewerSession*> viewers = {viewer.get()};
+  ASSERT_TRUE(pump_until(viewers, [&] {
+    feed_one();
+    return viewer->status().timecode.has_value();
+  }));
+  const Notice begun = ask(RecordCommand{true, "", "12A", 3});
+  EXPECT_THAT(begun.text, HasSubstr("12A-T03.mcap"));
+  ASSERT_TRUE(pump_until(viewers, [&] {
+    feed_one();
+    return viewer->status().recording.ends_with(", slate 12A, take 3") &&
+           server_->counters().record->states > 20;
+  }));
+  EXPECT_FALSE(stop_recording().is_error);
+  const auto reader = RecordingReader::open(file("12A-T03.mcap"), RecordedPart::Messages);
+  ASSERT_TRUE(reader);
+  EXPECT_EQ((*reader)->start().slate, "12A");
+  EXPECT_EQ((*reader)->start().take, 3u);
+  std::map<uint64_t, std::optional<Timecode>> steps, states;
+  while (true) {
+    const auto item = (*reader)->next();
+    ASSERT_TRUE(item) << item.error().to_string();
+    if (!*item) break;
+    const auto* message = std::get_if<RecordedMessage>(&(*item)->what);
+    if (message == nullptr) continue;
+    if (const auto* step = std::get_if<RecordedStep>(message)) steps[step->tick] = step->timecode;
+    if (const auto* state = std::get_if<RecordedState>(message)) states[state->tick] = state->timecode;
+  }
+  ASSERT_GT(states.size(), 20u);
+  std::optional<Timecode> before;
+  for (const auto& [tick, timecode] : states) {
+    ASSERT_TRUE(timecode) << tick;
+    EXPECT_EQ(fields_of(*timecode).hours, 1u);
+    if (steps.contains(tick)) {
+      EXPECT_EQ(timecode, steps[tick]) << "as the step took it";
+    }
+    if (before) {
+      EXPECT_GE(frames_between(*before, *timecode), 0.0);
+    }
+    before = timecode;
+  }
+  check(file("12A-T03.mcap"));
+  testing::internal::CaptureStdout();
+  EXPECT_EQ(run_recording_info(file("12A-T03.mcap")), kDoneExit);
+  EXPECT_THAT(testing::internal::GetCapturedStdout(), HasSubstr("slate 12A, take 3"));
+}
+
 TEST_F(RecordCommands, AnswerWhyNot) {
   if (!start(config())) return;
   EXPECT_THAT(stop_recording().text, HasSubstr("Nothing is being recorded"));

@@ -19,6 +19,7 @@ inline std::vector<ClientMessage> sample_client_messages() {
   }
   motion.held_back = 0.75;
   motion.joint_names = {"neck", "left_shoulder"};
+  motion.timecode = Timecode{{30000, 1001}, true, 107'892, 0.25};
   CameraChange camera;
   camera.camera = {{1.0f, 2.0f, -3.0f}, {0.5f, 0.25f, 0.125f}, 1.25f};
   return {Hello{Role::Controller, StreamMode::Auto, "Zoë", "secret", 640, 360, true, kAllPictureCodecs, true,
@@ -39,7 +40,7 @@ inline std::vector<ClientMessage> sample_client_messages() {
           ParameterRequest{"look.shading", 128, true},
           CameraCommand{1ull << 40, camera.camera},
           StateTimesRequest{true},
-          RecordCommand{true, "take 5"},
+          RecordCommand{true, "take 5", "12A", 3},
           WindowChange{1280, 720, true}};
 }
 
@@ -105,6 +106,7 @@ inline std::vector<ServerMessage> sample_server_messages() {
   live.values = {{"/VMC/Ext/Bone/Pos Head 0 1.5 0"}, {"/VMC/Ext/OK 1"}};
   status.live_inputs = {live, LiveInputStatus{}};
   status.recording = "take 5.mcap: 12.5 s, 3.2 MB";
+  status.timecode = Timecode{{24000, 1001}, false, 89'356, 0.5};
   return {
       welcome,
       Pong{1, -2, INT64_MAX},
@@ -123,7 +125,8 @@ inline std::vector<ServerMessage> sample_server_messages() {
                     345,
                     true},
       CameraChange{sample_camera()},
-      StateTimes{{{1ull << 40, 1, 2, 3, 4, INT64_MAX}, {7, INT64_MIN, -1, -2, -3, -4}}},
+      StateTimes{{{1ull << 40, 1, 2, 3, 4, INT64_MAX, Timecode{{25, 1}, false, 2'159'999}},
+                  {7, INT64_MIN, -1, -2, -3, -4}}},
       StreamList{{{1, 1.0f, 1, 1e-4f, 60.0}, {4, 0.25f, 5, 5e-4f, 15.0}},
                  {"step", "tangent"},
                  "another bound",

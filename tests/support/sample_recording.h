@@ -44,6 +44,8 @@ inline RecordingStart sample_start() {
   start.scene_text = "name: \"walk\" step_rate_hz: 120";
   start.server_time_ns = 5'000'000'000;
   start.unix_time_ns = 1'700'000'000'000'000'000;
+  start.slate = "12A";
+  start.take = 3;
   start.asset_hash =
       hash_bytes(std::span<const std::byte>(sample_asset_frame()->message).subspan(kFrameHeaderBytes));
   return start;
@@ -65,6 +67,7 @@ inline std::vector<RecordedMessage> sample_recorded_messages() {
   motion.samples = {{7, {{0.1, -2.0, 1e5}, {0.5, 0.5, -0.5, 0.5}}, {{0.25f, -0.5f, 0.125f}}}};
   motion.held_back = 0.5;
   motion.joint_names = {"neck"};
+  motion.timecode = Timecode{{30, 1}, false, 7, 0.5};
   RecordedStep step;
   step.tick = 11;
   step.time_ns = -5;
@@ -77,6 +80,7 @@ inline std::vector<RecordedMessage> sample_recorded_messages() {
   step.motion_speed = 0.75;
   step.motion_time_ns = 123;
   step.rejected_samples = 3;
+  step.timecode = Timecode{{60000, 1001}, true, 9, 0.25};
   ServerStatus status;
   status.tick = 9;
   status.is_paused = true;
@@ -87,7 +91,7 @@ inline std::vector<RecordedMessage> sample_recorded_messages() {
       RecordedChange{12, SetParameter{"wind.mean_mps.x=3"}, "session 5 (controller 'desk')", {true, "no"}},
       RecordedChange{13, ControlCommand{Command::Reset}, "", {false, "done"}},
       RecordedStream{14, "delta", 2e-4},
-      RecordedState{15, 250'000'000, 0xfedcba9876543210u},
+      RecordedState{15, 250'000'000, 0xfedcba9876543210u, Timecode{{25, 1}, false, 1}},
       RecordedCamera{16, sample_camera()},
       RecordedLoss{1, 2, 3},
       LookChange{sample_look(), sample_camera()},

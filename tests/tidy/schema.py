@@ -27,7 +27,7 @@ MESSAGE = {
          "                        [&](const ToyRequest& toy) { net_->send(session, Notice{toy.toy_count > 1, toy.what}); },\n"
          "                        [](const auto&) {}},"),
     ],
-    "tests/support/sample_messages.h": [("          RecordCommand{true, \"take 5\"}", "          ToyRequest{\"bear\", 3}, RecordCommand{true, \"take 5\"}")],
+    "tests/support/sample_messages.h": [("          RecordCommand{true, \"take 5\", \"12A\", 3}", "          ToyRequest{\"bear\", 3}, RecordCommand{true, \"take 5\", \"12A\", 3}")],
 }
 MESSAGE_SHOWS = {
     "common/wire/messages.h": ["struct ToyRequest {", "std::string what = {};  // by name", "uint32_t toy_count = 2;  // at once"],

@@ -18,10 +18,10 @@ inline void tell(FieldTexts& told, const std::string& where, const MotionFileOpt
 }
 inline void tell(FieldTexts& told, const std::string& where, const FeedOptions& all) {
   OPTION_FIELDS(all, motion, wind, motion_file, is_looped, blend_s, is_live, speed, seconds, rate_hz,
-                wind_mps, gust_intensity, seed, as, to);
+                timecode, ltc, fps, wind_mps, gust_intensity, seed, as, to);
 }
 inline void tell(FieldTexts& told, const std::string& where, const ExportCommand& all) {
-  OPTION_FIELDS(all, paths, fps, unit, up, space, is_guides, is_drawn, has_head, from_s, to_s, seconds, at_s);
+  OPTION_FIELDS(all, paths, fps, unit, up, space, is_guides, is_drawn, has_head, from, to, seconds, at_s);
 }
 inline void tell(FieldTexts& told, const std::string& where, const SceneRecordingOptions& all) {
   OPTION_FIELDS(all, scene, overrides, motion, wind, seconds, server);
@@ -47,7 +47,7 @@ inline void tell(FieldTexts& told, const std::string& where, const CameraOptions
 inline void tell(FieldTexts& told, const std::string& where, const CtlCommandLine& all) {
   OPTION_FIELDS(all, target, log_level, feed, monitor_s, assignment, subject, check_frames, check_timeout_s,
                 session, ban_s, scene_path, exported, bake, bundle, recording, other_recording,
-                recording_name, step_count, test, params, latency, camera, script_words);
+                recording_name, slate, take, step_count, test, params, latency, camera, script_words);
 }
 
 }  // namespace strandcast::test
@@ -100,6 +100,9 @@ const OptionRow kCommandRows[] = {
     {"--speed", {"2"}, {{"feed.speed", "2"}}, {}, "feed"},
     {"--seconds", {"2.5"}, {{"feed.seconds", "2.5"}}, {}, "feed"},
     {"--rate", {"25/2"}, {{"feed.rate_hz", "12.5"}}, {}, "feed"},
+    {"--timecode", {"01:00:00:00"}, {{"feed.timecode", "01:00:00:00"}}, {}, "feed"},
+    {"--fps", {"25"}, {{"feed.fps", "25"}}, {}, "feed"},
+    {"--ltc", {"a.wav"}, {{"feed.ltc", "a.wav"}}, {}, "feed"},
     {"--wind-mean", {"3", "4", "5"}, {{"feed.wind_mps", "3 4 5"}}, {}, "feed"},
     {"--gust-intensity", {"1.25"}, {{"feed.gust_intensity", "1.25"}}, {}, "feed"},
     {"--seed", {"7"}, {{"feed.seed", "7"}}, {}, "feed"},
@@ -116,6 +119,8 @@ const OptionRow kCommandRows[] = {
     {"--fov-deg", {"7"}, {{"camera.fov_deg", "7"}}, {}, "camera"},
     {"name", {"Zoe"}, {{"subject", "Zoe"}}, {}, "mocap subject"},
     {"name", {"take"}, {{"recording_name", "take"}}, {}, "record start"},
+    {"--slate", {"12A"}, {{"slate", "12A"}}, {}, "record start"},
+    {"--take", {"3"}, {{"take", "3"}}, {}, "record start"},
     {"prefix", {"look"}, {{"params.prefix", "look"}}, {}, "params"},
     {"--watch", {}, {{"params.is_watching", "true"}}, {}, "params"},
     {"--live", {}, {{"params.is_live_only", "true"}}, {}, "params"},
@@ -126,8 +131,8 @@ const OptionRow kCommandRows[] = {
     {"--guides", {}, {{"exported.is_guides", "true"}}, kOut, "export"},
     {"--drawn", {}, {{"exported.is_drawn", "true"}}, kOut, "export"},
     {"--head", {}, {{"exported.has_head", "true"}}, kOut, "export"},
-    {"--from", {"2"}, {{"exported.from_s", "2"}}, kOut, "export"},
-    {"--to", {"2"}, {{"exported.to_s", "2"}}, kOut, "export"},
+    {"--from", {"2"}, {{"exported.from", "2"}}, kOut, "export"},
+    {"--to", {"2"}, {{"exported.to", "2"}}, kOut, "export"},
     {"--seconds", {"2"}, {{"exported.seconds", "2"}}, kOut, "export"},
     {"--at", {"2"}, {{"exported.at_s", "2"}}, kOut, "export"},
     {"--motion", {"a.bvh"}, {{"bake.feed.motion", "a.bvh"}}, kOut, "bake"},
@@ -149,8 +154,8 @@ const OptionRow kCommandRows[] = {
     {"--guides", {}, {{"bake.exported.is_guides", "true"}}, kOut, "bake"},
     {"--drawn", {}, {{"bake.exported.is_drawn", "true"}}, kOut, "bake"},
     {"--head", {}, {{"bake.exported.has_head", "true"}}, kOut, "bake"},
-    {"--from", {"2"}, {{"bake.exported.from_s", "2"}}, kOut, "bake"},
-    {"--to", {"2"}, {{"bake.exported.to_s", "2"}}, kOut, "bake"},
+    {"--from", {"2"}, {{"bake.exported.from", "2"}}, kOut, "bake"},
+    {"--to", {"2"}, {{"bake.exported.to", "2"}}, kOut, "bake"},
     {"--seconds", {"2"}, {{"bake.exported.seconds", "2"}}, kOut, "bake"},
     {"--at", {"2"}, {{"bake.exported.at_s", "2"}}, kOut, "bake"},
     {"recording", {"a.mcap"}, {{"recording", "a.mcap"}}, {}, "check"},
@@ -230,6 +235,7 @@ TEST(CtlOptionTable, NumbersEndWhereTheyAreSaidTo) {
       {"--rate", "0.9", "1", "1000", "1001", {"feed"}},
       {"--gust-intensity", "-0.1", "0", "2", "2.1", {"feed"}},
       {"--seconds", "-1", "0", "1000000", "1000001", {"monitor"}},
+      {"--take", "0", "1", "9999", "10000", {"record", "start"}},
       {"--yaw-deg", "-361", "-360", "360", "361", {"camera"}},
       {"--pitch-deg", "-86", "-85", "85", "86", {"camera"}},
       {"--distance-m", "0.009", "0.01", "100", "101", {"camera"}},
@@ -270,7 +276,7 @@ TEST(CtlOptionTable, ACommandThatOnlySendsAMessageSaysAllOfIt) {
       {{"mocap", "subject", "Zoe"}, LiveCommand{LiveAction::ChooseSubject, "Zoe"}},
       {{"mocap", "calibrate"}, LiveCommand{LiveAction::Calibrate, ""}},
       {{"mocap", "reset"}, LiveCommand{LiveAction::Reset, ""}},
-      {{"record", "start", "take"}, RecordCommand{true, "take"}},
+      {{"record", "start", "take", "--slate", "12A", "--take", "3"}, RecordCommand{true, "take", "12A", 3}},
       {{"record", "stop"}, RecordCommand{false, ""}},
       {{"sessions"}, AdminCommand{AdminAction::ListSessions, 0, 0.0}},
       {{"kick", "7", "--ban", "60"}, AdminCommand{AdminAction::Kick, 7, 60.0}},

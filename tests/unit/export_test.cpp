@@ -74,8 +74,10 @@ class MadeStates : public ExportSource {
     return std::shared_ptr<const Snapshot>();
   }
   std::vector<std::string> remarks() const override { return {"the source says so"}; }
+  const TimecodeTrack& timecodes() const override { return timecodes_; }
 
   ExportScene scene_;
+  TimecodeTrack timecodes_;
   std::vector<std::shared_ptr<const Snapshot>> states_;
   std::optional<Error> end_;
   size_t stop_at_ = ~size_t{0};  // whoever exports is stopped with this state
@@ -299,6 +301,75 @@ TEST(Export, FramesOfRationalRatesAreAtTheirTimes) {
     const std::string text = *load_text(options.path, 1 << 26);
     EXPECT_THAT(text, HasSubstr(fmt::format("timeCodesPerSecond = {}\n", options.fps.hz()))) << asked;
   }
+}
+
+/// A second from 01:02:03:04 at 23.976 frames a second on, and a quarter of a frame.
+void count_timecode(MadeStates& states) {
+  const Timecode first = advanced(*parse_timecode("01:02:03:04", {24000, 1001}), 0.25);
+  for (const auto& state : states.states_) {
+    const double passed_s = static_cast<double>(state->sim_time_ns) * 1e-9;
+    states.timecodes_.add(state->sim_time_ns, advanced(first, passed_s * first.rate.hz()));
+  }
+}
+
+TEST(Export, FilesBeginAtTheirFrameOfTimecode) {
+  const TemporaryFolder folder;
+  ExportOptions options;
+  options.path = folder.path() / "hair.usda";
+  MadeStates states(61);
+  count_timecode(states);
+  const ExportReport report = exported(states, options);
+  EXPECT_EQ(report.first_timecode, "01:02:03:05") << "the first whole frame";
+  EXPECT_NEAR(report.first_s, 0.75 * 1001.0 / 24000.0, 1e-8);
+  EXPECT_EQ(report.frame_count, 24u) << "1.0 s has 24.2 frames from 0.25 on, of which 05 to 28 are whole";
+  const std::string text = *load_text(options.path, 1 << 26);
+  const int first = (3600 + 2 * 60 + 3) * 24 + 5;
+  for (const std::string& said :
+       {fmt::format("startTimeCode = {}\n", first), fmt::format("endTimeCode = {} ", first + 23),
+        fmt::format("timeCodesPerSecond = {}\n", 24000.0 / 1001.0),
+        fmt::format("\n            {}: [(", first - 1), fmt::format("\n            {}: [(", first)})
+    EXPECT_THAT(text, HasSubstr(said));
+  options.path = folder.path() / "hair.abc";
+  MadeStates same(61);
+  count_timecode(same);
+  exported(same, options);
+  const std::string bytes = *load_text(options.path, 1 << 26);
+  for (const double s : {(first - 1) * 1001.0 / 24000.0, 1001.0 / 24000.0}) {
+    const double nearby[] = {s, std::nextafter(s, 0.0), std::nextafter(s, 2.0 * s)};
+    EXPECT_TRUE(std::any_of(std::begin(nearby), std::end(nearby), [&](double value) {
+      return bytes.find(std::string(reinterpret_cast<const char*>(&value), sizeof(value))) !=
+             std::string::npos;
+    })) << s;
+  }
+}
+
+TEST(Export, ARangeOfTimecodeIsKept) {
+  const TemporaryFolder folder;
+  ExportOptions options;
+  options.path = folder.path() / "hair.csv";
+  options.from_timecode = "01:02:03:10";
+  options.to_timecode = "01:02:03:15";
+  MadeStates states(61);
+  count_timecode(states);
+  EXPECT_EQ(exported(states, options).frame_count, 6u);
+  const auto rows = rows_of(options.path);
+  EXPECT_EQ(rows[kStrands * kVertices][0], (3600 + 2 * 60 + 3) * 24 + 10);
+  EXPECT_NEAR(rows[kStrands * kVertices][1], 5.75 * 1001.0 / 24000.0, 1e-6);
+  const auto refusal = [&](const char* from, const char* to, MadeStates& source) {
+    options.from_timecode = from;
+    options.to_timecode = to;
+    options.is_quiet = true;
+    const auto report = export_strands(source, options, kNeverStopped);
+    return report ? std::string() : report.error().to_string();
+  };
+  EXPECT_THAT(refusal("02:00:00:00", "", states), HasSubstr("they go from 01:02:03:04 to 01:02:04:"));
+  EXPECT_THAT(refusal("01:02:03:20", "01:02:03:10", states), HasSubstr("before the beginning"));
+  EXPECT_THAT(refusal("01:02:03:24", "", states), HasSubstr("23:59:59:23"));
+  MadeStates none(61);
+  EXPECT_THAT(refusal("01:02:03:10", "", none), HasSubstr("carry no timecode"));
+  options.fps = {30, 1};
+  options.has_fps = true;
+  EXPECT_THAT(refusal("01:02:03:10", "", states), HasSubstr("count 23.976 frames per second"));
 }
 
 TEST(Export, UsdaFramesAreTheStatesAtTheirTimes) {

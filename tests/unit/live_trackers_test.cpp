@@ -197,6 +197,18 @@ TEST(LiveLinkFaceParser, TurnsAHeadAsArKitDoes) {
 
 // 320 bytes for a device of 32 letters and a subject of 18, as a reader that was checked against the app has
 // it.
+TEST(LiveLinkFaceParser, FramesAreTimecodeWhereTheRateCounts) {
+  const auto parser = live_parser_of("livelinkface");
+  test::FacePacketFields fields;
+  fields.frame = 60 * 3'723 + 4;
+  const LivePose pose = only_pose(*parser, test::live_link_face(fields));
+  ASSERT_TRUE(pose.timecode);
+  EXPECT_EQ(timecode_text(*pose.timecode), "01:02:03:04");
+  EXPECT_EQ(pose.timecode->part, 0.5);
+  fields.frames_per_second = 59;
+  EXPECT_FALSE(only_pose(*parser, test::live_link_face(fields)).timecode);
+}
+
 TEST(LiveLinkFaceParser, HasTheSizeOfRealPackets) {
   test::FacePacketFields fields;
   fields.device = std::string(32, 'd');

@@ -346,6 +346,21 @@ TEST(SceneFile, OverridesReplaceWhatTheFileSays) {
   EXPECT_FALSE(scene->has_auto_collider);
 }
 
+TEST(SceneFile, RatesOfOverridesAreAsPeopleWriteThem) {
+  for (const auto& [text, hz] : {std::pair{"23.976", 24000.0 / 1001.0},
+                                 {"24000/1001", 24000.0 / 1001.0},
+                                 {"59.94", 60000.0 / 1001.0},
+                                 {"25/2", 12.5},
+                                 {"7.5", 7.5}}) {
+    const auto scene = parse_scene("", "test", {fmt::format("stream.frame_rate_hz={}", text)});
+    ASSERT_TRUE(scene) << text << ": " << scene.error().to_string();
+    EXPECT_DOUBLE_EQ(scene->stream.frame_rate_hz, hz) << text;
+  }
+  EXPECT_THAT(parse_scene("", "test", {"stream.frame_rate_hz=24000/0"}).error().message,
+              HasSubstr("write 24, 23.976 or 24000/1001"));
+  EXPECT_FALSE(parse_scene("", "test", {"stream.frame_rate_hz=48000/100"})) << "beyond the field's own range";
+}
+
 TEST(SceneFile, OfTwoOverridesOfOneParameterTheLastCounts) {
   const auto scene = parse_scene(
       "solver { name: 'dftl' parameters { key: 'damping' value: 0.5 } parameters { key: 'sag_free' value: 1 "

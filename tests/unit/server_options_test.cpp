@@ -50,10 +50,13 @@ inline void tell(FieldTexts& told, const std::string& where, const NetConfig& al
   OPTION_FIELDS(all, address, port, socket, tokens, loopback_trust, tls, plain_access, allowed_hosts,
                 allowed_origins, trusted_proxies, proxy_protocol, limits, page);
 }
+inline void tell(FieldTexts& told, const std::string& where, const Timecode& all) {
+  told[where + "count"] = fmt::format("{}{}", frame_rate_text(all.rate.hz()), all.is_drop ? "df" : "");
+}
 inline void tell(FieldTexts& told, const std::string& where, const ServerConfig& all) {
-  OPTION_FIELDS(all, scene, net, sim_device, gl_device, renderer, shader_folder, on_publish, is_lockstep,
-                trace_path, make_painter, is_drawn_by_processors, make_source, fallback_codec, live_allowed,
-                sends, record, record_folder, tap, shared);
+  OPTION_FIELDS(all, scene, net, sim_device, gl_device, renderer, shader_folder, on_publish, timecode,
+                is_lockstep, trace_path, make_painter, is_drawn_by_processors, make_source, fallback_codec,
+                live_allowed, sends, record, record_folder, tap, shared);
 }
 inline void tell(FieldTexts& told, const std::string& where, const ServerOptions& all) {
   OPTION_FIELDS(all, scene_path, overrides, mocap, token_path, port_path, log_level, has_json_log, run_s,
@@ -168,6 +171,7 @@ const OptionRow kRunRows[] = {
     {"--shader-dir", {"s"}, {{"config.shader_folder", "s"}}},
     {"--log-level", {"debug"}, {{"log_level", "debug"}}},
     {"--log-format", {"json"}, {{"has_json_log", "true"}}},
+    {"--timecode", {"29.97df"}, {{"config.timecode", "some"}, {"config.timecode.count", "29.97df"}}},
     {"--trace", {"t.csv"}, {{"config.trace_path", "t.csv"}}},
     {"--lockstep", {}, {{"config.is_lockstep", "true"}}},
     {"--seconds", {"2.5"}, {{"run_s", "2.5"}}},

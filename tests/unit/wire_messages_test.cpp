@@ -292,6 +292,8 @@ TEST(WireMessages, TheLongestStatusFits) {
   status.slow_motion = status.detail = wide(kMaxTextChars);
   status.picture_motions.assign(kMaxPictureMotions, PictureMotion{INT64_MAX, INT64_MAX});
   status.live_inputs.assign(kMaxLiveInputs, input);
+  status.recording = wide(kMaxTextChars);
+  status.timecode = Timecode{{60'000, 1001}, true, 5'178'815, 0.1};
   EXPECT_LE(encode(ServerMessage(status)).size(), kMaxControlBytes);
   EXPECT_EQ(round_trip(status), status);
   status.live_inputs.push_back(input);
@@ -346,8 +348,9 @@ TEST(WireMessages, AStreamQualityOfBeforeNamesNoCodec) {
 }
 
 TEST(WireMessages, AsManyStateTimesAsThereMayBeFitIntoOneMessage) {
-  StateTimes times{std::vector<StateTime>(
-      kMaxStateTimes, {UINT64_MAX, INT64_MIN, INT64_MIN, INT64_MIN, INT64_MIN, INT64_MIN})};
+  StateTimes times{
+      std::vector<StateTime>(kMaxStateTimes, {UINT64_MAX, INT64_MIN, INT64_MIN, INT64_MIN, INT64_MIN,
+                                              INT64_MIN, Timecode{{60'000, 1001}, true, 5'178'815, 0.1}})};
   const auto bytes = encode(ServerMessage(times));
   EXPECT_LE(bytes.size(), kMaxControlBytes);
   EXPECT_EQ(std::get<StateTimes>(decode_server_message(bytes).value()), times);
@@ -355,6 +358,26 @@ TEST(WireMessages, AsManyStateTimesAsThereMayBeFitIntoOneMessage) {
   const auto refused = decode_server_message(encode(ServerMessage(times)));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
+}
+
+TEST(WireMessages, TimecodeThatNobodyCountsIsRefusedAndNoneTakesNoByte) {
+  MotionSamples motion;
+  const size_t bare_bytes = encode(ClientMessage(motion)).size();
+  const auto refusal = [&](const Timecode& timecode) {
+    motion.timecode = timecode;
+    const auto bytes = encode(ClientMessage(motion));
+    EXPECT_GT(bytes.size(), bare_bytes);
+    const auto decoded = decode_client_message(bytes);
+    return decoded ? std::string() : decoded.error().to_string();
+  };
+  EXPECT_EQ(refusal({{24, 1}, false, 2'073'599, 0.999}), "");
+  EXPECT_EQ(refusal({{60'000, 1001}, true, 5'178'815}), "");
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  for (const Timecode& wrong :
+       {Timecode{{24, 1}, false, 2'073'600}, Timecode{{60'000, 1001}, true, 5'178'816}, Timecode{{23, 1}},
+        Timecode{{24, 1}, true}, Timecode{{0, 0}}, Timecode{{24, 0}}, Timecode{{24, 1}, false, 0, 1.0},
+        Timecode{{24, 1}, false, 0, -0.5}, Timecode{{24, 1}, false, 0, kNan}})
+    EXPECT_THAT(refusal(wrong), testing::HasSubstr("timecode: is no frame of a day"));
 }
 
 TEST(WireMessages, TheLongestSessionListFitsIntoOneMessage) {

@@ -288,6 +288,16 @@ check('a dead link is left at once, without the closing handshake', () => {
   assert.ok(!socket.isOpen);
 });
 
+check('timecode is counted as the server counts it', () => {
+  const text = (numerator, denominator, is_drop, frame) => page.timecodeText({ rate_numerator: numerator, rate_denominator: denominator, is_drop, frame });
+  assert.equal(text(24000, 1001, false, 89356), '01:02:03:04');
+  assert.equal(text(30000, 1001, true, 1799), '00:00:59;29');
+  assert.equal(text(30000, 1001, true, 1800), '00:01:00;02');
+  assert.equal(text(30000, 1001, true, 17982), '00:10:00;00');
+  assert.equal(text(60000, 1001, true, 3600), '00:01:00;04');
+  assert.equal(text(25, 1, false, 2159999), '23:59:59:24');
+});
+
 check('the clock believes the shortest round trip', () => {
   const clock = new page.ClockOffset();
   clock.add(1000, 501_500, 501_500, 2000);

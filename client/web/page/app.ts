@@ -1,6 +1,7 @@
 // The page: its window, controls and measurements. The connection and the drawing are in workers (session.ts,
 // drawer.ts); what comes here is small, but for the server's pictures.
 import { keepToken, keptToken, linkTo, readFragment, withoutToken } from './address';
+import { timecodeText } from './clock';
 import { compileCore } from './core';
 import type { Asked, Camera, DrawFigures, FromDraw, FromNet, NetFigures, ToDraw, ToNet } from './messages';
 import { element } from './ui/element';
@@ -664,6 +665,7 @@ class Viewer {
     add('round trip', `${figures.roundTripMs.toFixed(1)} ms${status ? `, ${status.queue_delay_ms.toFixed(0)} ms queued` : ''}`);
     add('dropped', `${status?.dropped_frames ?? 0} at the server, ${figures.missedFrames} missed, ${figures.rejectedFrames} refused, ${figures.replacedStates} not drawn`);
     if (figures.lastError) add('last refused', figures.lastError);
+    if (status?.timecode) add('timecode', timecodeText(status.timecode));
     if (status) add('tick', `${status.tick}, ${status.viewer_count} ${status.viewer_count === 1 ? 'viewer' : 'viewers'}`);
     return rows;
   }

@@ -50,3 +50,19 @@ export class Recent {
     return sorted[Math.floor(sorted.length / 2)] ?? 0;
   }
 }
+
+type Timecode = { rate_numerator: number; rate_denominator: number; is_drop: boolean; frame: number };
+
+/** 01:02:03:04, or 01:02:03;04 where numbers are left out (SMPTE ST 12-1). */
+export function timecodeText({ rate_numerator, rate_denominator, is_drop, frame }: Timecode): string {
+  const count = Math.ceil(rate_numerator / rate_denominator);
+  const dropped = is_drop ? count / 15 : 0;
+  const minute = 60 * count;
+  const ten = 10 * minute - 9 * dropped;
+  const rest = frame % ten;
+  const minutes = 9 * Math.floor(frame / ten) + (rest < minute ? 0 : Math.floor((rest - minute) / (minute - dropped)) + 1);
+  const number = frame + dropped * minutes;
+  const seconds = Math.floor(number / count);
+  const two = (value: number): string => String(value).padStart(2, '0');
+  return `${two(Math.floor(seconds / 3600))}:${two(Math.floor(seconds / 60) % 60)}:${two(seconds % 60)}${is_drop ? ';' : ':'}${two(number % count)}`;
+}

@@ -48,7 +48,9 @@ export const LiveCommand = { action: [1, 'enum'], subject: [2, 'string'] } as co
 export const ParameterRequest = { prefix: [1, 'string'], first: [2, 'uint32'], is_watching: [3, 'bool'] } as const;
 export const CameraCommand = { session: [1, 'uint64'], camera: [2, Camera] } as const;
 export const StateTimesRequest = { is_wanted: [1, 'bool'] } as const;
-export const RecordCommand = { is_wanted: [1, 'bool'], name: [2, 'string'] } as const;
+export const RecordCommand = {
+  is_wanted: [1, 'bool'], name: [2, 'string'], slate: [3, 'string'], take: [4, 'uint32'],
+} as const;
 export const WindowChange = {
   frame_width: [1, 'uint32'], frame_height: [2, 'uint32'], is_hidden: [3, 'bool'],
 } as const;
@@ -95,13 +97,17 @@ export const LiveInput = {
   over_rate: [14, 'uint64'], impossible: [15, 'uint64'], clamped: [16, 'uint64'], gated: [17, 'uint64'],
   resequenced: [18, 'uint64'], late: [19, 'uint64'], lost: [20, 'uint64'], values: [21, LiveValue, 'repeated'],
 } as const;
+export const Timecode = {
+  rate_numerator: [1, 'uint32'], rate_denominator: [2, 'uint32'], is_drop: [3, 'bool'], frame: [4, 'uint32'],
+  part: [5, 'double'],
+} as const;
 export const ServerStatus = {
   tick: [1, 'uint64'], sim_ms: [2, 'double'], encode_ms: [3, 'double'], render_ms: [4, 'double'],
   realtime_factor: [5, 'double'], is_paused: [6, 'bool'], is_motion_stale: [7, 'bool'], viewer_count: [8, 'uint32'],
   dropped_frames: [9, 'uint64'], rejected_samples: [10, 'uint64'], quarantined_strands: [11, 'uint64'],
   overstretched_strands: [12, 'uint64'], queue_delay_ms: [13, 'double'], slow_motion: [14, 'string'],
   picture_motions: [15, PictureMotion, 'repeated'], detail: [16, 'string'], live_inputs: [24, LiveInput, 'repeated'],
-  recording: [28, 'string'],
+  recording: [28, 'string'], timecode: [29, Timecode],
 } as const;
 export const Goodbye = { reason: [1, 'string'] } as const;
 export const Notice = {
@@ -134,7 +140,7 @@ export const ParameterList = {
 } as const;
 export const StateTime = {
   tick: [1, 'uint64'], sim_time_ns: [2, 'sfixed64'], source_ns: [3, 'sfixed64'], motion_ns: [4, 'sfixed64'],
-  published_ns: [5, 'sfixed64'], encoded_ns: [6, 'sfixed64'],
+  published_ns: [5, 'sfixed64'], encoded_ns: [6, 'sfixed64'], timecode: [7, Timecode],
 } as const;
 export const StateTimes = { states: [1, StateTime, 'repeated'] } as const;
 export const StreamClass = {
@@ -164,7 +170,7 @@ export const schemas: { readonly [name: string]: Schema } = {
   Hello, Vec3, Camera, CameraChange, KeyframeRequest, FrameAck, Ping, ControlCommand, SetParameter, AdminCommand,
   ViewerReport, ModeRequest, SceneRequest, LiveCommand, ParameterRequest, CameraCommand, StateTimesRequest,
   RecordCommand, WindowChange, Color, StrandStyle, HairShading, RenderMethods, Look, Welcome, Pong, PictureMotion,
-  LiveValue, LiveInput, ServerStatus, Goodbye, Notice, StreamQuality, FrameQuality, SessionInfo, SessionList,
+  LiveValue, LiveInput, Timecode, ServerStatus, Goodbye, Notice, StreamQuality, FrameQuality, SessionInfo, SessionList,
   ModeChange, LookChange, SceneText, ParameterInfo, ParameterList, StateTime, StateTimes, StreamClass, StreamList,
   ClientMessage, ServerMessage,
 };

@@ -20,7 +20,8 @@ struct FacePacket {
   std::string device, subject;
   uint32_t frame = 0;
   std::optional<double> time_s;  // of day
-  bool has_values = false;       // none while no face is in front of the camera
+  std::optional<Timecode> timecode;
+  bool has_values = false;  // none while no face is in front of the camera
   std::array<float, kValueCount> value{};
 };
 
@@ -32,12 +33,18 @@ std::optional<std::string> take_name(BigEndianReader& reader) {
   return one_line({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, kMaxSubjectBytes);
 }
 
-/// Seconds of a frame number with a part of a frame and frames per second as a fraction.
-std::optional<double> take_time(BigEndianReader& reader, uint32_t frame) {
+/// Takes the time of a frame number with a part of a frame, and frames per second as a fraction. The number
+/// is since midnight where the phone has timecode.
+void take_time(BigEndianReader& reader, FacePacket& packet) {
   const double part = reader.take<float>();
   const auto frames = reader.take<int32_t>(), seconds = reader.take<int32_t>();
-  if (frames <= 0 || seconds <= 0) return std::nullopt;
-  return (static_cast<int32_t>(frame) + part) * seconds / frames;
+  if (frames <= 0 || seconds <= 0) return;
+  packet.time_s = (static_cast<int32_t>(packet.frame) + part) * seconds / frames;
+  const FrameRate rate{static_cast<uint32_t>(frames), static_cast<uint32_t>(seconds)};
+  if (static_cast<int32_t>(packet.frame) < 0 || !is_timecode_rate(rate, false) ||
+      !(part >= 0.0 && part < 1.0))
+    return;
+  packet.timecode = Timecode{rate, false, packet.frame % frames_per_day(rate, false), part};
 }
 
 Result<FacePacket> read_face(std::span<const std::byte> bytes) {
@@ -61,7 +68,7 @@ Result<FacePacket> read_face(std::span<const std::byte> bytes) {
   }
   if (reader.rest().empty()) return packet;
   packet.frame = reader.take<uint32_t>();
-  packet.time_s = take_time(reader, packet.frame);
+  take_time(reader, packet);
   const size_t count = reader.rest().empty() ? 0 : reader.take<uint8_t>();
   if (!reader.ok() || (count != 0 && count != kValueCount) || reader.rest().size() != count * sizeof(float))
     return make_error(ErrorCode::BadInput,
@@ -87,6 +94,7 @@ class LiveLinkFaceParser : public LiveParser {
                          rad_per_unit_ * face.value[kHeadRollAt]);
       pose.has_position = false;
       pose.frame = face.frame;
+      pose.timecode = face.timecode;
       if (face.time_s) pose.source_time_ns = nanoseconds_of(*face.time_s);
     }
     last_ = std::move(face);

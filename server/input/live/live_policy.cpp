@@ -246,6 +246,7 @@ void LivePolicy::release(const LivePose& pose, int64_t arrival_ns) {
   LiveHead head;
   head.time_ns = time_ns;
   head.world_from_head = head_of(pose);
+  head.timecode = pose.timecode;
   add_joints(pose, head);
   if (last_ && jumps_) {
     // Hair is carried through what the hub takes for a jump.

@@ -69,6 +69,7 @@ struct LiveHead {
   Pose world_from_head;
   std::vector<std::string> joint_names = {};  // of the body below it
   std::vector<glm::vec3> joint_m = {};        // of each; head space
+  std::optional<Timecode> timecode = {};
 };
 
 class LivePolicy {

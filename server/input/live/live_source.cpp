@@ -312,6 +312,7 @@ LiveSource::Due LiveSource::advance(int64_t now_ns) {
     MotionSamples samples;
     samples.samples.push_back({head.time_ns, head.world_from_head, std::move(head.joint_m)});
     samples.joint_names = std::move(head.joint_names);
+    samples.timecode = head.timecode;
     due.motion.push_back(std::move(samples));
   }
   for (const std::string& note : policy_.take_notes()) warn(note);

@@ -1,0 +1,243 @@
+#include "client/app/ltc.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "common/base/profile.h"
+#include "common/base/units.h"
+
+namespace strandcast {
+namespace {
+
+constexpr size_t kWordBits = 80;
+constexpr double kLevelShare = 0.25;    // of the loudest samples, that an edge has to pass
+constexpr double kLevelFall = 0.9995;   // per sample: silence is forgotten within a few frames
+constexpr double kBitShare = 1.0 / 16;  // of the newest bit in their usual length
+constexpr double kHalfBelow = 0.75;     // of a bit; shorter is the half of a 1
+constexpr double kLeastHalf = 0.3, kLongestBit = 1.6;
+constexpr double kLeastLevel = 1e-4;
+constexpr uint32_t kMaxWavChannels = 64;
+constexpr uint32_t kMaxWavRateHz = 768'000;
+constexpr size_t kChunkSamples = 1024;
+constexpr size_t kMaxLtcFrames = 24 * 3600 * 60;
+constexpr int64_t kLiveStaleNs = 1'000'000'000;
+
+template <class T>
+T number_at(const char* bytes) {
+  T value;
+  std::memcpy(&value, bytes, sizeof(value));
+  return value;
+}
+
+/// Of a second, that `fps` has.
+uint32_t value_of(const std::array<bool, kWordBits>& bits, size_t begin, size_t count) {
+  uint32_t value = 0;
+  for (size_t i = 0; i < count; ++i) value |= static_cast<uint32_t>(bits[begin + i]) << i;
+  return value;
+}
+
+std::optional<Timecode> timecode_of_word(const std::array<bool, kWordBits>& bits, const FrameRate& fps) {
+  constexpr size_t kSyncAt = 64;
+  constexpr uint32_t kSync = 0xBFFC;  // 0011 1111 1111 1101, the first bit lowest
+  if (value_of(bits, kSyncAt, 16) != kSync) return std::nullopt;
+  const auto two_digits = [&](size_t units_at, size_t tens_at, size_t tens_bits) {
+    return value_of(bits, units_at, 4) + 10 * value_of(bits, tens_at, tens_bits);
+  };
+  const TimecodeFields fields{two_digits(48, 56, 2), two_digits(32, 40, 3), two_digits(16, 24, 3),
+                              two_digits(0, 8, 2)};
+  constexpr size_t kDropAt = 10;
+  const auto timecode = make_timecode(fields, fps, bits[kDropAt] && is_timecode_rate(fps, true));
+  return timecode ? std::optional(*timecode) : std::nullopt;
+}
+
+}  // namespace
+
+LtcDecoder::LtcDecoder(double sample_rate_hz, const FrameRate& fps)
+    : sample_rate_hz_(sample_rate_hz), fps_(fps), bit_samples_(sample_rate_hz / fps.hz() / kWordBits) {}
+
+std::optional<LtcFrame> LtcDecoder::add(std::span<const float> samples) {
+  newest_.reset();
+  for (const float sample : samples) {
+    level_ = std::max(level_ * kLevelFall, static_cast<double>(std::abs(sample)));
+    const double edge = std::max(kLevelShare * level_, kLeastLevel);
+    if (is_high_ ? sample < -edge : sample > edge) {
+      is_high_ = !is_high_;
+      // Where the line between the two samples is half way through the edge.
+      const double rise = static_cast<double>(sample) - last_;
+      const double back = rise == 0.0 ? 0.0 : std::clamp(sample / rise, 0.0, 1.0);
+      note_edge(static_cast<double>(sample_count_) - back);
+    }
+    last_ = sample;
+    ++sample_count_;
+  }
+  return newest_;
+}
+
+/// A bit begins with an edge, and a 1 has another in its middle.
+void LtcDecoder::note_edge(double at) {
+  const double length = at - std::exchange(edge_at_, at);
+  const double share = length / bit_samples_;
+  if (share < kLeastHalf || share > kLongestBit) {
+    has_half_ = false;
+    bit_count_ = 0;
+  } else if (share >= kHalfBelow) {
+    bit_samples_ += kBitShare * (length - bit_samples_);
+    has_half_ = false;
+    note_bit(false, at);
+  } else if (std::exchange(has_half_, !has_half_)) {
+    note_bit(true, at);
+  } else {
+    bit_samples_ += kBitShare * (2.0 * length - bit_samples_);
+  }
+}
+
+void LtcDecoder::note_bit(bool bit, double at) {
+  std::rotate(bits_.begin(), bits_.begin() + 1, bits_.end());
+  bits_.back() = bit;
+  if (++bit_count_ < kWordBits) return;
+  if (const auto timecode = timecode_of_word(bits_, fps_))
+    newest_ = LtcFrame{*timecode, at / sample_rate_hz_};
+}
+
+Result<WavReader> WavReader::open(std::istream& in) {
+  const auto refuse = [](std::string_view why) {
+    return make_error(ErrorCode::BadInput, "this is no WAV file that can be read: {}", why);
+  };
+  char head[12];
+  if (!in.read(head, sizeof(head)) || std::memcmp(head, "RIFF", 4) != 0 ||
+      std::memcmp(head + 8, "WAVE", 4) != 0)
+    return refuse("it does not begin with RIFF and WAVE");
+  WavReader reader(in);
+  constexpr uint32_t kMostFormatBytes = 4096;
+  constexpr uint16_t kWhole = 1, kFloat = 3, kExtended = 0xFFFE;
+  while (true) {
+    char chunk[8];
+    if (!in.read(chunk, sizeof(chunk))) return refuse("it ends before its sound");
+    const auto size = number_at<uint32_t>(chunk + 4);
+    if (std::memcmp(chunk, "data", 4) == 0) {
+      if (reader.sample_bytes_ == 0) return refuse("its format does not stand before its sound");
+      // A pipe does not know how long it will be.
+      constexpr uint32_t kUnknown = 0xFFFFFFFF;
+      reader.left_bytes_ = size == 0 || size == kUnknown ? ~uint64_t{0} : size;
+      return reader;
+    }
+    if (std::memcmp(chunk, "fmt ", 4) != 0) {
+      in.ignore(static_cast<std::streamsize>(size) + size % 2);
+      continue;
+    }
+    if (size < 16 || size > kMostFormatBytes) return refuse("its format has a wrong size");
+    std::vector<char> format(size + size % 2);
+    if (!in.read(format.data(), static_cast<std::streamsize>(format.size()))) return refuse("it is cut off");
+    auto kind = number_at<uint16_t>(format.data());
+    if (kind == kExtended && size >= 26) kind = number_at<uint16_t>(format.data() + 24);
+    reader.channel_count_ = number_at<uint16_t>(format.data() + 2);
+    const auto rate_hz = number_at<uint32_t>(format.data() + 4);
+    const auto bits = number_at<uint16_t>(format.data() + 14);
+    reader.is_float_ = kind == kFloat;
+    reader.sample_rate_hz_ = rate_hz;
+    const bool is_known =
+        (kind == kWhole && (bits == 16 || bits == 24 || bits == 32)) || (kind == kFloat && bits == 32);
+    if (!is_known || reader.channel_count_ == 0 || reader.channel_count_ > kMaxWavChannels || rate_hz == 0 ||
+        rate_hz > kMaxWavRateHz)
+      return refuse("16, 24 or 32 bits of whole numbers, or 32 of float, are possible");
+    reader.sample_bytes_ = bits / 8;
+  }
+}
+
+size_t WavReader::read(std::span<float> samples) {
+  const size_t row = size_t{sample_bytes_} * channel_count_;
+  std::vector<char> bytes(samples.size() * row);
+  const uint64_t wanted = std::min<uint64_t>(bytes.size(), left_bytes_ / row * row);
+  in_->read(bytes.data(), static_cast<std::streamsize>(wanted));
+  const auto got = static_cast<size_t>(in_->gcount());
+  if (left_bytes_ != ~uint64_t{0}) left_bytes_ -= got;
+  const size_t count = got / row;
+  for (size_t i = 0; i < count; ++i) {
+    const char* const at = bytes.data() + i * row;
+    if (is_float_) {
+      const auto value = number_at<float>(at);
+      samples[i] = std::isfinite(value) ? std::clamp(value, -1.0f, 1.0f) : 0.0f;
+      continue;
+    }
+    uint32_t raw = 0;  // in the upper bytes
+    for (uint32_t byte = 0; byte < sample_bytes_; ++byte)
+      raw |= uint32_t{static_cast<uint8_t>(at[byte])} << (8 * (4 - sample_bytes_ + byte));
+    samples[i] = static_cast<float>(static_cast<double>(std::bit_cast<int32_t>(raw)) / 2147483648.0);
+  }
+  return count;
+}
+
+namespace {
+
+Result<TimecodeAt> read_ltc_file(const std::string& path, const FrameRate& fps) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return at(path, make_error(ErrorCode::NotFound, "cannot be read"));
+  auto reader = WavReader::open(file);
+  if (!reader) return at(path, reader.error());
+  LtcDecoder decoder(reader->sample_rate_hz(), fps);
+  auto frames = std::make_shared<std::vector<LtcFrame>>();
+  std::vector<float> samples(kChunkSamples);
+  while (const size_t count = reader->read(samples))
+    if (const auto frame = decoder.add(std::span(samples).first(count));
+        frame && frames->size() < kMaxLtcFrames)
+      frames->push_back(*frame);
+  if (frames->empty())
+    return at(path,
+              make_error(ErrorCode::BadInput, "has no timecode of {} frames per second in its first channel",
+                         frame_rate_text(fps.hz())));
+  return TimecodeAt([frames](double time_s) -> std::optional<Timecode> {
+    const auto later = std::upper_bound(frames->begin(), frames->end(), time_s,
+                                        [](double t_s, const LtcFrame& frame) { return t_s < frame.end_s; });
+    if (later == frames->begin()) return std::nullopt;
+    const LtcFrame& last = *std::prev(later);
+    return advanced(last.timecode, 1.0 + (time_s - last.end_s) * last.timecode.rate.hz());
+  });
+}
+
+Result<TimecodeAt> read_live_ltc(const FrameRate& fps) {
+  struct Live {
+    std::mutex mutex;
+    std::optional<Timecode> timecode;  // of `time_ns`
+    int64_t time_ns = 0;
+  };
+  auto reader = WavReader::open(std::cin);
+  if (!reader) return at("standard input", reader.error());
+  const auto live = std::make_shared<Live>();
+  std::thread([live, reader = *reader, fps]() mutable {
+    LtcDecoder decoder(reader.sample_rate_hz(), fps);
+    std::vector<float> samples(kChunkSamples / 4);
+    double read_s = 0.0;
+    while (const size_t count = reader.read(samples)) {
+      const auto frame = decoder.add(std::span(samples).first(count));
+      read_s += static_cast<double>(count) / reader.sample_rate_hz();
+      if (!frame) continue;
+      const std::lock_guard lock(live->mutex);
+      live->time_ns = now_ns();
+      live->timecode = advanced(frame->timecode, 1.0 + (read_s - frame->end_s) * fps.hz());
+    }
+  }).detach();
+  return TimecodeAt([live](double) -> std::optional<Timecode> {
+    const std::lock_guard lock(live->mutex);
+    const int64_t passed_ns = now_ns() - live->time_ns;
+    if (!live->timecode || passed_ns > kLiveStaleNs) return std::nullopt;
+    return advanced(*live->timecode, static_cast<double>(passed_ns) * kSPerNs * live->timecode->rate.hz());
+  });
+}
+
+}  // namespace
+
+Result<TimecodeAt> open_ltc(const std::string& path, const FrameRate& fps) {
+  if (!is_timecode_rate(fps, false)) return make_timecode({}, fps, false).error();
+  return path == "-" ? read_live_ltc(fps) : read_ltc_file(path, fps);
+}
+
+}  // namespace strandcast
