@@ -27,6 +27,7 @@ namespace strandcast {
 struct SteppedState {
   Snapshot snapshot;
   std::vector<glm::vec3> position_in_head_m;  // (vertex_count x strand_count), strand fastest
+  std::vector<glm::vec3> velocity_mps;        // likewise; world
 };
 
 /// The built-in scene with its head, wind and follicles, with so many strands.
@@ -121,6 +122,7 @@ class SteppedHair {
     const Pose& pose = builder_.world_from_head();
     const glm::dmat3 head_from_world = glm::transpose(glm::mat3_cast(pose.rotation));
     SteppedState state;
+    state.velocity_mps = solver_state.velocity_mps;
     for (const glm::vec3& point : solver_state.position_m)
       state.position_in_head_m.emplace_back(head_from_world * glm::dvec3(point));
     QuantiseInput input;

@@ -610,7 +610,7 @@ TEST(StepCodec, AHeadsFieldTakesLittleOfAKeyframe) {
   std::vector<std::byte> bytes;
   step::write_model(model, hair.rest_in_head_m(), kStrands, bytes);
   fmt::print("{} nodes in {} bytes\n", model.field->grid.size(), bytes.size());
-  EXPECT_LT(bytes.size(), 40'000u);
+  EXPECT_LT(bytes.size(), 16'000u);
   // Where strands are turned it is the field, to half a step.
   const auto quads = field_quads(*model.field);
   const auto content = load_scene_content(scene);

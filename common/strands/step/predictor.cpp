@@ -35,17 +35,6 @@ float& w_at(StrandBlocks& blocks, size_t place, uint32_t row) {
   return blocks.row(static_cast<uint32_t>(place / kBlockStrands), row, 3)[place % kBlockStrands];
 }
 
-/// To memory that is there already, where it fits.
-void copy_blocks(const std::unique_ptr<StrandBlocks>& from, std::unique_ptr<StrandBlocks>& to) {
-  if (from == nullptr) {
-    to.reset();
-    return;
-  }
-  if (to == nullptr || to->size() != from->size())
-    to = std::make_unique<StrandBlocks>(from->strand_count(), from->row_count());
-  std::memcpy(to->data(), from->data(), from->size() * sizeof(float));
-}
-
 }  // namespace
 
 Result<std::unique_ptr<Predictor>> Predictor::make(StepModel model, const PredictorGround& ground) {
@@ -254,6 +243,7 @@ void Predictor::put_positions(const tangent::Planes<int32_t>& decoded, float qua
 
 void Predictor::start(const Decoded& now, const Decoded& before, double seconds, float quantum_m) {
   state_.is_body_known = false;
+  state_.is_history_known = true;
   state_.pose = now.world_from_head;
   state_.head = HeadPath::at_rest(now.world_from_head.rotation);
   put_positions(now.lattice, quantum_m);
@@ -393,6 +383,7 @@ void Predictor::advance(const Origin& origin, std::span<const StepTick> ticks, d
       if (!state_.is_body_known && !tick.is_body_new) begin_body(substeps.front());
       state_.is_body_known = true;
     }
+    if (!state_.is_history_known) find_history(substeps.front());
     for (const StepInput& substep : substeps) run(substep);
     state_.pose = tick.world_from_head;
   }
@@ -419,10 +410,22 @@ void Predictor::correct(const Correction& of) {
   });
 }
 
+/// To memory that is there already, where it fits.
+void Predictor::copy_blocks(const std::unique_ptr<StrandBlocks>& from, std::unique_ptr<StrandBlocks>& to) {
+  if (from == nullptr) {
+    to.reset();
+    return;
+  }
+  if (to == nullptr || to->size() != from->size())
+    to = std::make_unique<StrandBlocks>(from->strand_count(), from->row_count());
+  std::memcpy(to->data(), from->data(), from->size() * sizeof(float));
+}
+
 void Predictor::copy(const State& from, State& to) {
   for (size_t role = 0; role < kPlaneRoleCount; ++role) copy_blocks(from.planes[role], to.planes[role]);
   copy_blocks(from.body_before, to.body_before);
   to.is_body_known = from.is_body_known;
+  to.is_history_known = from.is_history_known;
   to.head = from.head;
   to.pose = from.pose;
 }
@@ -435,6 +438,7 @@ void Predictor::restore() {
   std::swap(state_.planes, saved_.planes);
   std::swap(state_.body_before, saved_.body_before);
   state_.is_body_known = saved_.is_body_known;
+  state_.is_history_known = saved_.is_history_known;
   state_.head = saved_.head;
   state_.pose = saved_.pose;
 }

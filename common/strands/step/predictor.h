@@ -16,6 +16,8 @@
 #include "common/kernels/step_model.h"
 #include "common/kernels/volume/volume_law.h"
 #include "common/strands/byte_io.h"
+#include "common/strands/step/numbers.h"
+#include "common/strands/step/step_reader.h"
 #include "common/strands/step/wire.h"
 #include "common/strands/tangent/motion.h"
 #include "common/strands/value_coder.h"
@@ -36,6 +38,9 @@ inline constexpr size_t kMostStepVertices = 2'000'000;
 
 class Predictor {
  public:
+  /// Tables of the components of a state: three planes with w, and the twist.
+  using ComponentTables = std::array<NumberTables, 13>;
+
   /// State that changes from frame to frame.
   struct State {
     std::array<std::unique_ptr<StrandBlocks>, kPlaneRoleCount> planes;
@@ -43,6 +48,7 @@ class Predictor {
     Pose pose;
     std::unique_ptr<StrandBlocks> body_before;  // where strands were, w = how near to the body they may come
     bool is_body_known = false;                 // w is
+    bool is_history_known = true;               // what strands remember of the last substep
   };
 
   /// Makes a predictor. Unsupported if there is no rest shape or this build lacks the model's kernel.
@@ -81,11 +87,14 @@ class Predictor {
   /// Rounds the state to the numbers that write_state() writes, so that joiners continue from the same state.
   /// Positions are set to the decoded ones.
   void settle(const tangent::Planes<int32_t>& decoded, float quantum_m);
-  /// Appends the state for joiners; call settle() first.
+  /// The same so finely that nobody sees it. What strands remember of the last substep is forgotten: the next
+  /// step finds it again.
+  void settle_finely(const tangent::Planes<int32_t>& decoded, float quantum_m);
+  /// Appends the state for joiners; call settle() or settle_finely() first.
   void write_state(std::vector<std::byte>& bytes) const;
   /// Reads what write_state() wrote, under this pose of the head. BadInput for malformed bytes. Call place()
   /// afterwards.
-  Status read_state(ByteReader& bytes, const Pose& world_from_head);
+  Status read_state(ByteReader& bytes, const Pose& world_from_head, Rounding rounding);
   /// Completes read_state() with the decoded positions of the strands.
   void place(const tangent::Planes<int32_t>& decoded, float quantum_m);
 
@@ -122,14 +131,39 @@ class Predictor {
   void begin_body(const StepInput& first);
   void put_positions(const tangent::Planes<int32_t>& decoded, float quantum_m);
   void find_axes(StrandBlocks& axes) const;
-  template <class StepsOfAxis>
-  void twist(StepsOfAxis steps_of_axis);
+  /// Axis of an edge, the one without twist, and what is at right angles to that.
+  struct TwistedAxis {
+    glm::vec3 axis;
+    glm::vec3 found;
+    glm::vec3 side;
+  };
+  /// A turn about an edge; both parts are to be multiplied with `scale`.
+  struct TwistTurn {
+    float cosine;
+    float sine;
+    float scale;
+  };
+  using StepsOfAxis = int32_t (*)(const TwistedAxis& axis, int32_t steps, int32_t steps_before);
+  void twist(StepsOfAxis steps_of_axis, TwistTurn (*turn_of)(int32_t steps));
+  static TwistTurn turn_of_steps(int32_t steps);
+  static TwistTurn turn_of_fine_steps(int32_t steps);
   void turn(const glm::dquat& by);
   void run(const StepInput& input);
   StrandBlocks* moving(PlaneRole role) const;
   std::vector<StatePlane> state_planes() const;
   float share_history();
+  void settle_planes();
+  template <class Steps>
+  void visit_velocities(uint32_t slice, Steps steps);
+  void place_velocities();
+  void forget_history();
+  void find_history(const StepInput& first);
+  void write_fine(ValueWriter& writer) const;
+  void read_fine(ValueReader& reader);
+  static void copy_blocks(const std::unique_ptr<StrandBlocks>& from, std::unique_ptr<StrandBlocks>& to);
   void write_slice(uint32_t slice, ValueWriter& writer) const;
+  void write_planes(uint32_t slice, ComponentTables& tables, ValueWriter& writer) const;
+  void read_planes(uint32_t slice, float history_s, ComponentTables& tables, ValueReader& reader);
   void read_slice(uint32_t slice, float history_s, ValueReader& reader);
   uint32_t block_count() const;
   template <class Work>
@@ -150,9 +184,11 @@ class Predictor {
   std::array<std::unique_ptr<StrandBlocks>, kPlaneRoleCount> fixed_;
   State state_;
   State saved_;
-  // By settle(), for write_state().
-  std::vector<int32_t> twist_steps_;  // (places x vertex_count)
-  float history_s_ = 0.0f;            // last substep of strands that remember it
+  // By settle() or settle_finely(), for write_state().
+  bool is_fine_ = false;
+  std::vector<int32_t> velocity_steps_;  // (places x vertex_count x 3), of settle_finely()
+  std::vector<int32_t> twist_steps_;     // (places x vertex_count)
+  float history_s_ = 0.0f;               // last substep of strands that remember it
   std::optional<LaneProgram> program_;
   std::optional<LaneProgram> follicle_program_;
   // Where the model tells of a volume.

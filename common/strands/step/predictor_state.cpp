@@ -3,10 +3,8 @@
 #include <cmath>
 
 #include "common/base/check.h"
-#include "common/strands/step/lanes.h"
-#include "common/strands/step/numbers.h"
+#include "common/strands/step/component.h"
 #include "common/strands/step/predictor.h"
-#include "common/strands/wrapping.h"
 
 namespace strandcast::step {
 namespace {
@@ -25,77 +23,6 @@ constexpr float kTensionStepM2ps2 = 1.0f / 8.0f;
 constexpr double kMostTurnPerS = 1e6;
 constexpr double kMostHistoryS = kMaxSubstepS;
 
-/// One component of the strands of a slice, in steps, told beside what the vertex before has and how the two
-/// neighbours (in the first block the strand before, alone) go on from there.
-class Component {
- public:
-  Component(const tangent::Layout& layout, uint32_t slice, uint32_t vertex_count)
-      : layout_(layout),
-        begin_(layout.slice_begin[slice]),
-        vertex_count_(vertex_count),
-        values_(size_t{layout.strands_in[slice] + 1} * vertex_count) {}  // the first strand follows zeros
-
-  /// One strand; value_at(v) gives what it has there.
-  template <class ValueAt>
-  void put_strand(size_t place, ValueWriter& writer, ValueAt value_at) {
-    SymbolStep* next = writer.begin_run(vertex_count_);
-    visit(place, [&](uint32_t v, int32_t expected) {
-      const int32_t value = value_at(v);
-      tables_.put(wrapping_difference(value, expected), writer, next);
-      return value;
-    });
-    writer.end_run(next);
-  }
-  template <class Give>
-  void take_strand(size_t place, ValueReader& reader, Give give) {
-    SymbolCursor cursor = reader.begin_run(vertex_count_);
-    visit(place, [&](uint32_t v, int32_t expected) {
-      const int32_t value = wrapping_sum(expected, tables_.take(reader, cursor));
-      give(v, value);
-      return value;
-    });
-    reader.end_run(cursor);
-  }
-
- private:
-  const int32_t* strand_at(size_t place) const {
-    return values_.data() + (place + 1 - begin_) * vertex_count_;
-  }
-  template <class Code>
-  void visit(size_t place, Code code) {
-    std::array<const int32_t*, 2> beside;
-    for (size_t i = 0; i < beside.size(); ++i) {
-      const size_t near = layout_.neighbour[i][place];
-      beside[i] = near == layout_.no_neighbour() ? strand_at(place) - vertex_count_ : strand_at(near);
-    }
-    int32_t* const own = values_.data() + (place + 1 - begin_) * vertex_count_;
-    for (uint32_t v = 0; v < vertex_count_; ++v) {
-      int64_t way = int64_t{beside[0][v]} + beside[1][v];
-      if (v > 0) way -= int64_t{beside[0][v - 1]} + beside[1][v - 1];
-      const auto expected = static_cast<int32_t>(way / 2 + (v == 0 ? 0 : own[v - 1]));
-      own[v] = code(v, expected);
-    }
-  }
-
-  const tangent::Layout& layout_;
-  size_t begin_;
-  uint32_t vertex_count_;
-  std::vector<int32_t> values_;
-  NumberTables tables_;
-};
-
-float at(const StrandBlocks& blocks, size_t place, uint32_t v, uint32_t axis) {
-  return blocks.row(static_cast<uint32_t>(place / kBlockStrands), v, axis)[place % kBlockStrands];
-}
-float& at(StrandBlocks& blocks, size_t place, uint32_t v, uint32_t axis) {
-  return blocks.row(static_cast<uint32_t>(place / kBlockStrands), v, axis)[place % kBlockStrands];
-}
-glm::vec3 vector_at(const StrandBlocks& blocks, size_t place, uint32_t v) {
-  return {at(blocks, place, v, 0), at(blocks, place, v, 1), at(blocks, place, v, 2)};
-}
-float dot(const glm::vec3& a, const glm::vec3& b) {
-  return (a.x * b.x + a.y * b.y) + a.z * b.z;
-}
 int32_t steps_of(float value, float step) {
   return static_cast<int32_t>(std::lrint(value * (1.0f / step)));
 }
@@ -104,8 +31,10 @@ int32_t steps_of(float value, float step) {
 
 /// In this order on the wire: later ones may be told beside those before.
 std::vector<Predictor::StatePlane> Predictor::state_planes() const {
-  std::vector<StatePlane> planes = {
-      {PlaneRole::Velocity, kVelocityStepMps, kernel_.carries_way ? kTensionStepM2ps2 : 0.0f}};
+  std::vector<StatePlane> planes;
+  if (is_fine_ && kernel_.carries_way) return planes;
+  if (!is_fine_)
+    planes.push_back({PlaneRole::Velocity, kVelocityStepMps, kernel_.carries_way ? kTensionStepM2ps2 : 0.0f});
   for (const PlaneRole role : kernel_.moving) {
     if (role == PlaneRole::VelocityChange) planes.push_back({role, kChangeStepMps});
     if (role == PlaneRole::Displacement)
@@ -131,9 +60,22 @@ float Predictor::share_history() {
 }
 
 void Predictor::settle(const tangent::Planes<int32_t>& decoded, float quantum_m) {
+  is_fine_ = false;
   state_.is_body_known = false;  // joiners do not
   put_positions(decoded, quantum_m);
   history_s_ = share_history();
+  settle_planes();
+  if (moving(PlaneRole::RodAxis) == nullptr) return;
+  twist(
+      [](const TwistedAxis& of, int32_t, int32_t) {
+        const float turned = 1.0f + dot_of(of.axis, of.found);
+        const float tangent = turned > 1e-3f ? dot_of(of.axis, of.side) / turned : 0.0f;
+        return std::clamp(steps_of(tangent, kTwistStep), -kMostTwistSteps, kMostTwistSteps);
+      },
+      turn_of_steps);
+}
+
+void Predictor::settle_planes() {
   for (const StatePlane& plane : state_planes()) {
     StrandBlocks& vectors = *moving(plane.role);
     const StrandBlocks* about = plane.is_way ? moving(PlaneRole::Velocity) : nullptr;
@@ -141,20 +83,18 @@ void Predictor::settle(const tangent::Planes<int32_t>& decoded, float quantum_m)
       settle_blocks(ground_.set, {vectors, about, about, plane.step, plane.w_step, begin, end});
     });
   }
-  if (moving(PlaneRole::RodAxis) == nullptr) return;
-  twist_steps_.resize(size_t{block_count()} * kBlockStrands * model_.vertex_count);
-  twist([](const glm::vec3& axis, const glm::vec3& found, const glm::vec3& side, int32_t) {
-    const float turned = 1.0f + dot(axis, found);
-    const float tangent = turned > 1e-3f ? dot(axis, side) / turned : 0.0f;
-    return std::clamp(steps_of(tangent, kTwistStep), -kMostTwistSteps, kMostTwistSteps);
-  });
 }
 
-/// Turns axes without twist about the strands as they lie; steps_of_axis(axis, found, side) gives by how
-/// much.
-template <class StepsOfAxis>
-void Predictor::twist(StepsOfAxis steps_of_axis) {
+Predictor::TwistTurn Predictor::turn_of_steps(int32_t steps) {
+  const float t = kTwistStep * static_cast<float>(steps);
+  return {1.0f - t * t, 2.0f * t, 1.0f / (1.0f + t * t)};
+}
+
+/// Turns axes without twist about the strands as they lie, by the steps that steps_of_axis(axis, steps, those
+/// of the vertex before) gives.
+void Predictor::twist(StepsOfAxis steps_of_axis, TwistTurn (*turn_of)(int32_t)) {
   StrandBlocks& axes = *moving(PlaneRole::RodAxis);
+  twist_steps_.resize(size_t{block_count()} * kBlockStrands * model_.vertex_count);
   const StrandBlocks& position = *moving(PlaneRole::Position);
   StrandBlocks found_axes(places_, axes.row_count());
   find_axes(found_axes);
@@ -164,17 +104,19 @@ void Predictor::twist(StepsOfAxis steps_of_axis) {
       glm::vec3 along(0.0f);
       for (uint32_t v = 1; v < axes.row_count(); ++v) {
         const glm::vec3 edge = vector_at(position, place, v) - vector_at(position, place, v - 1);
-        const float squared = dot(edge, edge);
+        const float squared = dot_of(edge, edge);
         if (squared > kTiniestEdgeM2) along = edge * (1.0f / std::sqrt(squared));
         const glm::vec3 found = vector_at(found_axes, place, v);
         const glm::vec3 side(along.y * found.z - along.z * found.y, along.z * found.x - along.x * found.z,
                              along.x * found.y - along.y * found.x);
         int32_t& steps = twist_steps_[place * axes.row_count() + v];
-        steps = steps_of_axis(vector_at(axes, place, v), found, side, steps);
-        const float t = kTwistStep * static_cast<float>(steps);
-        const float scale = 1.0f / (1.0f + t * t);
-        for (int axis = 0; axis < 3; ++axis)
-          at(axes, place, v, axis) = ((1.0f - t * t) * found[axis] + (2.0f * t) * side[axis]) * scale;
+        const int32_t before = v > 1 ? twist_steps_[place * axes.row_count() + v - 1] : 0;
+        steps = steps_of_axis({vector_at(axes, place, v), found, side}, steps, before);
+        const TwistTurn turn = turn_of(steps);
+        for (uint32_t axis = 0; axis < 3; ++axis) {
+          const auto i = static_cast<int>(axis);
+          at(axes, place, v, axis) = (turn.cosine * found[i] + turn.sine * side[i]) * turn.scale;
+        }
         at(axes, place, v, 3) = 0.0f;
       }
     }
@@ -182,6 +124,12 @@ void Predictor::twist(StepsOfAxis steps_of_axis) {
 }
 
 void Predictor::write_slice(uint32_t slice, ValueWriter& writer) const {
+  ComponentTables tables;
+  write_planes(slice, tables, writer);
+}
+
+void Predictor::write_planes(uint32_t slice, ComponentTables& tables, ValueWriter& writer) const {
+  size_t number = 0;
   const tangent::Layout& layout = ground_.layout;
   const size_t begin = layout.slice_begin[slice];
   const size_t end = begin + layout.strands_in[slice];
@@ -189,7 +137,7 @@ void Predictor::write_slice(uint32_t slice, ValueWriter& writer) const {
     const StrandBlocks& vectors = *moving(plane.role);
     const StrandBlocks& velocity = *moving(PlaneRole::Velocity);
     for (uint32_t axis = 0; axis < 3; ++axis) {
-      Component component(layout, slice, vectors.row_count());
+      Component component(layout, slice, vectors.row_count(), tables[number++]);
       for (size_t place = begin; place < end; ++place) {
         const float seconds = at(velocity, place, 0, 3);
         component.put_strand(place, writer, [&](uint32_t v) {
@@ -200,7 +148,7 @@ void Predictor::write_slice(uint32_t slice, ValueWriter& writer) const {
       }
     }
     if (plane.w_step == 0.0f) continue;
-    Component component(layout, slice, vectors.row_count());
+    Component component(layout, slice, vectors.row_count(), tables[number++]);
     for (size_t place = begin; place < end; ++place)
       component.put_strand(place, writer, [&](uint32_t v) {
         const float w = at(vectors, place, v, 3);
@@ -208,7 +156,7 @@ void Predictor::write_slice(uint32_t slice, ValueWriter& writer) const {
       });
   }
   if (moving(PlaneRole::RodAxis) == nullptr) return;
-  Component component(layout, slice, model_.vertex_count);
+  Component component(layout, slice, model_.vertex_count, tables[number++]);
   for (size_t place = begin; place < end; ++place)
     component.put_strand(place, writer,
                          [&](uint32_t v) { return twist_steps_[place * model_.vertex_count + v]; });
@@ -220,6 +168,11 @@ void Predictor::write_state(std::vector<std::byte>& bytes) const {
     for (int row = 0; row < 3; ++row) to.put(state_.head.turn_per_s[column][row]);
   to.put(state_.head.step_index);
   to.put(history_s_);
+  if (is_fine_) {
+    ValueWriter writer;
+    write_fine(writer);
+    return writer.finish(bytes);
+  }
   const uint32_t count = ground_.layout.slice_count();
   std::vector<ValueWriter> writers(count);
   std::vector<std::vector<std::byte>> slices(count);
@@ -237,6 +190,12 @@ void Predictor::write_state(std::vector<std::byte>& bytes) const {
 }
 
 void Predictor::read_slice(uint32_t slice, float history_s, ValueReader& reader) {
+  ComponentTables tables;
+  read_planes(slice, history_s, tables, reader);
+}
+
+void Predictor::read_planes(uint32_t slice, float history_s, ComponentTables& tables, ValueReader& reader) {
+  size_t number = 0;
   const tangent::Layout& layout = ground_.layout;
   const size_t begin = layout.slice_begin[slice];
   const size_t end = begin + layout.strands_in[slice];
@@ -247,14 +206,14 @@ void Predictor::read_slice(uint32_t slice, float history_s, ValueReader& reader)
   for (const StatePlane& plane : state_planes()) {
     StrandBlocks& vectors = *moving(plane.role);
     for (uint32_t axis = 0; axis < 3; ++axis) {
-      Component component(layout, slice, vectors.row_count());
+      Component component(layout, slice, vectors.row_count(), tables[number++]);
       for (size_t place = begin; place < end; ++place)
         component.take_strand(place, reader, [&](uint32_t v, int32_t value) {
           at(vectors, place, v, axis) = in_steps(value, plane.step);
         });
     }
     if (plane.w_step == 0.0f) continue;
-    Component component(layout, slice, vectors.row_count());
+    Component component(layout, slice, vectors.row_count(), tables[number++]);
     for (size_t place = begin; place < end; ++place)
       component.take_strand(place, reader, [&](uint32_t v, int32_t value) {
         at(vectors, place, v, 3) = v > 0 ? in_steps(value, plane.w_step) : value > 0 ? history_s : 0.0f;
@@ -274,14 +233,18 @@ void Predictor::read_slice(uint32_t slice, float history_s, ValueReader& reader)
     }
   }
   if (moving(PlaneRole::RodAxis) == nullptr) return;
-  Component component(layout, slice, model_.vertex_count);
+  Component component(layout, slice, model_.vertex_count, tables[number++]);
   for (size_t place = begin; place < end; ++place)
     component.take_strand(place, reader, [&](uint32_t v, int32_t value) {
-      twist_steps_[place * model_.vertex_count + v] = std::clamp(value, -kMostTwistSteps, kMostTwistSteps);
+      constexpr int32_t kMostFineSteps = 1 << 20;
+      const int32_t most = is_fine_ ? kMostFineSteps : kMostTwistSteps;
+      twist_steps_[place * model_.vertex_count + v] = std::clamp(value, -most, most);
     });
 }
 
-Status Predictor::read_state(ByteReader& bytes, const Pose& pose) {
+Status Predictor::read_state(ByteReader& bytes, const Pose& pose, Rounding rounding) {
+  is_fine_ = rounding == Rounding::Fine;
+  if (is_fine_) velocity_steps_.assign(3 * size_t{places_} * model_.vertex_count, 0);
   state_.pose = pose;
   state_.head = HeadPath::at_rest(pose.rotation);
   bool are_usable = true;
@@ -297,13 +260,17 @@ Status Predictor::read_state(ByteReader& bytes, const Pose& pose) {
   if (!bytes.ok() || !are_usable)
     return make_error(ErrorCode::BadInput, "the state that steps go on from is cut off or no numbers");
   twist_steps_.assign(size_t{block_count()} * kBlockStrands * model_.vertex_count, 0);
-  std::vector<ValueReader> readers(ground_.layout.slice_count());
+  std::vector<ValueReader> readers(is_fine_ ? 1 : ground_.layout.slice_count());
   for (ValueReader& reader : readers) {
     ASSIGN_OR_RETURN(const auto rest, reader.open(bytes.rest()));
     bytes.take_bytes(bytes.rest().size() - rest.size());
   }
-  tangent::for_each_part(tangent::decode_terms(ground_.layout, ground_.workers), ground_.layout.slice_count(),
-                         [&](uint32_t slice) { read_slice(slice, history_s_, readers[slice]); });
+  if (is_fine_)
+    read_fine(readers.front());
+  else
+    tangent::for_each_part(tangent::decode_terms(ground_.layout, ground_.workers),
+                           ground_.layout.slice_count(),
+                           [&](uint32_t slice) { read_slice(slice, history_s_, readers[slice]); });
   for (const ValueReader& reader : readers)
     if (!reader.is_spent())
       return make_error(ErrorCode::BadInput, "the state that steps go on from does not end where it should");
@@ -312,8 +279,10 @@ Status Predictor::read_state(ByteReader& bytes, const Pose& pose) {
 
 void Predictor::place(const tangent::Planes<int32_t>& decoded, float quantum_m) {
   put_positions(decoded, quantum_m);
+  if (is_fine_) place_velocities();
   if (moving(PlaneRole::RodAxis) == nullptr) return;
-  twist([](const glm::vec3&, const glm::vec3&, const glm::vec3&, int32_t steps) { return steps; });
+  twist([](const TwistedAxis&, int32_t steps, int32_t) { return steps; },
+        is_fine_ ? turn_of_fine_steps : turn_of_steps);
 }
 
 }  // namespace strandcast::step

@@ -23,13 +23,19 @@ inline constexpr uint8_t kSparseFlag = 16;  // with kStepFlag: without weights, 
 /// kStepFlag.
 inline constexpr uint8_t kFollowFlag = 32;
 inline constexpr uint8_t kTellingFlags = kStepFlag | kSceneFlag | kModelFlag | kFollowFlag;  // bytes follow
-inline constexpr uint8_t kFlags = kTellingFlags | kSparseFlag;
+/// Flag of an anchor that steps foretell: its positions and the state are rounded finely.
+inline constexpr uint8_t kFineFlag = 64;
+inline constexpr uint8_t kFlags = kTellingFlags | kSparseFlag | kFineFlag;
+
+/// How what joiners receive is rounded: finely so that nobody sees it.
+enum class Rounding { Coarse, Fine };
 
 /// Tick and pose of a frame that is predicted.
 struct Moment {
   uint64_t tick = 0;
   int64_t sim_time_ns = 0;
   Pose world_from_head;
+  BustCode bust = kRigidBust;
 };
 
 /// How a delta begins.
@@ -57,7 +63,8 @@ class StepReader {
   /// After an anchor: rounds the state to the one that joiners receive.
   virtual void settle(const tangent::History& history) = 0;
   /// Reads a keyframe's state except the positions; it is kept until take_over().
-  virtual Status read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout) = 0;
+  /// Returns how everything of the keyframe is rounded.
+  virtual Result<Rounding> read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout) = 0;
   /// Completes read_state() after the keyframe's positions have become history.
   virtual void take_over(const Moment& now, const tangent::History& history) = 0;
 };

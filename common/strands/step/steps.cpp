@@ -20,6 +20,17 @@ constexpr double kMostBitsWorse = 1.0;
 constexpr size_t kSampleRun = 8;
 constexpr size_t kSampleStep = 128;
 
+// What a keyframe says of its state.
+constexpr uint8_t kNoState = 0, kCoarseState = 1, kFineState = 2;
+
+/// What ticks count from after a fine anchor: the chest is known.
+TickBase base_of(const Moment& moment, BustCode chest) {
+  TickBase base;
+  base.chest = chest;
+  base.bust = bust_turn(chest, moment.world_from_head.rotation);
+  return base;
+}
+
 Moment moment_of(const SnapshotInfo& info) {
   return {info.tick, info.sim_time_ns, info.world_from_head};
 }
@@ -77,7 +88,9 @@ void Steps::step(std::span<const StepTick> ticks, const Moment& now, const tange
 
 void Steps::follow(const Moment& now, const tangent::Frame& frame, const tangent::History& history) {
   const double seconds = static_cast<double>(now.sim_time_ns - last_.sim_time_ns) / kNsPerS;
-  if (is_stepping_ || is_following_) {
+  if (is_stepping_ && rounding_ == Rounding::Fine) {
+    ++age_;  // strands are placed when they settle
+  } else if (is_stepping_ || is_following_) {
     predictor_->correct(
         {is_stepping_ ? frame.lattice : expected_, history.lattice, seconds, history.quantum_m});
     ++age_;
@@ -102,8 +115,12 @@ void Steps::follow_exact(const Moment& now) {
 }
 
 void Steps::settle(const tangent::History& history) {
-  base_ = {};
-  if (predictor_) predictor_->settle(history.lattice, history.quantum_m);
+  base_ = rounding_ == Rounding::Fine ? base_of(last_, base_.chest) : TickBase{};
+  if (!predictor_) return;
+  if (rounding_ == Rounding::Fine)
+    predictor_->settle_finely(history.lattice, history.quantum_m);
+  else
+    predictor_->settle(history.lattice, history.quantum_m);
 }
 
 void EncoderSteps::set_rest_shape(std::span<const glm::vec3> rest_in_head_m) {
@@ -145,6 +162,7 @@ void EncoderSteps::restart(const SnapshotInfo& snapshot, const tangent::Layout& 
   last_ = moment_of(snapshot);
   bytes_.clear();
   flags_ = 0;
+  rounding_ = Rounding::Coarse;
   is_disturbed_ = true;
   shared_tick_ = 0;
   if (snapshot.trail == nullptr || snapshot.trail->scene == nullptr) return;
@@ -177,6 +195,7 @@ uint8_t EncoderSteps::begin(const SnapshotInfo& snapshot, const tangent::Layout&
                             tangent::History& history, tangent::Planes<int32_t>& target) {
   bytes_.clear();
   is_stepping_ = is_following_ = false;
+  rounding_ = Rounding::Coarse;
   flags_ = say(snapshot, layout, history, target);
   return flags_;
 }
@@ -288,7 +307,7 @@ std::shared_ptr<SharedUpdate> EncoderSteps::take_shared(const tangent::Layout& l
 
 void EncoderSteps::append_state(std::vector<std::byte>& body) {
   const bool has_state = predictor_ && has_model_;
-  ByteWriter(body).put(static_cast<uint8_t>(has_state ? 1 : 0));
+  ByteWriter(body).put(!has_state ? kNoState : rounding_ == Rounding::Fine ? kFineState : kCoarseState);
   if (!has_state) return;
   write_scene(scene_, body);
   ByteWriter(body).put_bytes(model_bytes_);
@@ -346,6 +365,7 @@ Status DecoderSteps::begin(const Beginning& beginning, const Moment& now, const 
   base_ = std::move(base);
   is_stepping_ = is_step;
   is_following_ = is_following;
+  rounding_ = (flags & kFineFlag) != 0 ? Rounding::Fine : Rounding::Coarse;
   if (!is_step && !is_following) return {};
   step(ticks, now, layout, history);
   if (is_step) std::swap(history.lattice, expected_);
@@ -370,21 +390,27 @@ void DecoderSteps::settle(const tangent::History& history) {
   Steps::settle(history);
 }
 
-Status DecoderSteps::read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout) {
+Result<Rounding> DecoderSteps::read_state(ByteReader& body, const Moment& now,
+                                          const tangent::Layout& layout) {
   joined_ = {};
-  if (body.take<uint8_t>() == 0) return {};
+  const auto kind = body.take<uint8_t>();
+  if (kind == kNoState) return Rounding::Coarse;
+  if (kind > kFineState) return make_error(ErrorCode::BadInput, "a keyframe has a state of kind {}", kind);
+  const Rounding rounding = kind == kFineState ? Rounding::Fine : Rounding::Coarse;
+  if (rounding == Rounding::Fine) joined_.base = base_of(now, now.bust);
   ASSIGN_OR_RETURN(joined_.scene, read_scene(body));
   ASSIGN_OR_RETURN(StepModel model,
                    read_model(body, rest_in_head_m_, layout.strand_count, layout.vertex_count));
   ASSIGN_OR_RETURN(joined_.predictor, Predictor::make(std::move(model), ground(layout)));
-  return joined_.predictor->read_state(body, now.world_from_head);
+  RETURN_IF_ERROR(joined_.predictor->read_state(body, now.world_from_head, rounding));
+  return rounding;
 }
 
 void DecoderSteps::take_over(const Moment& now, const tangent::History& history) {
   predictor_ = std::move(joined_.predictor);
   next_predictor_.reset();
   scene_ = std::move(joined_.scene);
-  base_ = {};
+  base_ = std::move(joined_.base);
   last_ = now;
   is_stepping_ = is_following_ = is_saved_ = false;
   if (!predictor_) return;

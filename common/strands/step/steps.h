@@ -48,8 +48,9 @@ class Steps {
   Moment last_;
   tangent::Planes<int32_t> expected_;
   bool is_stepping_ = false;
-  bool is_following_ = false;  // steps were taken, and predict nothing
-  uint32_t age_ = 0;           // frames since strands started without velocities
+  bool is_following_ = false;             // steps were taken, and predict nothing
+  Rounding rounding_ = Rounding::Coarse;  // of the anchor at work
+  uint32_t age_ = 0;                      // frames since strands started without velocities
 };
 
 class EncoderSteps : public Steps {
@@ -62,6 +63,8 @@ class EncoderSteps : public Steps {
   /// Sets the target to the prediction if the simulation is about to take the viewers' state over.
   uint8_t begin(const SnapshotInfo& snapshot, const tangent::Layout& layout, tangent::History& history,
                 tangent::Planes<int32_t>& target);
+  /// The frame at work becomes an anchor.
+  void begin_anchor(Rounding rounding) { rounding_ = rounding; }
   /// `head`: of an exact frame.
   void append_bytes(std::span<const std::byte> head, std::vector<std::byte>& body) const;
   /// Returns the pose of the chest after the newest step.
@@ -112,7 +115,7 @@ class DecoderSteps final : public Steps, public StepReader {
   void finish(const Moment& now, const tangent::Frame& frame, const tangent::History& history) override;
   void finish_exact(const Moment& now) override { follow_exact(now); }
   void settle(const tangent::History& history) override;
-  Status read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout) override;
+  Result<Rounding> read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout) override;
   void take_over(const Moment& now, const tangent::History& history) override;
 
  private:
@@ -120,6 +123,7 @@ class DecoderSteps final : public Steps, public StepReader {
   struct Joined {
     std::unique_ptr<Predictor> predictor;  // nullptr: nothing is predicted by steps yet
     StepScene scene;
+    TickBase base;
   };
 
   Joined joined_;  // until take_over()

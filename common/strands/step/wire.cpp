@@ -26,9 +26,10 @@ constexpr double kMostTipLengthM = 1e3;
 constexpr double kLargest = 1e20;  // of parameters and constants
 constexpr uint8_t kVolume = 0x80;  // beside a kernel's number
 constexpr uint8_t kPasses = 0x40;
-constexpr uint8_t kBend = 1, kDrag = 2, kMeetsBody = 4, kField = 8;  // of the passes
-constexpr uint8_t kSceneBody = 0x80;                                 // beside the substeps
-constexpr uint8_t kSceneBust = 0x80;                                 // beside the count of colliders
+// Of the passes.
+constexpr uint8_t kBend = 1, kDrag = 2, kMeetsBody = 4, kField = 8, kGradedField = 16;
+constexpr uint8_t kSceneBody = 0x80;  // beside the substeps
+constexpr uint8_t kSceneBust = 0x80;  // beside the count of colliders
 constexpr double kMostBustShare = 1e4;
 constexpr double kMostCellM = 1.0;
 constexpr double kBodyStepM = 1.0 / 65536.0;
@@ -341,6 +342,50 @@ int32_t linear_guess(std::span<const int16_t> distance, const glm::uvec3& count,
          before(true, true, true);
 }
 
+/// How finely distances are told: nodes beside the skin in eight steps at a time, those farther away in more.
+class GradedDistance {
+ public:
+  /// `most`: of the field.
+  GradedDistance(float cell_m, int16_t most)
+      : most_(std::max<int32_t>(most, 0)),
+        near_(static_cast<int32_t>(limited(static_cast<double>(cell_m) / double{kToldFieldStepM}, 30'000.0)) /
+              kNearSteps * kNearSteps) {}
+
+  int32_t level_of(int32_t distance) const {
+    const int32_t size = std::abs(distance);
+    const int32_t level = size <= near_ ? (size + kNearSteps / 2) / kNearSteps
+                                        : near_ / kNearSteps + (size - near_ + kFarSteps / 2) / kFarSteps;
+    return distance < 0 ? -level : level;
+  }
+  int16_t distance_of(int32_t level) const {
+    const int32_t size = std::min(std::abs(std::clamp(level, -kMostLevel, kMostLevel)), kMostLevel);
+    const int32_t steps =
+        size <= near_ / kNearSteps ? size * kNearSteps : near_ + (size - near_ / kNearSteps) * kFarSteps;
+    return static_cast<int16_t>(std::clamp(level < 0 ? -steps : steps, -32'767, most_));
+  }
+  /// Which of the tables: nodes out of reach, near the skin and between differ.
+  size_t table_of(int32_t guess) const { return guess >= most_ - 1 ? 0 : std::abs(guess) <= near_ ? 1 : 2; }
+  int32_t within(int32_t guess) const { return std::clamp(guess, -32'767, most_); }
+
+ private:
+  static constexpr int32_t kNearSteps = 8;
+  static constexpr int32_t kFarSteps = 128;
+  static constexpr int32_t kMostLevel = 1 << 16;
+  int32_t most_;
+  int32_t near_;  // about a cell
+};
+
+/// A node by those before it: linear_guess() and how distances go on along the axes, in the mean.
+int32_t curved_guess(std::span<const int16_t> distance, const glm::uvec3& count, const glm::uvec3& node) {
+  const int32_t linear = linear_guess(distance, count, node);
+  if (node.x < 2 || node.y < 2 || node.z < 2) return linear;
+  const size_t row = count.x, slice = row * count.y;
+  const size_t here = node.z * slice + node.y * row + node.x;
+  int32_t on = 0;
+  for (const size_t way : {size_t{1}, row, slice}) on += 2 * distance[here - way] - distance[here - 2 * way];
+  return (3 * linear + on) / 6;
+}
+
 template <class Code>
 void code_field(ToldField& field, Code code) {
   const glm::uvec3 count = field.grid.node_count;
@@ -348,8 +393,7 @@ void code_field(ToldField& field, Code code) {
   size_t i = 0;
   for (node.z = 0; node.z < count.z; ++node.z)
     for (node.y = 0; node.y < count.y; ++node.y)
-      for (node.x = 0; node.x < count.x; ++node.x)
-        code(field.distance[i++], linear_guess(field.distance, count, node));
+      for (node.x = 0; node.x < count.x; ++node.x) code(field.distance[i++], node);
 }
 
 void write_field(const ToldField& told, std::vector<std::byte>& bytes) {
@@ -358,13 +402,21 @@ void write_field(const ToldField& told, std::vector<std::byte>& bytes) {
   to.put(told.grid.cell_m);
   for (int axis = 0; axis < 3; ++axis) to.put(static_cast<uint16_t>(told.grid.node_count[axis]));
   ToldField field = told;
+  const int16_t most = *std::max_element(field.distance.begin(), field.distance.end());
+  to.put(most);
+  const GradedDistance graded(field.grid.cell_m, most);
   ValueWriter writer;
-  NumberTables tables;
-  code_field(field, [&](int16_t& value, int32_t guess) { tables.put(value - guess, writer); });
+  std::array<NumberTables, 3> tables;
+  code_field(field, [&](int16_t& value, const glm::uvec3& node) {
+    const int32_t guess = graded.within(curved_guess(field.distance, field.grid.node_count, node));
+    const int32_t level = graded.level_of(value);
+    tables[graded.table_of(guess)].put(level - graded.level_of(guess), writer);
+    value = graded.distance_of(level);
+  });
   writer.finish(bytes);
 }
 
-Result<std::shared_ptr<const ToldField>> read_field(ByteReader& bytes) {
+Result<std::shared_ptr<const ToldField>> read_field(ByteReader& bytes, uint8_t kind) {
   Numbers from{bytes};
   auto field = std::make_shared<ToldField>();
   field->grid.origin_m = from.vector<float, glm::vec3>(kMaxColliderM);
@@ -376,13 +428,21 @@ Result<std::shared_ptr<const ToldField>> read_field(ByteReader& bytes) {
       field->grid.size() > kMostToldNodes)
     return make_error(ErrorCode::LimitExceeded, "a step's field has {} x {} x {} nodes, at most {} are",
                       count.x, count.y, count.z, kMostToldNodes);
+  const GradedDistance graded(field->grid.cell_m, kind == kField ? int16_t{0} : bytes.take<int16_t>());
   ValueReader reader;
   ASSIGN_OR_RETURN(const auto rest, reader.open(bytes.rest()));
   bytes.take_bytes(bytes.rest().size() - rest.size());
   field->distance.resize(field->grid.size());
-  NumberTables tables;
-  code_field(*field, [&](int16_t& value, int32_t guess) {
-    value = static_cast<int16_t>(wrapping_sum(guess, tables.take(reader)));
+  std::array<NumberTables, 3> tables;
+  code_field(*field, [&](int16_t& value, const glm::uvec3& node) {
+    if (kind == kField) {  // of number 12
+      const int32_t guess = linear_guess(field->distance, count, node);
+      value = static_cast<int16_t>(wrapping_sum(guess, tables[0].take(reader)));
+      return;
+    }
+    const int32_t guess = graded.within(curved_guess(field->distance, count, node));
+    const int32_t beside = tables[graded.table_of(guess)].take(reader);
+    value = graded.distance_of(wrapping_sum(graded.level_of(guess), beside));
   });
   if (!reader.is_spent())
     return make_error(ErrorCode::BadInput, "the field of a step does not end where it should");
@@ -394,7 +454,7 @@ void write_passes(const StepModel& model, std::vector<std::byte>& bytes) {
   uint8_t flags = model.bend ? kBend : 0;
   if (model.drag_along_share != 1.0) flags |= kDrag;
   if (model.meets_body) flags |= kMeetsBody;
-  if (model.field != nullptr) flags |= kField;
+  if (model.field != nullptr) flags |= kGradedField;
   to.put(flags);
   if (model.bend)
     for (const double angle : {model.bend->least_root_rad, model.bend->least_tip_rad,
@@ -407,7 +467,8 @@ void write_passes(const StepModel& model, std::vector<std::byte>& bytes) {
 Status read_passes(ByteReader& bytes, StepModel& model) {
   Numbers from{bytes};
   const auto flags = bytes.take<uint8_t>();
-  if (flags > (kBend | kDrag | kMeetsBody | kField))
+  constexpr uint8_t kFields = kField | kGradedField;
+  if (flags > (kBend | kDrag | kMeetsBody | kFields) || (flags & kFields) == kFields)
     return make_error(ErrorCode::Unsupported, "a step does {:#x} besides, which this build does not know",
                       flags);
   if ((flags & kBend) != 0) {
@@ -418,8 +479,8 @@ Status read_passes(ByteReader& bytes, StepModel& model) {
   if ((flags & kDrag) != 0) model.drag_along_share = from.take<double>(1.0);
   model.meets_body = (flags & kMeetsBody) != 0;
   RETURN_IF_ERROR(from.status("what a step does besides"));
-  if ((flags & kField) != 0) {
-    ASSIGN_OR_RETURN(model.field, read_field(bytes));
+  if ((flags & kFields) != 0) {
+    ASSIGN_OR_RETURN(model.field, read_field(bytes, flags & kFields));
   }
   return {};
 }

@@ -26,7 +26,9 @@ namespace strandcast::tangent {
 namespace {
 
 constexpr uint8_t kTangentNumber = 5;
-constexpr uint8_t kStepNumber = 12;
+constexpr uint8_t kStepNumber = 13;
+/// Of the release 0.2.0: the same without fine anchors and graded fields.
+constexpr uint8_t kFirstStepNumber = 12;
 constexpr int kTableLevel = 3;
 constexpr uint8_t kAnchorFlag = 1;
 
@@ -55,8 +57,11 @@ struct Chain {
 
   void reset(const Layout& layout) {
     history.reset(layout);
-    sizes.reset(layout);
-    blocks.assign(block_count_of(layout), 0);
+    forget_integers(layout);
+    forget_tables();
+  }
+  /// After a fine anchor: what frames of steps learnt says nothing of it.
+  void forget_tables() {
     tables = make_first_tables();
     sparse_tables = make_first_sparse_tables();
   }
@@ -191,6 +196,12 @@ class Encoder final : public StrandEncoder {
     writers_.resize(layout_.slice_count());
   }
 
+  /// After begin(): whether steps tell all of the frame.
+  bool is_foretold(const SnapshotInfo& snapshot) const {
+    return flags_ == kExactFlags && snapshot.bust == steps_->chest() &&
+           tangent::is_foretold(chain_.history.lattice, target_);
+  }
+
   /// What every frame ends with.
   void end(const Snapshot& snapshot) {
     remember(chain_.history, frame_);
@@ -200,9 +211,7 @@ class Encoder final : public StrandEncoder {
 
   EncodedFramePtr encode_delta(const Snapshot& snapshot) {
     begin(snapshot, Followers::Some);
-    if (flags_ == kExactFlags && snapshot.bust == steps_->chest() &&
-        is_foretold(chain_.history.lattice, target_))
-      return encode_exact(snapshot);
+    if (is_foretold(snapshot)) return encode_exact(snapshot);
     if ((flags_ & step::kSparseFlag) != 0) return encode_sparse(snapshot);
     for (auto& escapes : frame_.codes.escapes) escapes.clear();
     std::vector<Tables> tables(layout_.slice_count(), chain_.tables);
@@ -259,12 +268,17 @@ class Encoder final : public StrandEncoder {
 
   JoinFrames encode_anchor(const Snapshot& snapshot, Followers followers) {
     begin(snapshot, followers);
+    const bool is_exact = is_foretold(snapshot);
+    if (is_exact) target_ = chain_.history.lattice;
     if ((flags_ & step::kSparseFlag) != 0) {
       // Who joins is told of the shape, which needs weights.
       flags_ &= static_cast<uint8_t>(~step::kSparseFlag);
       fit_motion(set_, layout_, chain_.history, target_, workers_, frame_);
     }
     flags_ |= kAnchorFlag;
+    if (is_exact) flags_ |= step::kFineFlag;
+    frame_.anchor_share = is_exact ? kFineShare : 1.0f;
+    if (steps_) steps_->begin_anchor(is_exact ? step::Rounding::Fine : step::Rounding::Coarse);
     frame_.shape_weights = fit_shape(layout_, snapshot.quantum_m, target_, workers_);
     for (auto& escapes : frame_.shape_codes.escapes) escapes.clear();
     Slices slices(layout_.slice_count());
@@ -278,6 +292,7 @@ class Encoder final : public StrandEncoder {
                       {layout_, slice, frame_.codes, chain_.sizes, next_sizes_, tables, writers_[slice]});
       }
       if (followers == Followers::Some) finish(first, count, slices);
+      if (is_exact) return;
       for (uint32_t slice = first; slice < first + count; ++slice) {
         Tables tables = chain_.tables;
         write_symbols(set_,
@@ -285,6 +300,14 @@ class Encoder final : public StrandEncoder {
       }
       finish(first, count, shape_slices);
     });
+    if (is_exact) {
+      chain_.forget_tables();
+      Tables tables = chain_.tables;
+      for (uint32_t slice = 0; slice < layout_.slice_count(); ++slice)
+        write_symbols(set_,
+                      {layout_, slice, frame_.shape_codes, no_sizes_, next_sizes_, tables, writers_[slice]});
+      finish(0, layout_.slice_count(), shape_slices);
+    }
     end(snapshot);
     chain_.forget_motion(layout_);
     if (steps_) steps_->settle(chain_.history);
@@ -402,7 +425,8 @@ class Decoder final : public StrandDecoder {
 
   Result<std::shared_ptr<const Snapshot>> decode(std::span<const std::byte> bytes) override {
     if (is_exact(bytes)) return decode_exact(bytes);
-    ASSIGN_OR_RETURN(const StrandMessage message, read_strand_message(bytes, number_, limits_));
+    const uint8_t number = spoken_number(bytes);
+    ASSIGN_OR_RETURN(const StrandMessage message, read_strand_message(bytes, number, limits_));
     RETURN_IF_ERROR(check_chain(message.header, sequence_));
     if (layout_.strand_count == 0) reset_layout({});
     auto snapshot = std::make_shared<Snapshot>(make_snapshot(message));
@@ -410,15 +434,24 @@ class Decoder final : public StrandDecoder {
       RETURN_IF_ERROR(read_keyframe(message, *snapshot));
     else
       RETURN_IF_ERROR(read_delta(message, *snapshot));
+    chain_number_ = number;
     sequence_ = message.header.sequence;
     return std::shared_ptr<const Snapshot>(std::move(snapshot));
   }
 
  private:
+  /// Number that a message may have, a keyframe any that is known; one of another number is refused.
+  uint8_t spoken_number(std::span<const std::byte> bytes) const {
+    if (steps_ == nullptr || bytes.size() <= kFrameHeaderBytes) return number_;
+    const auto told =
+        static_cast<uint8_t>(std::to_integer<uint8_t>(bytes[kFrameHeaderBytes]) & ~step::kExactBit);
+    if (bytes[0] != std::byte{uint8_t(Opcode::StrandKeyframe)}) return chain_number_;
+    return told == kFirstStepNumber ? told : number_;
+  }
   bool is_exact(std::span<const std::byte> bytes) const {
     return steps_ && bytes.size() > kFrameHeaderBytes &&
            bytes[0] == std::byte{uint8_t(Opcode::StrandDelta)} &&
-           bytes[kFrameHeaderBytes] == std::byte{static_cast<uint8_t>(number_ | step::kExactBit)};
+           (std::to_integer<uint8_t>(bytes[kFrameHeaderBytes]) ^ step::kExactBit) == spoken_number(bytes);
   }
 
   Result<std::shared_ptr<const Snapshot>> decode_exact(std::span<const std::byte> bytes) {
@@ -470,17 +503,25 @@ class Decoder final : public StrandDecoder {
     ByteReader body(message.body);
     const auto table_bytes = body.take<uint32_t>();
     const auto packed = body.take_bytes(table_bytes);
-    const step::Moment moment{snapshot.tick, snapshot.sim_time_ns, snapshot.world_from_head};
-    if (steps_ && body.ok()) RETURN_IF_ERROR(steps_->read_state(body, moment, layout_));
+    const step::Moment moment{snapshot.tick, snapshot.sim_time_ns, snapshot.world_from_head, snapshot.bust};
+    frame_.anchor_share = 1.0f;
+    if (steps_ && body.ok()) {
+      ASSIGN_OR_RETURN(const step::Rounding rounding, steps_->read_state(body, moment, layout_));
+      if (rounding == step::Rounding::Fine) frame_.anchor_share = kFineShare;
+    }
     take_into(body, frame_.shape_weights);
     if (!body.ok())
       return make_error(ErrorCode::BadInput, "keyframe of {} bytes is cut off in its tables or weights",
                         message.body.size());
     RETURN_IF_ERROR(read_tables(packed, chain));
+    const auto place = [&](uint32_t slice) { place_shape(set_, {layout_, chain.history, slice, frame_}); };
     Tables tables = chain.tables;
-    RETURN_IF_ERROR(read_slices(body.rest(), tables, no_sizes_, frame_.shape_codes, [&](uint32_t slice) {
-      place_shape(set_, {layout_, chain.history, slice, frame_});
-    }));
+    if (frame_.anchor_share < 1.0f) {
+      RETURN_IF_ERROR(read_slices_in_turn(body.rest(), tables, frame_.shape_codes));
+      for_each_part(decode_terms(layout_, workers_), layout_.slice_count(), place);
+    } else {
+      RETURN_IF_ERROR(read_slices(body.rest(), tables, no_sizes_, frame_.shape_codes, place));
+    }
     RETURN_IF_ERROR(give(message, frame_.lattice, snapshot));
     // Only now, with everything checked, the state moves on.
     frame_.head = {snapshot.world_from_head, {}};
@@ -514,6 +555,7 @@ class Decoder final : public StrandDecoder {
     chain_.head.follow(snapshot, (head.flags & kAnchorFlag) != 0);
     if ((head.flags & kAnchorFlag) != 0) {
       chain_.forget_motion(layout_);
+      if ((head.flags & step::kFineFlag) != 0) chain_.forget_tables();
       if (steps_) steps_->settle(chain_.history);
       return {};
     }
@@ -569,6 +611,10 @@ class Decoder final : public StrandDecoder {
     if (is_sparse && ((head.flags & step::kStepFlag) == 0 || (head.flags & kAnchorFlag) != 0))
       return make_error(ErrorCode::BadInput, "strand payload has flags {}, which do not go together",
                         head.flags);
+    const bool is_fine = (head.flags & step::kFineFlag) != 0;
+    if (is_fine && ((head.flags & step::kStepFlag) == 0 || (head.flags & kAnchorFlag) == 0))
+      return make_error(ErrorCode::BadInput, "strand payload has flags {}, which do not go together",
+                        head.flags);
     if (head.length_blend > kMaxLengthBlend)
       return make_error(ErrorCode::BadInput,
                         "strand payload blends lengths by {}/16, at most {} are possible", head.length_blend,
@@ -585,6 +631,7 @@ class Decoder final : public StrandDecoder {
       return make_error(ErrorCode::BadInput, "{} bytes have no room for what a delta begins with",
                         message.body.size());
     frame_.length_blend = head.length_blend;
+    frame_.anchor_share = (head.flags & step::kFineFlag) != 0 ? kFineShare : 1.0f;
     if ((head.flags & step::kStepFlag) != 0)
       frame_.head = {snapshot.world_from_head, {}};
     else
@@ -623,6 +670,20 @@ class Decoder final : public StrandDecoder {
     RETURN_IF_ERROR(check_spent(readers));
     tables = mean_tables(learnt);
     return {};
+  }
+
+  /// Reads `codes` of a fine anchor's slices, each with the tables that the one before ended with.
+  Status read_slices_in_turn(std::span<const std::byte> source, Tables& tables, Codes& codes) {
+    std::vector<ValueReader> readers(layout_.slice_count());
+    ASSIGN_OR_RETURN(const auto rest, open_slices(source, readers));
+    if (!rest.empty())
+      return make_error(ErrorCode::BadInput, "{} bytes follow the last slice of a strand payload",
+                        rest.size());
+    for (uint32_t slice = 0; slice < layout_.slice_count(); ++slice) {
+      SliceSymbols symbols[] = {{slice, tables, readers[slice]}};
+      read_symbols(set_, {layout_, no_sizes_, codes, next_sizes_, symbols});
+    }
+    return check_spent(readers);
   }
 
   /// The decoded positions, once they are checked.
@@ -664,6 +725,7 @@ class Decoder final : public StrandDecoder {
 
   simd::InstructionSet set_;
   const uint8_t number_;
+  uint8_t chain_number_ = number_;  // of its keyframe
   const std::unique_ptr<step::StepReader> steps_;
   StrandStreamLimits limits_;
   WorkerPool& workers_;

@@ -36,21 +36,21 @@ FeatureRows feature_rows(const Layout& layout, const History& history, const Fra
   return rows;
 }
 
-Escape make_escape(size_t at, const Lattice& target, const Lattice& from) {
+Escape make_escape(size_t at, const Lattice& target, const Lattice& from, int32_t step) {
   Escape escape;
   escape.at = at;
   for (size_t axis = 0; axis < 3; ++axis) {
     const int64_t way = int64_t{target[axis]} - from[axis];
-    const int64_t half = way < 0 ? -kEscapeStep / 2 : kEscapeStep / 2;
-    escape.step[axis] = static_cast<int32_t>((way + half) / kEscapeStep);
+    const int64_t half = way < 0 ? -step / 2 : step / 2;
+    escape.step[axis] = static_cast<int32_t>((way + half) / step);
   }
   return escape;
 }
 
-Lattice escaped(const Escape& escape, const Lattice& from) {
+Lattice escaped(const Escape& escape, const Lattice& from, int32_t step) {
   Lattice position;
   for (size_t axis = 0; axis < 3; ++axis) {
-    const uint32_t moved = static_cast<uint32_t>(escape.step[axis]) * uint32_t{kEscapeStep};
+    const uint32_t moved = static_cast<uint32_t>(escape.step[axis]) * static_cast<uint32_t>(step);
     position[axis] = wrapping_sum(from[axis], static_cast<int32_t>(moved));
   }
   return position;

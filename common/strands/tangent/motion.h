@@ -62,6 +62,9 @@ struct MotionClass {
   std::array<std::array<float, 4>, 3> head{};  // the steps of the head, weighted
 };
 
+/// Share of an anchor's steps that nobody sees: vertices are within 0.3 bounds.
+inline constexpr float kFineShare = 0.29f;
+
 using ShapeWeights = std::array<std::array<int16_t, kShapeFeatureCount>, kShapeClassCount>;
 
 /// State of both sides after the frames so far.
@@ -112,6 +115,7 @@ struct Frame {
   uint8_t length_blend = 0;  // of the last decoded length against the rest length, in 1/16
   Codes codes;
   ShapeWeights shape_weights{};  // of an anchor
+  float anchor_share = 1.0f;     // of the steps of its integers
   Codes shape_codes;             // of an anchor, for who has no history
   Planes<int32_t> lattice;
   Planes<float> velocity;

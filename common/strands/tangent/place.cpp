@@ -17,8 +17,8 @@ STRANDCAST_LANES CodeLanes load_codes(const Codes& codes, size_t at) {
 /// Goes through the escapes of a slice with its blocks.
 class EscapeWalk {
  public:
-  explicit EscapeWalk(const std::vector<Escape>& escapes)
-      : next_(escapes.data()), end_(escapes.data() + escapes.size()) {}
+  explicit EscapeWalk(const std::vector<Escape>& escapes, int32_t step = kEscapeStep)
+      : next_(escapes.data()), end_(escapes.data() + escapes.size()), step_(step) {}
 
   /// Puts the escaped vertices of the block that begins at `at` where they belong; from() is where their
   /// escapes count from.
@@ -30,7 +30,7 @@ class EscapeWalk {
     const BlockPositions begin(from());
     for (; next_ != end_ && next_->at < at + kLaneCount; ++next_) {
       const size_t lane = next_->at - at;
-      points.set(lane, escaped(*next_, begin.get(lane)));
+      points.set(lane, escaped(*next_, begin.get(lane), step_));
     }
     position = points.load();
   }
@@ -38,6 +38,7 @@ class EscapeWalk {
  private:
   const Escape* next_;
   const Escape* end_;
+  const int32_t step_;
 };
 
 STRANDCAST_LANES void place_slice_lanes(const SliceWork& of) {
@@ -62,10 +63,11 @@ STRANDCAST_LANES void place_step_lanes(const SliceWork& of) {
 }
 
 STRANDCAST_LANES void place_anchor_lanes(const SliceWork& of) {
-  EscapeWalk escapes(of.frame.codes.escapes[of.slice]);
+  EscapeWalk escapes(of.frame.codes.escapes[of.slice], escape_step(of.frame.anchor_share));
   for_each_block(of, [&](const MotionRow& row, size_t place, const Expected& moved) STRANDCAST_LANES_LAMBDA {
     const ShapeRow shape(of.layout, of.history.quantum_m, of.frame.lattice, row.vertex());
-    const Expected expected = shape.expect(place, of.frame.shape_weights);
+    Expected expected = shape.expect(place, of.frame.shape_weights);
+    expected.refine(of.frame.anchor_share);
     const size_t at = row.at(place);
     IntLaneVectors position =
         expected.placed(sum_of(expected.codes_of(moved), load_codes(of.frame.codes, at)));
@@ -75,12 +77,13 @@ STRANDCAST_LANES void place_anchor_lanes(const SliceWork& of) {
 }
 
 STRANDCAST_LANES void place_shape_lanes(const SliceWork& of) {
-  EscapeWalk escapes(of.frame.shape_codes.escapes[of.slice]);
+  EscapeWalk escapes(of.frame.shape_codes.escapes[of.slice], escape_step(of.frame.anchor_share));
   for (uint32_t v = 0; v < of.layout.vertex_count; ++v) {
     const ShapeRow shape(of.layout, of.history.quantum_m, of.frame.lattice, v);
     for (size_t place = of.layout.slice_begin[of.slice]; place < of.layout.slice_begin[of.slice + 1];
          place += kLaneCount) {
-      const Expected expected = shape.expect(place, of.frame.shape_weights);
+      Expected expected = shape.expect(place, of.frame.shape_weights);
+      expected.refine(of.frame.anchor_share);
       const size_t at = shape.at(place);
       IntLaneVectors position = expected.placed(load_codes(of.frame.shape_codes, at));
       escapes.place(at, position, [&]() STRANDCAST_LANES_LAMBDA { return expected.base; });

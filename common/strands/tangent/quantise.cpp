@@ -10,6 +10,7 @@ namespace {
 
 // What is left of the bound when positions were rounded to the lattice (sqrt(3) / 2) and to floats before.
 constexpr int32_t kReach = kStepsPerBound - 3;
+constexpr int32_t kFineReach = 76;
 
 /// The cheapest integers that put vertices within reach of their targets. Cheap are those near `origin`: a
 /// dead zone as wide as the bound allows.
@@ -17,6 +18,7 @@ struct Found {
   const Expected& expected;
   const IntLaneVectors& target;
   const CodeLanes& origin;
+  float reach_squared = static_cast<float>(kReach * kReach);
   IntLanes is_open;  // worth trying
   IntLanes is_found;
   CodeLanes codes;
@@ -42,7 +44,7 @@ struct Found {
     for (size_t axis = 0; axis < 3; ++axis)
       away.axis[axis] = to_floats(wrapping_differences(reached.axis[axis], target.axis[axis]));
     // Exact: squares this small are whole numbers below 2^24, and larger ones stay larger.
-    const IntLanes is_taken = is_open & (dots(away, away) <= static_cast<float>(kReach * kReach));
+    const IntLanes is_taken = is_open & (dots(away, away) <= reach_squared);
     codes.first = is_taken ? tried.first : codes.first;
     codes.second = is_taken ? tried.second : codes.second;
     codes.length = is_taken ? tried.length : codes.length;
@@ -109,22 +111,24 @@ struct EscapingBlock {
   BlockPositions from;  // where escapes count from
   BlockPositions position;
   BlockPositions codes;  // first, second and length
+  int32_t step;
   int32_t is_found[kLaneCount];
 };
 
 __attribute__((noinline)) void escape_others(EscapingBlock& block, std::vector<Escape>& escapes) {
   for (uint32_t lane = 0; lane < kLaneCount; ++lane) {
     if (block.is_found[lane] != 0) continue;
-    escapes.push_back(make_escape(block.at + lane, block.target.get(lane), block.from.get(lane)));
+    escapes.push_back(make_escape(block.at + lane, block.target.get(lane), block.from.get(lane), block.step));
     block.codes.set(lane, {0, 0, kEscapedLength});
-    block.position.set(lane, escaped(escapes.back(), block.from.get(lane)));
+    block.position.set(lane, escaped(escapes.back(), block.from.get(lane), block.step));
   }
 }
 
 /// Escapes the vertices of the block that begins at `at` for which nothing was found; from() is where their
 /// escapes count from.
 template <class From>
-STRANDCAST_LANES void escape_others(Found& found, size_t at, std::vector<Escape>& escapes, From from) {
+STRANDCAST_LANES void escape_others(Found& found, size_t at, std::vector<Escape>& escapes, From from,
+                                    int32_t step = kEscapeStep) {
   if (!is_any(~found.is_found)) [[likely]]
     return;
   EscapingBlock block{at,
@@ -132,6 +136,7 @@ STRANDCAST_LANES void escape_others(Found& found, size_t at, std::vector<Escape>
                       BlockPositions(from()),
                       BlockPositions(found.position),
                       BlockPositions({found.codes.first, found.codes.second, found.codes.length}),
+                      step,
                       {}};
   store_lanes(found.is_found, block.is_found);
   escape_others(block, escapes);
@@ -182,14 +187,17 @@ STRANDCAST_LANES void quantise_anchor_lanes(const QuantiseWork& work) {
   const SliceWork& of = work.of;
   for_each_block(of, [&](const MotionRow& row, size_t place, const Expected& moved) STRANDCAST_LANES_LAMBDA {
     const ShapeRow shape(of.layout, of.history.quantum_m, of.frame.lattice, row.vertex());
-    const Expected expected = shape.expect(place, of.frame.shape_weights);
+    Expected expected = shape.expect(place, of.frame.shape_weights);
+    expected.refine(of.frame.anchor_share);
     const size_t at = row.at(place);
     const IntLaneVectors wanted = load_vectors(work.target, at);
     const CodeLanes origin = expected.codes_of(moved);
     Found found(expected, wanted, origin);
+    if (of.frame.anchor_share < 1.0f) found.reach_squared = static_cast<float>(kFineReach * kFineReach);
     find_codes(found);
-    escape_others(found, at, of.frame.shape_codes.escapes[of.slice],
-                  [&]() STRANDCAST_LANES_LAMBDA { return expected.base; });
+    escape_others(
+        found, at, of.frame.shape_codes.escapes[of.slice],
+        [&]() STRANDCAST_LANES_LAMBDA { return expected.base; }, escape_step(of.frame.anchor_share));
     store_codes(found.codes, of.frame.shape_codes, at);
     store_codes(found.apart(), of.frame.codes, at);
     row.store(moved, place, found.position);

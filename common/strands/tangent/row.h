@@ -150,8 +150,12 @@ STRANDCAST_LANES CodeLanes sum_of(const CodeLanes& a, const CodeLanes& b) {
 
 /// Lattice position of an escaped vertex, and the escape that codes it.
 using Lattice = std::array<int32_t, 3>;
-Escape make_escape(size_t at, const Lattice& target, const Lattice& from);
-Lattice escaped(const Escape& escape, const Lattice& from);
+Escape make_escape(size_t at, const Lattice& target, const Lattice& from, int32_t step = kEscapeStep);
+Lattice escaped(const Escape& escape, const Lattice& from, int32_t step = kEscapeStep);
+/// Step of the escapes of an anchor.
+constexpr int32_t escape_step(float anchor_share) {
+  return static_cast<int32_t>(anchor_share * static_cast<float>(kEscapeStep));
+}
 
 /// Positions of a block, addressable vertex by vertex.
 struct BlockPositions {
@@ -177,7 +181,14 @@ struct Expected {
   LaneVectors first;
   LaneVectors second;
   Lanes length;
+  float tangent_step = kTangentStep;
+  float length_step = kLengthStep;
 
+  /// Makes steps smaller.
+  STRANDCAST_LANES void refine(float share) {
+    tangent_step = share * kTangentStep;
+    length_step = share * kLengthStep;
+  }
   /// Sets direction and length to those of `edge`.
   STRANDCAST_LANES void aim(const LaneVectors& edge) {
     const Lanes squared = dots(edge, edge);
@@ -219,11 +230,11 @@ struct Expected {
     const Lanes beside = dots(edge, along);
     const Lanes size = square_roots(dots(edge, edge));
     // Seen from the vertex before, where the direction of the edge meets the tangent plane.
-    const Lanes scale = size > 0.0f ? length / beside / kTangentStep : Lanes{};
+    const Lanes scale = size > 0.0f ? length / beside / tangent_step : Lanes{};
     Coordinates of;
     of.first = dots(edge, first) * scale;
     of.second = dots(edge, second) * scale;
-    of.length = (size - length) / kLengthStep;
+    of.length = (size - length) / length_step;
     const IntLanes is_steep = (size > 0.0f) & ~(beside > kSteepest * size);
     of.is_possible = ~is_steep & (sizes_of(of.first) < kFarthest) & (sizes_of(of.second) < kFarthest) &
                      (sizes_of(of.length) < kFarthest);
@@ -243,13 +254,13 @@ struct Expected {
 
   /// Returns the positions that integers decode to, clamped to the range where rounding holds.
   STRANDCAST_LANES IntLaneVectors placed(const CodeLanes& codes) const {
-    const Lanes across = to_floats(codes.first) * kTangentStep;
-    const Lanes also = to_floats(codes.second) * kTangentStep;
+    const Lanes across = to_floats(codes.first) * tangent_step;
+    const Lanes also = to_floats(codes.second) * tangent_step;
     LaneVectors edge;
     for (size_t axis = 0; axis < 3; ++axis)
       edge.axis[axis] = (along.axis[axis] * length + first.axis[axis] * across) + second.axis[axis] * also;
     const Lanes squared = dots(edge, edge);
-    const Lanes wanted = length + to_floats(codes.length) * kLengthStep;
+    const Lanes wanted = length + to_floats(codes.length) * length_step;
     const Lanes scale = squared > kTinySquared ? wanted / square_roots(squared) : Lanes{};
     IntLaneVectors position;
     for (size_t axis = 0; axis < 3; ++axis)

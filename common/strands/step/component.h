@@ -1,0 +1,92 @@
+// What of a predictor's state is coded: a component of the strands of a slice, and vectors of blocks by
+// place. Header only; private to common/strands/step.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "common/kernels/strand_blocks.h"
+#include "common/strands/step/lanes.h"
+#include "common/strands/step/numbers.h"
+#include "common/strands/tangent/layout.h"
+#include "common/strands/wrapping.h"
+
+namespace strandcast::step {
+
+/// One component of the strands of a slice, in steps, told beside what the vertex before has and how the two
+/// neighbours (in the first block the strand before, alone) go on from there.
+class Component {
+ public:
+  Component(const tangent::Layout& layout, uint32_t slice, uint32_t vertex_count, NumberTables& tables)
+      : tables_(tables),
+        layout_(layout),
+        begin_(layout.slice_begin[slice]),
+        vertex_count_(vertex_count),
+        values_(size_t{layout.strands_in[slice] + 1} * vertex_count) {}  // the first strand follows zeros
+
+  /// One strand; value_at(v) gives what it has there.
+  template <class ValueAt>
+  void put_strand(size_t place, ValueWriter& writer, ValueAt value_at) {
+    SymbolStep* next = writer.begin_run(vertex_count_);
+    visit(place, [&](uint32_t v, int32_t expected) {
+      const int32_t value = value_at(v);
+      tables_.put(wrapping_difference(value, expected), writer, next);
+      return value;
+    });
+    writer.end_run(next);
+  }
+  template <class Give>
+  void take_strand(size_t place, ValueReader& reader, Give give) {
+    SymbolCursor cursor = reader.begin_run(vertex_count_);
+    visit(place, [&](uint32_t v, int32_t expected) {
+      const int32_t value = wrapping_sum(expected, tables_.take(reader, cursor));
+      give(v, value);
+      return value;
+    });
+    reader.end_run(cursor);
+  }
+
+ private:
+  const int32_t* strand_at(size_t place) const {
+    return values_.data() + (place + 1 - begin_) * vertex_count_;
+  }
+  template <class Code>
+  void visit(size_t place, Code code) {
+    std::array<const int32_t*, 2> beside;
+    for (size_t i = 0; i < beside.size(); ++i) {
+      const size_t near = layout_.neighbour[i][place];
+      beside[i] = near == layout_.no_neighbour() ? strand_at(place) - vertex_count_ : strand_at(near);
+    }
+    int32_t* const own = values_.data() + (place + 1 - begin_) * vertex_count_;
+    for (uint32_t v = 0; v < vertex_count_; ++v) {
+      int64_t way = int64_t{beside[0][v]} + beside[1][v];
+      if (v > 0) way -= int64_t{beside[0][v - 1]} + beside[1][v - 1];
+      const auto expected = static_cast<int32_t>(way / 2 + (v == 0 ? 0 : own[v - 1]));
+      own[v] = code(v, expected);
+    }
+  }
+
+  NumberTables& tables_;
+  const tangent::Layout& layout_;
+  size_t begin_;
+  uint32_t vertex_count_;
+  std::vector<int32_t> values_;
+};
+
+inline float at(const StrandBlocks& blocks, size_t place, uint32_t v, uint32_t axis) {
+  return blocks.row(static_cast<uint32_t>(place / kBlockStrands), v, axis)[place % kBlockStrands];
+}
+inline float& at(StrandBlocks& blocks, size_t place, uint32_t v, uint32_t axis) {
+  return blocks.row(static_cast<uint32_t>(place / kBlockStrands), v, axis)[place % kBlockStrands];
+}
+inline glm::vec3 vector_at(const StrandBlocks& blocks, size_t place, uint32_t v) {
+  return {at(blocks, place, v, 0), at(blocks, place, v, 1), at(blocks, place, v, 2)};
+}
+inline float dot_of(const glm::vec3& a, const glm::vec3& b) {
+  return (a.x * b.x + a.y * b.y) + a.z * b.z;
+}
+
+}  // namespace strandcast::step

@@ -1,0 +1,271 @@
+// What a predictor tells joiners of frames that steps foretell, and goes on with itself: everybody takes the
+// rounded strands over, the simulation too, so that roundings are too fine to be seen.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/strands/step/component.h"
+#include "common/strands/step/predictor.h"
+
+namespace strandcast::step {
+namespace {
+
+constexpr float kFineVelocityStepMps = 1.0f / 880.0f;  // in three directions: 0.99 mm/s at most
+constexpr float kParentShare = 0.9f;  // of how the vertex before goes on otherwise than its neighbours
+constexpr float kShortestSquared = 1e-14f;
+constexpr int32_t kStepsOfQuarter = 32;                                // of a turn; a power of two
+constexpr float kTwistTangent = 0.82842712f / float{kStepsOfQuarter};  // of half a step's angle, in the mean
+constexpr uint32_t kTurnMask = uint32_t{4 * kStepsOfQuarter - 1};
+
+/// Of everything that is told finely.
+struct FineTables {
+  std::array<NumberTables, 2> velocity;  // across edges, along them
+  Predictor::ComponentTables component;
+};
+
+/// A vector's parts along an edge and across it.
+struct EdgeFrame {
+  glm::vec3 along{0.0f, 1.0f, 0.0f};
+  glm::vec3 first;
+  glm::vec3 second;
+
+  /// Of the edge from a to b; edges without length go on as the one before.
+  void aim(const glm::vec3& a, const glm::vec3& b) {
+    const glm::vec3 edge = b - a;
+    const float squared = dot_of(edge, edge);
+    if (squared > kShortestSquared) along = edge * (1.0f / std::sqrt(squared));
+    const float sign = along.z >= 0.0f ? 1.0f : -1.0f;
+    const float p = -1.0f / (sign + along.z);
+    const float q = along.x * along.y * p;
+    first = {1.0f + sign * (along.x * along.x * p), sign * q, -sign * along.x};
+    second = {q, sign + along.y * along.y * p, -along.y};
+  }
+  /// Parts across, and the one along as it is given.
+  glm::vec3 parts_of(const glm::vec3& vector, float part_along) const {
+    return {dot_of(vector, first), dot_of(vector, second), part_along};
+  }
+  glm::vec3 sum_of(const glm::vec3& parts) const {
+    return (parts.x * first + parts.y * second) + parts.z * along;
+  }
+};
+
+template <class Work>
+void for_slices(const PredictorGround& ground, const Work& work) {
+  tangent::for_each_part(tangent::encode_terms(ground.layout, ground.workers), ground.layout.slice_count(),
+                         work);
+}
+/// First vertex of a slice and the one after its last, strand by strand.
+std::pair<size_t, size_t> vertices_of(const tangent::Layout& layout, uint32_t slice) {
+  const size_t first = layout.slice_begin[slice];
+  return {first * layout.vertex_count, (first + layout.strands_in[slice]) * layout.vertex_count};
+}
+
+/// Of a change of velocity, what is no noise: roundings alone make strands at rest move by as much.
+float beyond_noise(float change_mps) {
+  constexpr float kNoiseMps = 0.004f;
+  const float above = change_mps < kNoiseMps ? kNoiseMps : change_mps;
+  const float below = change_mps > -kNoiseMps ? -kNoiseMps : change_mps;
+  return (above - kNoiseMps) + (below + kNoiseMps);
+}
+
+int32_t whole_steps_of(float value) {
+  const float low = value > -kMostSteps ? value : -kMostSteps;  // also what is no number
+  const float within = low < kMostSteps ? low : kMostSteps;
+  constexpr float kRounder = 12582912.0f;  // 1.5 * 2^23: floats there are whole numbers
+  return static_cast<int32_t>((within + kRounder) - kRounder);
+}
+
+}  // namespace
+
+/// Visits the velocities of a slice, in steps beside what is expected from the vertex before and the
+/// neighbours: across an edge how they go on there, along it how fast theirs grow, which is next to nothing.
+/// steps(first, wanted) gives three whole numbers.
+template <class Steps>
+void Predictor::visit_velocities(uint32_t slice, Steps steps) {
+  const tangent::Layout& layout = ground_.layout;
+  const uint32_t vertex_count = model_.vertex_count;
+  const StrandBlocks& position = *moving(PlaneRole::Position);
+  StrandBlocks& velocity = *moving(PlaneRole::Velocity);
+  const size_t begin = layout.slice_begin[slice];
+  // Of each strand, w = along its edges; the first one follows zeros.
+  std::vector<glm::vec4> changes(size_t{layout.strands_in[slice] + 1} * vertex_count, glm::vec4(0.0f));
+  for (size_t place = begin; place < begin + layout.strands_in[slice]; ++place) {
+    const auto changes_at = [&](size_t other) { return changes.data() + (other + 1 - begin) * vertex_count; };
+    std::array<const glm::vec4*, 2> beside;
+    for (size_t i = 0; i < beside.size(); ++i) {
+      const size_t near = layout.neighbour[i][place];
+      beside[i] = near == layout.no_neighbour() ? changes_at(place) - vertex_count : changes_at(near);
+    }
+    EdgeFrame frame;
+    glm::vec3 apart(0.0f);  // of the vertex before
+    glm::vec3 speed(0.0f);
+    for (uint32_t v = 0; v < vertex_count; ++v) {
+      const glm::vec4 near = 0.5f * (beside[0][v] + beside[1][v]);
+      const glm::vec3 expected = glm::vec3(near) + kParentShare * apart;
+      const glm::vec3 wanted = vector_at(velocity, place, v) - speed;
+      if (v > 0) frame.aim(vector_at(position, place, v - 1), vector_at(position, place, v));
+      const glm::vec3 about = v > 0 ? frame.parts_of(expected, near.w) : expected;
+      const glm::vec3 parts = v > 0 ? frame.parts_of(wanted, dot_of(wanted, frame.along)) : wanted;
+      const std::array<int32_t, 3> found =
+          steps(3 * (place * vertex_count + v), (parts - about) * (1.0f / kFineVelocityStepMps));
+      glm::vec3 rounded;
+      for (int i = 0; i < 3; ++i)
+        rounded[i] = about[i] + kFineVelocityStepMps * static_cast<float>(found[static_cast<size_t>(i)]);
+      const glm::vec3 change = v > 0 ? frame.sum_of(rounded) : rounded;
+      changes_at(place)[v] = glm::vec4(change, v > 0 ? rounded.z : 0.0f);
+      apart = v > 0 ? change - glm::vec3(near) : glm::vec3(0.0f);
+      speed += change;
+      for (uint32_t axis = 0; axis < 3; ++axis) at(velocity, place, v, axis) = speed[static_cast<int>(axis)];
+    }
+  }
+}
+
+/// Forgets what a step finds again (find_history).
+void Predictor::forget_history() {
+  state_.is_body_known = false;  // joiners do not
+  if (!kernel_.carries_way) return;
+  state_.is_history_known = false;
+  for (const PlaneRole role : {PlaneRole::Displacement, PlaneRole::VelocityChange}) {
+    StrandBlocks& blocks = *moving(role);
+    std::fill_n(blocks.data(), blocks.size(), 0.0f);
+  }
+  StrandBlocks& velocity = *moving(PlaneRole::Velocity);
+  for (uint32_t block = 0; block < block_count(); ++block)
+    for (uint32_t v = 0; v < model_.vertex_count; ++v)
+      std::fill_n(velocity.row(block, v, 3), kBlockStrands, 0.0f);
+}
+
+void Predictor::settle_finely(const tangent::Planes<int32_t>& decoded, float quantum_m) {
+  is_fine_ = true;
+  forget_history();
+  put_positions(decoded, quantum_m);
+  velocity_steps_.resize(3 * size_t{places_} * model_.vertex_count);
+  for_slices(ground_, [&](uint32_t slice) {
+    visit_velocities(slice, [&](size_t first, const glm::vec3& wanted) {
+      std::array<int32_t, 3> found;
+      for (size_t i = 0; i < 3; ++i) found[i] = whole_steps_of(wanted[static_cast<int>(i)]);
+      std::copy(found.begin(), found.end(), &velocity_steps_[first]);
+      return found;
+    });
+  });
+  settle_planes();
+  if (moving(PlaneRole::RodAxis) == nullptr) return;
+  twist(
+      [](const TwistedAxis& of, int32_t, int32_t before) {
+        const float c = dot_of(of.axis, of.found);
+        const float s = dot_of(of.axis, of.side);
+        const bool is_beside = std::abs(s) > std::abs(c);
+        const int32_t quarter = is_beside ? (s > 0.0f ? 1 : 3) : (c > 0.0f ? 0 : 2);
+        const float c_there = is_beside ? std::abs(s) : std::abs(c);
+        const float s_there = quarter == 0 ? s : quarter == 1 ? -c : quarter == 2 ? -s : c;
+        const float steps = s_there / (1.0f + c_there) / kTwistTangent;
+        const int32_t turned = kStepsOfQuarter * quarter +
+                               std::clamp(whole_steps_of(steps), -kStepsOfQuarter / 2, kStepsOfQuarter / 2);
+        // The nearest to the one before that means the same.
+        const uint32_t way = static_cast<uint32_t>(turned - before + 2 * kStepsOfQuarter) & kTurnMask;
+        return before + static_cast<int32_t>(way) - 2 * kStepsOfQuarter;
+      },
+      turn_of_fine_steps);
+}
+
+Predictor::TwistTurn Predictor::turn_of_fine_steps(int32_t steps) {
+  const uint32_t turned = (static_cast<uint32_t>(steps) + uint32_t{kStepsOfQuarter / 2}) & kTurnMask;
+  const auto beside = static_cast<int32_t>(turned % uint32_t{kStepsOfQuarter}) - kStepsOfQuarter / 2;
+  const float t = kTwistTangent * static_cast<float>(beside);
+  const float c = 1.0f - t * t;
+  const float s = 2.0f * t;
+  const float scale = 1.0f / (1.0f + t * t);
+  switch (turned / uint32_t{kStepsOfQuarter}) {
+    case 0:
+      return {c, s, scale};
+    case 1:
+      return {-s, c, scale};
+    case 2:
+      return {-c, -s, scale};
+    default:
+      return {s, -c, scale};
+  }
+}
+
+/// All slices by the same tables, one after the other: learning anew would cost more than they gain by
+/// threads.
+void Predictor::write_fine(ValueWriter& writer) const {
+  FineTables tables;
+  for (uint32_t slice = 0; slice < ground_.layout.slice_count(); ++slice) {
+    const auto [begin, end] = vertices_of(ground_.layout, slice);
+    for (size_t vertex = begin; vertex < end; ++vertex)
+      for (size_t i = 0; i < 3; ++i) tables.velocity[i / 2].put(velocity_steps_[3 * vertex + i], writer);
+    write_planes(slice, tables.component, writer);
+  }
+}
+
+void Predictor::read_fine(ValueReader& reader) {
+  constexpr auto kMost = static_cast<int32_t>(kMostSteps);
+  FineTables tables;
+  for (uint32_t slice = 0; slice < ground_.layout.slice_count(); ++slice) {
+    const auto [begin, end] = vertices_of(ground_.layout, slice);
+    for (size_t vertex = begin; vertex < end; ++vertex)
+      for (size_t i = 0; i < 3; ++i)
+        velocity_steps_[3 * vertex + i] = std::clamp(tables.velocity[i / 2].take(reader), -kMost, kMost);
+    read_planes(slice, history_s_, tables.component, reader);
+  }
+}
+
+void Predictor::place_velocities() {
+  forget_history();
+  for_slices(ground_, [&](uint32_t slice) {
+    visit_velocities(slice, [&](size_t first, const glm::vec3&) {
+      return std::array{velocity_steps_[first], velocity_steps_[first + 1], velocity_steps_[first + 2]};
+    });
+  });
+}
+
+/// What strands remember of the last substep follows from where they are and how fast: it is what the next
+/// one would leave behind if there had been none before. The way is that of a velocity that changes evenly.
+void Predictor::find_history(const StepInput& first) {
+  constexpr float kHalf = 0.5f;
+  state_.is_history_known = true;
+  const auto seconds = static_cast<float>(limited_substep_s(first));
+  const auto for_rows = [&](const auto& work) {
+    for_blocks([&](uint32_t begin, uint32_t end) {
+      for (uint32_t block = begin; block < end; ++block)
+        for (uint32_t v = 0; v < model_.vertex_count; ++v) work(block, v);
+    });
+  };
+  const auto way_with = [&](StrandBlocks& way, const StrandBlocks& velocity) {
+    for_rows([&](uint32_t block, uint32_t v) {
+      for (size_t i = 0; i < 3 * kBlockStrands; ++i)
+        way.row(block, v, 0)[i] = seconds * velocity.row(block, v, 0)[i];
+    });
+  };
+  way_with(*moving(PlaneRole::Displacement), *moving(PlaneRole::Velocity));
+  State known;
+  copy(state_, known);
+  std::unique_ptr<StrandBlocks> field_before;
+  copy_blocks(field_before_, field_before);
+  run(first);
+  std::swap(field_before_, field_before);
+  std::swap(state_, known);
+  const auto found = [&](PlaneRole role) -> const StrandBlocks& {
+    return *known.planes[static_cast<size_t>(role)];
+  };
+  const uint32_t tail = model_.vertex_count - model_.pinned_tail_count;
+  for_rows([&](uint32_t block, uint32_t v) {
+    const bool is_free = v >= model_.pinned_root_count && v < tail;
+    const float half_s = is_free ? kHalf * seconds : 0.0f;
+    float* const velocity = moving(PlaneRole::Velocity)->row(block, v, 0);
+    float* const way = moving(PlaneRole::Displacement)->row(block, v, 0);
+    const float* const next = found(PlaneRole::Velocity).row(block, v, 0);
+    for (size_t i = 0; i < 3 * kBlockStrands; ++i) way[i] -= half_s * beyond_noise(next[i] - velocity[i]);
+    constexpr size_t kW = 3 * kBlockStrands;
+    for (size_t i = 0; i < kW; ++i)
+      moving(PlaneRole::VelocityChange)->row(block, v, 0)[i] =
+          beyond_noise(found(PlaneRole::VelocityChange).row(block, v, 0)[i]);
+    std::copy_n(next + kW, kBlockStrands, velocity + kW);
+    std::copy_n(found(PlaneRole::Displacement).row(block, v, 3), kBlockStrands, way + kW);
+    if (StrandBlocks* axes = moving(PlaneRole::RodAxis))
+      std::copy_n(found(PlaneRole::RodAxis).row(block, v, 3), kBlockStrands, axes->row(block, v, 3));
+  });
+}
+
+}  // namespace strandcast::step
