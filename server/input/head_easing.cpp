@@ -50,7 +50,9 @@ void HeadEasing::hear_again(const Pose& seen, double since_s, double passed_s) {
                     turned(seen.rotation, -passed_s * turn_.seen_per_s)};
   place_.away = shown_.position_m - before.position_m;
   turn_.away = turn_between(before.rotation, shown_.rotation);
-  for (Part* part : {&place_, &turn_}) part->away_per_s = part->shown_per_s - part->seen_per_s;
+  time_.seen_per_s.x = 1.0;
+  time_.away.x = ahead_s() - (since_s - passed_s);
+  for (Part* part : {&place_, &turn_, &time_}) part->away_per_s = part->shown_per_s - part->seen_per_s;
   silent_s_ = 0.0;
 }
 
@@ -60,28 +62,34 @@ Pose HeadEasing::follow(const Pose& seen, double since_s, double passed_s) {
   } else if (passed_s > 0.0) {
     place_.seen_per_s = (seen.position_m - heard_.position_m) / passed_s;
     turn_.seen_per_s = turn_between(heard_.rotation, seen.rotation) / passed_s;
+    time_.seen_per_s.x = since_s / passed_s;
     knows_speed_ = true;
   }
   heard_ = reached_ = seen;
-  return show(passed_s);
+  reached_s_ = 0.0;
+  return show(passed_s, since_s);
 }
 
 Pose HeadEasing::coast(double passed_s) {
   silent_s_ += passed_s;
   reached_.position_m = heard_.position_m + place_.slowed(silent_s_);
   reached_.rotation = turned(heard_.rotation, turn_.slowed(silent_s_));
-  return show(passed_s);
+  reached_s_ = time_.slowed(silent_s_).x;
+  return show(passed_s, 0.0);
 }
 
-Pose HeadEasing::show(double passed_s) {
-  place_.approach(passed_s);
-  turn_.approach(passed_s);
+/// `heard_s`: by which the source's time went on since the frame before, as it was heard.
+Pose HeadEasing::show(double passed_s, double heard_s) {
+  const double before_s = shown_s_;
+  for (Part* part : {&place_, &turn_, &time_}) part->approach(passed_s);
+  shown_s_ = ahead_s();
   Pose shown = reached_;
   if (place_.away != glm::dvec3(0.0)) shown.position_m += place_.away;
   shown.rotation = turned(shown.rotation, turn_.away);
   if (passed_s > 0.0) {
     place_.shown_per_s = (shown.position_m - shown_.position_m) / passed_s;
     turn_.shown_per_s = turn_between(shown_.rotation, shown.rotation) / passed_s;
+    time_.shown_per_s.x = (heard_s + shown_s_ - before_s) / passed_s;
   }
   return shown_ = shown;
 }

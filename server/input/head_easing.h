@@ -36,9 +36,13 @@ class HeadEasing {
   /// slows by no more than kEasyStart, for at most kLongestSlowingS. A head on its way back to the source
   /// goes on with that meanwhile.
   Pose coast(double passed_s);
+  /// Returns how much later the source says what is shown than what it said last, in its time, s.
+  double ahead_s() const { return reached_s_ + time_.away.x; }
 
  private:
-  /// Place (m) or turn (rad, world axes) of the head.
+  static constexpr double kSwiftTime = 1e9;  // time is never what slows the head
+
+  /// Place (m) or turn (rad, world axes) of the head, or time (s).
   struct Part {
     double easy_per_s2 = 0.0;     // greatest acceleration
     glm::dvec3 seen_per_s{0.0};   // speed when the source spoke last
@@ -50,14 +54,17 @@ class HeadEasing {
     void approach(double passed_s);
   };
   void hear_again(const Pose& seen, double since_s, double passed_s);
-  Pose show(double passed_s);
+  Pose show(double passed_s, double heard_s);
 
   Part place_{.easy_per_s2 = kEasyStart.mps2};
   Part turn_{.easy_per_s2 = kEasyStart.rad_per_s2};
-  Pose heard_;             // what the source said last
-  Pose reached_;           // where the source is taken to be since
-  Pose shown_;             // in the newest frame
-  double silent_s_ = 0.0;  // since the frame that showed heard_; 0: the source speaks
+  Part time_{.easy_per_s2 = kSwiftTime};  // of the source, along x: it slows and returns as the head does
+  double shown_s_ = 0.0;                  // ahead_s() of the newest frame
+  double reached_s_ = 0.0;                // as reached_, in the source's time after heard_
+  Pose heard_;                            // what the source said last
+  Pose reached_;                          // where the source is taken to be since
+  Pose shown_;                            // in the newest frame
+  double silent_s_ = 0.0;                 // since the frame that showed heard_; 0: the source speaks
   bool knows_speed_ = false;
 };
 

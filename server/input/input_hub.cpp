@@ -276,9 +276,6 @@ InputHub::SeenHead InputHub::see_head(int64_t server_time_ns) {
     for (size_t i = 0; is_same_body && i < frame_.joints.place_m.size(); ++i)
       frame_.joints.place_m[i] = glm::mix(frame_.joints.place_m[i], glm::dvec3(next.joint_m[i]), blend);
   }
-  // A head that is not heard moves on, and so does the count.
-  if (seen.is_silent && frame_.timecode)
-    frame_.timecode = later(*frame_.timecode, std::max<int64_t>(time_ns - samples[newest].time_ns, 0));
   // Both signs are the same rotation; consecutive frames keep to one so that their difference is small.
   if (glm::dot(pose.rotation, frame_.world_from_head.rotation) < 0.0) pose.rotation = -pose.rotation;
   seen.pose = pose;
@@ -358,7 +355,13 @@ void InputHub::show_head(const SeenHead& seen, int64_t server_time_ns) {
   else
     head = easing_.follow(seen.pose, std::max(since_s, kTeleportShortestS), std::max(passed_s, 0.0));
   if (!is_possible(head)) easing_.restart(head = seen.pose);  // at the edge of the world
-  if (has_jumped || !is_silent) heard_ns_ = seen.time_ns;
+  if (has_jumped || !is_silent) {
+    heard_ns_ = seen.time_ns;
+    heard_timecode_ = frame_.timecode;
+  }
+  // A head that coasts, or eases back, shows another time than its source says.
+  if (heard_timecode_)
+    frame_.timecode = advanced(*heard_timecode_, easing_.ahead_s() * heard_timecode_->rate.hz());
   frame_.has_teleported = has_jumped || seen.has_caught_up;
   if (frame_.has_teleported) ++counters_.teleports;
 }

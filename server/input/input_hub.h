@@ -183,12 +183,13 @@ class InputHub {
   std::optional<int64_t> last_frame_ns_;
   std::optional<int64_t> shown_ns_;  // time of the head's source that the last frame shows
   HeadEasing easing_;
-  int64_t heard_ns_ = 0;          // SeenHead::time_ns of the last that was not silent
-  double steady_delay_ns_ = 0.0;  // by which uneven samples are shown later
-  bool has_left_ = false;         // the source that drove the head, since the last frame
-  double motion_speed_ = 1.0;     // as the owner said last
-  TimecodeClock timecodes_;       // that came without motion
-  InputFrame frame_;              // the last one given out
+  int64_t heard_ns_ = 0;                    // SeenHead::time_ns of the last that was not silent
+  std::optional<Timecode> heard_timecode_;  // likewise
+  double steady_delay_ns_ = 0.0;            // by which uneven samples are shown later
+  bool has_left_ = false;                   // the source that drove the head, since the last frame
+  double motion_speed_ = 1.0;               // as the owner said last
+  TimecodeClock timecodes_;                 // that came without motion
+  InputFrame frame_;                        // the last one given out
   InputCounters counters_;
 };
 

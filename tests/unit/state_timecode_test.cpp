@@ -52,7 +52,7 @@ void pass(const Camera& camera, double jitter_s,
 // The law of a take: which of the camera's frames hair shows is known within half a frame. What counts from
 // the beginning by the server's clock alone is beyond two frames in the end.
 TEST(StateTimecode, IsThatOfTheMotionThatItShowsOverTenMinutesOfDrift) {
-  for (const FrameRate& rate : {FrameRate{24000, 1001}, FrameRate{25, 1}})
+  for (const FrameRate& rate : {FrameRate{24000, 1001}, FrameRate{25, 1}, FrameRate{30, 1}, FrameRate{60, 1}})
     for (const double drift : {kDrift, -kDrift}) {
       const Camera camera{*make_timecode({23, 55, 0, 0}, rate, false), drift};  // past midnight
       InputHub hub;
