@@ -466,7 +466,7 @@ TEST(Export, UsdcSamplesAreTheFramesWithinAMicrometre) {
     const ExportReport report = exported(states, options);
     EXPECT_EQ(report.frame_count, 25u);
     EXPECT_EQ(report.bytes, std::filesystem::file_size(options.path));
-    FrameSampler sampler({24.0, 0.0, {}}, StrandFill());
+    FrameSampler sampler({{24, 1}, 0.0, {}}, StrandFill());
     for (const auto& state : states.states_) sampler.add(state);
     sampler.finish();
     std::optional<SampledFrame> frame = sampler.next();
