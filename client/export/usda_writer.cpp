@@ -19,11 +19,6 @@ constexpr size_t kPointsPerPiece = 4'096;
 constexpr size_t kMostPointChars = 3 * kMostDecimalChars + 8;  // "(x, y, z), "
 constexpr int kGroomVersionMajor = 1, kGroomVersionMinor = 5;  // of Unreal's groom conventions
 
-/// Decimals of a coordinate: steps of kExportStepM.
-int decimals_of(ExportUnit unit) {
-  return unit == ExportUnit::Centimetre ? 4 : 6;
-}
-
 struct Extent {
   glm::dvec3 low, high;
 };
@@ -76,7 +71,7 @@ class UsdaWriter : public StrandWriter {
         "begins at 1.\"\n",
         strands_.strand_count(), strands_.vertex_count(),
         options_.space == ExportSpace::Head ? "the head's own space" : "the world");
-    text += fmt::format("    metersPerUnit = {}\n", metres_of(options_.unit));
+    text += fmt::format("    metersPerUnit = {:.7g}\n", options_.unit_m);
     text += fmt::format("    upAxis = \"{}\"\n", options_.up == ExportUp::Y ? 'Y' : 'Z');
     text += "    startTimeCode = 1\n    endTimeCode = ";
     end_time_at_ = text.size();
@@ -90,7 +85,6 @@ class UsdaWriter : public StrandWriter {
   }
 
   std::string curves_text() const {
-    const bool is_guide = options_.role == ExportRole::Guides;
     std::string text =
         "    def BasisCurves \"Strands\" (\n        prepend apiSchemas = [\"GroomAPI\"]\n    )\n    {\n";
     text += "        uniform token type = \"linear\"\n        uniform token wrap = \"nonperiodic\"\n";
@@ -101,18 +95,26 @@ class UsdaWriter : public StrandWriter {
     text += fmt::format("        custom int userProperties:groom_version_major = {}\n", kGroomVersionMajor);
     text += fmt::format("        custom int userProperties:groom_version_minor = {}\n", kGroomVersionMinor);
     const std::string uniform = " (\n            interpolation = \"uniform\"\n        )\n";
-    text += "        int[] primvars:groom_guide = " + repeated(is_guide ? "1" : "0") + uniform;
-    text += "        int[] primvars:groom_group_id = " + repeated("0") + uniform;
+    text += fmt::format("        int[] primvars:groom_guide = [{}]", fmt::join(strands_.guides(), ", ")) +
+            uniform;
+    text += fmt::format("        int[] primvars:groom_group_id = [{}]", fmt::join(strands_.groups(), ", ")) +
+            uniform;
+    text += fmt::format("        int[] primvars:groom_id = [{}]", fmt::join(strands_.ids(), ", ")) + uniform;
+    if (const std::vector<std::string> names = strands_.names(); !names.empty())
+      text += "        string[] primvars:groom_group_name = [" + quoted_text(names) + "]" + uniform;
     text += "        texCoord2f[] primvars:groom_root_uv = " + root_uv_text() + uniform;
     return text;
   }
 
-  /// An array of the same value for each strand.
-  std::string repeated(const std::string& value) const {
-    std::string text = "[";
-    for (uint32_t strand = 0; strand < strands_.strand_count(); ++strand)
-      text += (strand > 0 ? ", " : "") + value;
-    return text + "]";
+  /// What would end a string is replaced.
+  static std::string quoted_text(const std::vector<std::string>& names) {
+    std::string text;
+    for (const std::string& name : names) {
+      text += text.empty() ? "\"" : ", \"";
+      for (const char c : name) text += c == '"' || c == '\\' || (c >= 0 && c < ' ') ? '_' : c;
+      text += '"';
+    }
+    return text;
   }
 
   std::string root_uv_text() const {
@@ -167,7 +169,7 @@ class UsdaWriter : public StrandWriter {
 
   /// Pieces are made side by side and written in their order.
   Status append_points(std::span<const glm::dvec3> points) {
-    const int decimals = decimals_of(options_.unit);
+    const int decimals = export_decimals(options_.unit_m);
     const size_t piece_count = (points.size() + kPointsPerPiece - 1) / kPointsPerPiece;
     pieces_.resize(piece_count);
     shared_workers().at(Priority::Background).for_ranges(piece_count, 1, [&](size_t begin, size_t end) {

@@ -65,9 +65,9 @@ class StageReader {
     return read_metadata([this](std::string_view key) -> Status {
       if (key == "upAxis") {
         ASSIGN_OR_RETURN(const std::string_view axis, scan_.string());
-        if (axis != "Y" && axis != "Z")
+        if (axis != "Y" && axis != "Z" && axis != "y" && axis != "z")
           return scan_.error(ErrorCode::BadInput, "upAxis is {}, known are Y and Z", quoted(axis));
-        stage_.is_z_up = axis == "Z";
+        stage_.is_z_up = axis == "Z" || axis == "z";
         return {};
       }
       if (key == "metersPerUnit") {
@@ -208,6 +208,15 @@ class StageReader {
     if (name == "widths") {
       if (time && !curves.widths.empty()) return scan_.skip_value();
       ASSIGN_OR_RETURN(curves.widths, scan_.floats(kMaxGroomVertices));
+      return {};
+    }
+    std::vector<double>* const list = name == "primvars:groom_id"         ? &curves.ids
+                                      : name == "primvars:groom_group_id" ? &curves.groups
+                                      : name == "primvars:groom_root_uv"  ? &curves.root_uv
+                                                                          : nullptr;
+    if (list != nullptr) {
+      if (time && !list->empty()) return scan_.skip_value();
+      ASSIGN_OR_RETURN(*list, scan_.numbers(2 * size_t{kMaxStrandCount}));
       return {};
     }
     std::string* const token = name == "type"    ? &curves.type

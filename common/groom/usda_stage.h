@@ -23,7 +23,8 @@ struct UsdaCurves {
   std::vector<glm::vec3> points;
   std::vector<uint32_t> vertex_counts;
   std::vector<float> widths;
-  std::string type = "cubic";  // USD's own defaults
+  std::vector<double> ids, groups, root_uv;  // primvars of Unreal's groom conventions; empty: there are none
+  std::string type = "cubic";                // USD's own defaults
   std::string basis = "bezier";
   std::string wrap = "nonperiodic";
   std::optional<double> time_code;  // of the points; empty: they have none

@@ -65,7 +65,7 @@ class DrawnExport : public testing::Test {
   DrawnExport() {
     look_.followers = 2;
     look_.style.length_spread = 0.3f;  // strands of different lengths
-    options_.unit = ExportUnit::Metre;
+    options_.unit_m = 1.0;
     options_.is_quiet = true;
     expected_ = DrawnHair::make(*asset_, look_)->strands(asset_->rest_position_m);
   }

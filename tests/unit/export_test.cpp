@@ -160,13 +160,13 @@ TEST(FrameSampler, ARangeIsKeptAndTimeThatBeginsAnewEndsIt) {
 TEST(Export, EveryFormatUnitAxisAndSpaceComesBackWithinTheBound) {
   const TemporaryFolder folder;
   for (const char* const extension : {".usda", ".abc", ".ply"}) {
-    for (const ExportUnit unit : {ExportUnit::Centimetre, ExportUnit::Metre}) {
+    for (const double unit_m : {0.01, 1.0}) {
       for (const ExportUp up : {ExportUp::Y, ExportUp::Z}) {
         for (const ExportSpace space : {ExportSpace::Head, ExportSpace::World}) {
           MadeStates states(30);
           ExportOptions options;
           options.path = folder.path() / (std::string("hair") + extension);
-          options.unit = unit;
+          options.unit_m = unit_m;
           options.up = up;
           options.space = space;
           options.from_s = 0.2;
@@ -383,11 +383,11 @@ struct AbcFound {
 
 TEST(Export, AbcSamplesAreTheFramesWithinAMicrometre) {
   const TemporaryFolder folder;
-  for (const ExportUnit unit : {ExportUnit::Centimetre, ExportUnit::Metre}) {
+  for (const double unit_m : {0.01, 1.0}) {
     MadeStates states(61);
     ExportOptions options;
     options.path = folder.path() / "hair.abc";
-    options.unit = unit;
+    options.unit_m = unit_m;
     options.space = ExportSpace::World;
     options.fps = 24;
     const ExportReport report = exported(states, options);
@@ -406,7 +406,7 @@ TEST(Export, AbcSamplesAreTheFramesWithinAMicrometre) {
       ASSERT_TRUE(curves) << curves.error().to_string();
       EXPECT_EQ(curves->vertex_counts, std::vector<uint32_t>(kStrands, kVertices));
       for (size_t i = 0; i < expected.size(); ++i)
-        EXPECT_LT(glm::distance(glm::dvec3(curves->points[i]), expected[i]) * metres_of(unit), kAbcReimportM);
+        EXPECT_LT(glm::distance(glm::dvec3(curves->points[i]), expected[i]) * unit_m, kAbcReimportM);
     };
     expect_sample(0, strands.rest_points());
     for (; frame; frame = sampler.next()) expect_sample(frame->index + 1, strands.points(frame->strands));
@@ -445,6 +445,55 @@ TEST(Export, AbcSaysWhatUnrealAsksOfAGroom) {
     EXPECT_EQ(found.archive.sample(*find_abc_property(*user, "groom_version_major"), 0, 1)->number(0), 1.0);
     EXPECT_EQ(found.archive.sample(*find_abc_property(*user, "groom_version_minor"), 0, 1)->number(0), 5.0);
   }
+}
+
+TEST(Export, WhatTheHairsFileSaysComesBackInItsOrder) {
+  const TemporaryFolder folder;
+  const auto place_in_file = [](uint32_t strand) { return kStrands - 1 - strand; };
+  const auto width_m_of = [](uint32_t strand, uint32_t vertex) {
+    return 1e-4f * static_cast<float>(1 + strand) - 1e-5f * static_cast<float>(vertex);
+  };
+  auto origin = std::make_shared<ExportOrigin>();
+  origin->object_name = {"fringe", "back"};
+  for (uint32_t strand = 0; strand < kStrands; ++strand) {
+    origin->place.push_back(place_in_file(strand));
+    origin->id.push_back(50 - 3 * static_cast<int32_t>(strand));
+    origin->group.push_back(static_cast<int32_t>(strand % 3));
+    origin->object.push_back(strand % 2);
+    origin->root_uv.emplace_back(0.1f * static_cast<float>(strand), 0.5f);
+    for (uint32_t vertex = 0; vertex < kVertices; ++vertex)
+      origin->width_m.push_back(width_m_of(strand, vertex));
+  }
+  for (const char* const extension : {".abc", ".usda"}) {
+    MadeStates states(3);
+    states.scene_.origin = origin;
+    ExportOptions options;
+    options.path = folder.path() / (std::string("hair") + extension);
+    exported(states, options);
+    GroomFileOptions again;
+    again.path = options.path;
+    const auto placed = load_placed_groom(again);
+    ASSERT_TRUE(placed) << placed.error().to_string();
+    ASSERT_EQ(placed->labels.id.size(), kStrands) << extension;
+    for (uint32_t strand = 0; strand < kStrands; ++strand) {
+      const uint32_t place = place_in_file(strand);
+      EXPECT_EQ(placed->labels.id[place], origin->id[strand]);
+      EXPECT_EQ(placed->labels.group[place], origin->group[strand]);
+      EXPECT_LT(glm::distance(placed->groom.root_uv[place], origin->root_uv[strand]), 1e-5f);
+      for (uint32_t vertex = 0; vertex < kVertices; ++vertex) {
+        EXPECT_NEAR(placed->labels.width[place * kVertices + vertex], width_m_of(strand, vertex), 1e-9f);
+        const glm::vec3 found = placed->groom.rest_position_m[place * kVertices + vertex];
+        EXPECT_LT(glm::distance(found, place_of(strand, vertex, 0.0)), 1e-5f);
+      }
+    }
+  }
+  const AbcFound found(folder.path() / "hair.abc");
+  const AbcProperty* const names = find_abc_property(found.reader->free_params(), "groom_group_name");
+  ASSERT_NE(names, nullptr);
+  const std::vector<std::string> texts = found.archive.sample(*names, 0, 1'000)->texts();
+  ASSERT_EQ(texts.size(), kStrands);
+  EXPECT_EQ(texts[place_in_file(3)], "back");
+  EXPECT_EQ(texts[place_in_file(4)], "fringe");
 }
 
 TEST(Export, AbcFramesOfHairThatStandsStillTakeNoSpace) {
