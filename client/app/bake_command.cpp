@@ -6,9 +6,7 @@
 #include <utility>
 
 #include "client/app/baked_states.h"
-#include "client/app/drawn_states.h"
 #include "client/app/scenario/server_process.h"
-#include "client/export/export_strands.h"
 #include "common/base/command_line_error.h"
 #include "common/groom/groom_file.h"
 
@@ -19,11 +17,16 @@ constexpr const char* kStillAir = "none";
 constexpr const char* kSceneWind = "scene";
 constexpr double kLongestLeadS = 60.0;
 
-/// What is fed, in motion time. Whoever names no motion holds the head still.
+bool is_of_curves(const std::string& motion) {
+  return std::filesystem::path(motion).extension() == ".abc";
+}
+
+/// What is fed, in motion time, but for the motion of curves. Who names no motion holds the head still.
 Result<FeedPlan> bake_plan(const BakeCommand& command) {
   FeedOptions options = command.feed;
   options.blend_s = 0.0;  // the lead does that, so that frames stay at the clip's times
   if (options.wind == kSceneWind) options.wind = "none";
+  if (is_of_curves(options.motion)) options.motion = "none";
   FeedPlan plan;
   if (options.motion != "none" || options.wind != "none") {
     ASSIGN_OR_RETURN(plan, make_feed_plan(options));
@@ -34,32 +37,48 @@ Result<FeedPlan> bake_plan(const BakeCommand& command) {
 }
 
 /// Where it ends: at what is asked for, else with the motion.
-Result<ExportOptions> bake_export(const BakeCommand& command, const FeedPlan& plan) {
-  ASSIGN_OR_RETURN(ExportOptions options, export_options(command.exported));
+Result<ExportOptions> bake_export(const BakeCommand& command, double motion_s) {
+  ExportCommand exported = command.exported;
+  // Curves say where hair is in their own space.
+  if (!exported.space && is_of_curves(command.feed.motion)) exported.space = "world";
+  ASSIGN_OR_RETURN(ExportOptions options, export_options(exported));
   options.is_whole = true;
   if (options.is_one_frame) options.to_s = options.from_s;
-  if (!options.to_s && plan.motion_s > 0.0) options.to_s = std::max(plan.motion_s, options.from_s);
+  if (!options.to_s && motion_s > 0.0) options.to_s = std::max(motion_s, options.from_s);
   if (!options.to_s)
     return make_error(ErrorCode::BadInput,
                       "this motion has no end: say --seconds, or give a clip with --motion FILE.bvh");
   return options;
 }
 
-Result<std::unique_ptr<ExportSource>> drawn_if_wanted(std::unique_ptr<BakedStates> states, bool is_drawn) {
-  const LookDesc look = states->simulated().look;
-  if (is_drawn) return as_drawn(std::move(states), look);
-  return std::unique_ptr<ExportSource>(std::move(states));
+Result<std::optional<HairOrigin>> origin_of(const BakedStates& states) {
+  const auto* const files = std::get_if<FileGroomDesc>(&states.simulated().groom);
+  if (files == nullptr) return std::optional<HairOrigin>();
+  ASSIGN_OR_RETURN(HairOrigin origin, load_origin(*files, *states.scene().asset));
+  return std::optional(std::move(origin));
 }
 
 Result<ExportReport> bake(const BakeCommand& command, const std::atomic<bool>& stop) {
-  ASSIGN_OR_RETURN(const FeedPlan plan, bake_plan(command));
-  ASSIGN_OR_RETURN(const ExportOptions options, bake_export(command, plan));
+  ASSIGN_OR_RETURN(FeedPlan plan, bake_plan(command));
+  std::optional<CurveMotion> curves;
+  if (is_of_curves(command.feed.motion)) {
+    ASSIGN_OR_RETURN(curves, load_abc_motion(command.feed.motion));
+  }
+  ASSIGN_OR_RETURN(const ExportOptions options,
+                   bake_export(command, curves ? curves->duration_s() : plan.motion_s));
   ASSIGN_OR_RETURN(const std::filesystem::path server, find_server_program(command.server));
-  ASSIGN_OR_RETURN(
-      auto states,
-      BakedStates::start({server, server_words(command), plan, command.lead_s, options.fps.hz()}, stop));
-  ASSIGN_OR_RETURN(const auto source, drawn_if_wanted(std::move(states), command.exported.is_drawn));
-  return export_strands(*source, options, stop);
+  ASSIGN_OR_RETURN(auto states, BakedStates::start(server, server_words(command), stop));
+  ASSIGN_OR_RETURN(std::optional<HairOrigin> origin, origin_of(*states));
+  if (curves) {
+    if (!origin)
+      return make_error(ErrorCode::BadInput,
+                        "curves move the hair of a file: name it before the file to write");
+    origin->is_world_at_rest = true;
+    plan.motion = head_motion(std::move(*curves), *origin);
+  }
+  states->begin({plan, command.lead_s, options.fps.hz()});
+  const LookDesc look = states->simulated().look;
+  return export_dressed(std::move(states), {std::move(origin), look}, command.exported, options, stop);
 }
 
 }  // namespace
@@ -89,7 +108,9 @@ void declare_bake(CLI::App& app, BakeCommand& command) {
                  "scene's hair), and the file to write: .abc, .usda, .ply or .csv; it is replaced")
       ->required()
       ->expected(1, static_cast<int>(kMaxGroomFiles) + 1);
-  app.add_option("--motion", feed.motion, "Motion of the head: a BVH file, builtin or none")
+  app.add_option(
+         "--motion", feed.motion,
+         "Motion of the head: a BVH file, an .abc of animated hair that moves as one, builtin or none")
       ->capture_default_str();
   app.add_option("--wind", feed.wind, "CSV file, gusts, scene (what the scene says) or none")
       ->capture_default_str();
@@ -102,7 +123,8 @@ void declare_bake(CLI::App& app, BakeCommand& command) {
   app.add_option("--scene", command.scene, "Scene file (default: the built-in scene in full quality)");
   app.add_option("--set", command.overrides, "path=value: override a field of the scene; repeatable")
       ->expected(1)
-      ->take_all();
+      ->take_all()
+      ->allow_extra_args(false);
   app.add_option("--server", command.server, "Server program (default: strandcast-server beside this one)");
   declare_export_options(app, command.exported);
 }

@@ -52,10 +52,12 @@ FeedPlan with_lead(FeedPlan plan, double lead_s) {
   return plan;
 }
 
-Result<std::unique_ptr<BakedStates>> BakedStates::start(const BakeConfig& config,
+Result<std::unique_ptr<BakedStates>> BakedStates::start(const std::filesystem::path& program,
+                                                        std::vector<std::string> words,
                                                         const std::atomic<bool>& stop) {
   std::unique_ptr<BakedStates> states(new BakedStates(stop));
-  if (const Status begun = states->begin(config); !begun) return states->ended(begun.error());
+  if (const Status opened = states->open(program, std::move(words)); !opened)
+    return states->ended(opened.error());
   return states;
 }
 
@@ -67,21 +69,23 @@ BakedStates::~BakedStates() {
   if (!folder_.empty()) std::filesystem::remove_all(folder_, ignored);
 }
 
-Status BakedStates::begin(const BakeConfig& config) {
+Status BakedStates::open(const std::filesystem::path& program, std::vector<std::string> words) {
   ASSIGN_OR_RETURN(folder_, make_temporary_folder());
   server_ = std::make_unique<ServerProcess>(
-      ServerProcessConfig{config.server, config.arguments, folder_, kBakeLifetimeS});
+      ServerProcessConfig{program, std::move(words), folder_, kBakeLifetimeS});
   RETURN_IF_ERROR(server_->start(kBakeStartS, stop_));
   RETURN_IF_ERROR(connect());
-  RETURN_IF_ERROR(await_scene());
+  return await_scene();
+}
+
+void BakedStates::begin(const BakeFeed& feed) {
   const double step_rate_hz = client_->welcome().step_rate_hz;
   // The first state is one of the motion's start, so the lead takes whole steps.
-  first_tick_ = static_cast<uint64_t>(std::ceil(config.lead_s * step_rate_hz));
-  feed_ = std::make_unique<SteppedFeed>(
-      with_lead(config.plan, static_cast<double>(first_tick_) / step_rate_hz), 0, step_rate_hz);
-  stride_ = steps_between(step_rate_hz, config.fps);
+  first_tick_ = static_cast<uint64_t>(std::ceil(feed.lead_s * step_rate_hz));
+  stride_ = steps_between(step_rate_hz, feed.fps);
+  feed_ = std::make_unique<SteppedFeed>(with_lead(feed.plan, static_cast<double>(first_tick_) / step_rate_hz),
+                                        0, step_rate_hz);
   if (first_tick_ > 0) waiting_.clear();
-  return {};
 }
 
 /// One connection steps and feeds, so that samples and steps come in order. The other gets the strands.

@@ -1,5 +1,5 @@
-// BakedStates: states of a server of its own in lockstep, which a feed drives step by step: each state is
-// there as soon as it is simulated, and none is missed. One thread.
+// BakedStates: states of a server of its own in lockstep. A feed drives it step by step, so that no state is
+// missed, however slow the machine is. One thread.
 #pragma once
 
 #include <atomic>
@@ -17,13 +17,11 @@
 
 namespace strandcast {
 
-/// A server to start, and what it is fed.
-struct BakeConfig {
-  std::filesystem::path server;        // the program
-  std::vector<std::string> arguments;  // hair and scene, as for the program
-  FeedPlan plan;                       // in motion time, from 0
-  double lead_s = 0.0;                 // in which the motion sets in, before the first state
-  double fps = 30.0;                   // of the frames that are made of the states
+/// What a server is fed, and when its states are wanted.
+struct BakeFeed {
+  FeedPlan plan;        // in motion time, from 0
+  double lead_s = 0.0;  // in which the motion sets in, before the first state
+  double fps = 30.0;    // of the frames that are made of the states
 };
 
 /// Returns how many steps lie between the states that frames are made of: all from one to the next where that
@@ -36,10 +34,15 @@ FeedPlan with_lead(FeedPlan plan, double lead_s);
 
 class BakedStates : public ExportSource {
  public:
-  /// Starts the server and waits for its hair; `stop` ends every wait. Returns the server's own error if it
-  /// does not start.
-  static Result<std::unique_ptr<BakedStates>> start(const BakeConfig& config, const std::atomic<bool>& stop);
+  /// Starts the program with these words for hair and scene, and waits for its hair; `stop` ends every wait.
+  /// Returns the server's own error if it does not start.
+  static Result<std::unique_ptr<BakedStates>> start(const std::filesystem::path& program,
+                                                    std::vector<std::string> words,
+                                                    const std::atomic<bool>& stop);
   ~BakedStates() override;
+
+  /// Begins with the first state of a feed. Call it once, before next().
+  void begin(const BakeFeed& feed);
 
   const ExportScene& scene() const override { return scene_; }
   /// Simulates on, and returns the next state. Unavailable when stopped, or when the server has ended.
@@ -50,7 +53,7 @@ class BakedStates : public ExportSource {
 
  private:
   explicit BakedStates(const std::atomic<bool>& stop) : stop_(stop) {}
-  Status begin(const BakeConfig& config);
+  Status open(const std::filesystem::path& program, std::vector<std::string> words);
   Status connect();
   Status await_scene();
   Status take_steps();

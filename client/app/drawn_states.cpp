@@ -23,9 +23,9 @@ class DrawnShapes : public ExportDrawing {
   ExportShape shape_;
 };
 
-class DrawnStates : public ExportSource {
+class StatesOfScene : public ExportSource {
  public:
-  DrawnStates(std::unique_ptr<ExportSource> source, ExportScene scene)
+  StatesOfScene(std::unique_ptr<ExportSource> source, ExportScene scene)
       : source_(std::move(source)), scene_(std::move(scene)) {}
   const ExportScene& scene() const override { return scene_; }
   const TimecodeTrack& timecodes() const override { return source_->timecodes(); }
@@ -44,7 +44,14 @@ Result<std::unique_ptr<ExportSource>> as_drawn(std::unique_ptr<ExportSource> sou
   ExportScene scene = source->scene();
   ASSIGN_OR_RETURN(DrawnHair hair, DrawnHair::make(*scene.asset, look));
   scene.drawing = std::make_shared<DrawnShapes>(std::move(hair), scene.asset->rest_position_m);
-  return std::unique_ptr<ExportSource>(std::make_unique<DrawnStates>(std::move(source), std::move(scene)));
+  return std::unique_ptr<ExportSource>(std::make_unique<StatesOfScene>(std::move(source), std::move(scene)));
+}
+
+std::unique_ptr<ExportSource> with_origin(std::unique_ptr<ExportSource> source,
+                                          std::shared_ptr<const ExportOrigin> origin) {
+  ExportScene scene = source->scene();
+  scene.origin = std::move(origin);
+  return std::make_unique<StatesOfScene>(std::move(source), std::move(scene));
 }
 
 }  // namespace strandcast

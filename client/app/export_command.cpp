@@ -15,6 +15,7 @@
 namespace strandcast {
 namespace {
 
+constexpr double kUsualUnitM = 0.01;
 constexpr double kMostSeconds = 86'400.0;
 
 std::string size_text(uint64_t bytes) {
@@ -39,20 +40,61 @@ std::string trouble_of_moment(const std::string& text) {
                      kMostSeconds);
 }
 
+/// In the unit and axes of the hair's files where the command states neither; then in their place too, in the
+/// head's space and where curves move the head.
+void follow_files(const HairOrigin& origin, const ExportCommand& command, ExportOptions& options) {
+  if (!command.unit) options.unit_m = origin.unit_m;
+  if (!command.up) options.up = origin.is_z_up ? ExportUp::Z : ExportUp::Y;
+  if (!command.unit && !command.up && (options.space == ExportSpace::Head || origin.is_world_at_rest))
+    options.file_from_space = origin.file_from_head;
+}
+
+struct OpenedSource {
+  std::unique_ptr<ExportSource> states;
+  SceneDesc scene;  // only where a file of its hair is named
+  LookDesc look;
+};
+
 /// From a recording where one is named, else from the server.
-Result<std::unique_ptr<ExportSource>> open_source(const CtlTarget& target, const ExportCommand& command,
-                                                  const std::atomic<bool>& stop) {
+Result<OpenedSource> open_source(const CtlTarget& target, const ExportCommand& command,
+                                 const std::atomic<bool>& stop) {
   if (command.paths.size() > 1) {
     ASSIGN_OR_RETURN(auto recorded, RecordedStates::open(command.paths.front()));
+    const SceneDesc scene = recorded->simulated();
     const LookDesc look = recorded->look().look;
-    if (command.is_drawn) return as_drawn(std::move(recorded), look);
-    return std::unique_ptr<ExportSource>(std::move(recorded));
+    return OpenedSource{std::move(recorded), scene, look};
+  }
+  SceneDesc scene;
+  if (!command.grooms.empty()) {
+    ASSIGN_OR_RETURN(scene, ask_scene(target));
   }
   ASSIGN_OR_RETURN(const ClientConfig config, client_config_for(target, Role::Viewer));
   ASSIGN_OR_RETURN(auto live, LiveStates::open(config, stop));
   const LookDesc look = live->look();
-  if (command.is_drawn) return as_drawn(std::move(live), look);
-  return std::unique_ptr<ExportSource>(std::move(live));
+  return OpenedSource{std::move(live), scene, look};
+}
+
+/// How the scene reads its files, with those that are named in their place.
+Result<FileGroomDesc> named_files(const SceneDesc& scene, const std::vector<std::string>& grooms) {
+  const auto* const file = std::get_if<FileGroomDesc>(&scene.groom);
+  if (file == nullptr)
+    return make_error(ErrorCode::BadInput, "this hair was grown, and comes of no file: leave --groom out");
+  FileGroomDesc named = *file;
+  named.path = grooms.front();
+  named.more_paths.assign(grooms.begin() + 1, grooms.end());
+  return named;
+}
+
+Result<ExportReport> export_with(const CtlTarget& target, const ExportCommand& command,
+                                 const std::atomic<bool>& stop) {
+  ASSIGN_OR_RETURN(ExportOptions options, export_options(command));
+  ASSIGN_OR_RETURN(OpenedSource source, open_source(target, command, stop));
+  std::optional<HairOrigin> origin;
+  if (!command.grooms.empty()) {
+    ASSIGN_OR_RETURN(const FileGroomDesc files, named_files(source.scene, command.grooms));
+    ASSIGN_OR_RETURN(origin, load_origin(files, *source.states->scene().asset));
+  }
+  return export_dressed(std::move(source.states), {origin, source.look}, command, options, stop);
 }
 
 }  // namespace
@@ -79,6 +121,12 @@ void declare_export(CLI::App& app, ExportCommand& command) {
          "server sends from now on; a file of the second name is replaced")
       ->required()
       ->expected(1, 2);
+  app.add_option(
+         "--groom", command.grooms,
+         "File of the hair, repeatable: ids, groups, names, widths, coordinates, unit and axes come from it")
+      ->expected(1)
+      ->take_all()
+      ->allow_extra_args(false);
   declare_export_options(app, command);
 }
 
@@ -88,21 +136,23 @@ void declare_export_options(CLI::App& app, ExportCommand& command) {
                  "timecode, else 30)")
       ->check(CLI::Validator(
           [](std::string text) { return make_frame_rate(text, kLeastFrameRate, kMostFrameRate); }, ""));
-  app.add_option("--units", command.unit, "Unit of the file")
-      ->check(CLI::IsMember({"cm", "m"}))
-      ->capture_default_str();
-  app.add_option("--up", command.up, "Up axis of the file; the face looks to +Z, or to -Y where Z is up")
-      ->check(CLI::IsMember({"y", "z"}))
-      ->capture_default_str();
+  app.add_option("--units", command.unit, "Unit of the file (default: that of the hair's file, else cm)")
+      ->check(CLI::IsMember({"cm", "m"}));
+  app.add_option(
+         "--up", command.up,
+         "Up axis of the file, with the face at +Z, or at -Y where Z is up (default: as the hair's file "
+         "has it, else y)")
+      ->check(CLI::IsMember({"y", "z"}));
   app.add_option("--space", command.space,
-                 "head: as seen from the head, which stands still; world: with its motion")
-      ->check(CLI::IsMember({"head", "world"}))
-      ->capture_default_str();
+                 "head: as seen from the head, which stands still (the default); world: with its motion")
+      ->check(CLI::IsMember({"head", "world"}));
   app.add_flag("--guides", command.is_guides,
                "Tell Unreal that these strands guide others, and are not drawn");
   app.add_flag(
       "--drawn", command.is_drawn,
       "Strands as viewers draw them, with followers, style and taper, instead of the simulated ones");
+  app.add_flag("--followers", command.has_followers,
+               "Simulated strands as guides, and the strands that viewers draw between them as hair");
   app.add_flag("--head", command.has_head, "The head, too, as a mesh with its neck at rest; not for .csv");
   const auto seconds = without_nan(CLI::Range(0.0, kMostSeconds));
   const CLI::Validator moment([](const std::string& text) { return trouble_of_moment(text); }, "");
@@ -126,10 +176,15 @@ Result<ExportOptions> export_options(const ExportCommand& command) {
     ASSIGN_OR_RETURN(options.fps, parse_frame_rate(*command.fps));
     options.has_fps = true;
   }
-  options.unit = command.unit == "m" ? ExportUnit::Metre : ExportUnit::Centimetre;
+  options.unit_m = command.unit == "m" ? 1.0 : kUsualUnitM;
   options.up = command.up == "z" ? ExportUp::Z : ExportUp::Y;
   options.space = command.space == "world" ? ExportSpace::World : ExportSpace::Head;
-  options.role = command.is_guides ? ExportRole::Guides : ExportRole::Strands;
+  options.role = command.has_followers ? ExportRole::Followers
+                 : command.is_guides   ? ExportRole::Guides
+                                       : ExportRole::Strands;
+  if (command.is_guides && command.has_followers)
+    return make_error(ErrorCode::BadInput,
+                      "--followers has guides and hair, --guides has guides alone: give one");
   options.has_head = command.has_head;
   const bool is_range = command.from || command.to || command.seconds || command.fps;
   if (command.at_s && is_range)
@@ -153,12 +208,21 @@ Result<ExportOptions> export_options(const ExportCommand& command) {
   return options;
 }
 
+Result<ExportReport> export_dressed(std::unique_ptr<ExportSource> states, const ExportDress& dress,
+                                    const ExportCommand& command, ExportOptions options,
+                                    const std::atomic<bool>& stop) {
+  if (dress.origin) {
+    follow_files(*dress.origin, command, options);
+    states = with_origin(std::move(states), dress.origin->strands);
+  }
+  if (command.is_drawn || command.has_followers) {
+    ASSIGN_OR_RETURN(states, as_drawn(std::move(states), dress.look));
+  }
+  return export_strands(*states, options, stop);
+}
+
 int run_export(const CtlTarget& target, const ExportCommand& command, const std::atomic<bool>& stop) {
-  const auto options = export_options(command);
-  if (!options) return ctl_failure(options.error());
-  const auto source = open_source(target, command, stop);
-  if (!source) return ctl_failure(source.error());
-  const auto report = export_strands(**source, *options, stop);
+  const auto report = export_with(target, command, stop);
   if (!report) return ctl_failure(report.error());
   print_export(*report);
   return kDoneExit;

@@ -30,6 +30,7 @@ Result<std::unique_ptr<RecordedStates>> RecordedStates::open(const std::filesyst
   std::unique_ptr<RecordedStates> states(new RecordedStates(std::move(reader)));
   states->scene_ = {std::make_shared<const SceneAsset>(std::move(asset)), scene->look.strand_radius_m,
                     scene->look.tip_scale};
+  states->simulated_ = *scene;
   const RecordingStart& start = states->reader_->start();
   states->looks_.push_back({start.server_time_ns, {scene->look, scene->camera}});
   states->codecs_.push_back({start.server_time_ns, start.codec});

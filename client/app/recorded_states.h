@@ -30,6 +30,8 @@ class RecordedStates : public ExportSource {
 
   /// Moves to the last keyframe at or before this time, or to the first one; next() continues there.
   Status seek(int64_t sim_time_ns);
+  /// Returns the scene that was recorded, as it began.
+  const SceneDesc& simulated() const { return simulated_; }
   int64_t first_ns() const { return reader_->info().first_sim_time_ns; }
   int64_t last_ns() const { return reader_->info().last_sim_time_ns; }
   /// Returns look and camera at the newest state.
@@ -50,6 +52,7 @@ class RecordedStates : public ExportSource {
   std::unique_ptr<StrandReplay> replay_;
   std::string codec_;  // of replay_
   ExportScene scene_;
+  SceneDesc simulated_;
   LookChange look_;
   std::vector<Timed<LookChange>> looks_;    // in the order of time, the first from the start on
   std::vector<Timed<std::string>> codecs_;  // likewise

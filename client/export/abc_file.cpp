@@ -133,8 +133,12 @@ Result<uint64_t> AbcFile::append_series(const AbcEntry& entry) {
   for (size_t i = 0; i < entry.series.sample.size(); ++i) {
     if (i > 0 && (first == 0 || i < first || i > last)) continue;
     children.push_back(entry.series.sample[i].child);
-    if (entry.form == AbcForm::Array)
-      children.push_back(kNoBlock);  // dimensions: the elements' number says all
+    if (entry.form != AbcForm::Array) continue;
+    // Dimensions: the number of bytes says all, but of texts.
+    std::string dimensions;
+    if (entry.series.text_count > 0) put(dimensions, entry.series.text_count);
+    ASSIGN_OR_RETURN(const uint64_t child, append_block(dimensions));
+    children.push_back(child);
   }
   if (entry.times >= most_samples_.size()) most_samples_.resize(entry.times + size_t{1}, 0);
   most_samples_[entry.times] = std::max<uint64_t>(most_samples_[entry.times], entry.series.sample.size());

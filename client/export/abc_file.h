@@ -40,6 +40,7 @@ struct AbcSeries {
     AbcKey key{};
   };
   std::vector<Kept> sample;
+  uint64_t text_count = 0;  // in each sample, of an array of texts, which states it
 };
 
 struct AbcEntry {

@@ -159,17 +159,19 @@ class AbcWriter : public StrandWriter {
 
   /// Adds what Unreal asks of each strand.
   Status add_groom(std::vector<AbcEntry>& entries) {
-    const auto strand_count = static_cast<size_t>(strands_.strand_count());
-    const int16_t is_guide = options_.role == ExportRole::Guides ? 1 : 0;
-    std::vector<int32_t> id;
-    for (size_t strand = 0; strand < strand_count; ++strand) id.push_back(static_cast<int32_t>(strand));
     RETURN_IF_ERROR(add(entries, "groom_group_id", AbcForm::Array, AbcType::I32, 1,
-                        param_metadata("uni", "", 1, "int32_t"), std::vector<int32_t>(strand_count, 0)));
+                        param_metadata("uni", "", 1, "int32_t"), strands_.groups()));
+    if (const std::vector<std::string> names = strands_.names(); !names.empty()) {
+      std::string texts;
+      for (const std::string& name : names) texts += text_bytes(name);
+      RETURN_IF_ERROR(add(entries, "groom_group_name", AbcForm::Array, AbcType::String, 1,
+                          param_metadata("uni", "", 1, "string"), texts));
+      entries.back().series.text_count = names.size();
+    }
     RETURN_IF_ERROR(add(entries, "groom_guide", AbcForm::Array, AbcType::I16, 1,
-                        param_metadata("uni", "", 1, "int16_t"),
-                        std::vector<int16_t>(strand_count, is_guide)));
+                        param_metadata("uni", "", 1, "int16_t"), strands_.guides()));
     RETURN_IF_ERROR(add(entries, "groom_id", AbcForm::Array, AbcType::I32, 1,
-                        param_metadata("uni", "", 1, "int32_t"), id));
+                        param_metadata("uni", "", 1, "int32_t"), strands_.ids()));
     return add(entries, "groom_root_uv", AbcForm::Array, AbcType::Float, 2,
                param_metadata("uni", ";interpretation=vector", 2, "float32_t"), strands_.root_uv());
   }
@@ -178,9 +180,9 @@ class AbcWriter : public StrandWriter {
   std::string description() const {
     return fmt::format(
         "_ai_Application=Strandcast {};_ai_DCC_FPS={:.6f};_ai_Description={} strands of {} vertices, root "
-        "first, in {}. Sample 0 is the rest shape, the motion begins at sample 1.;unit_m={};up_axis={}",
+        "first, in {}. Sample 0 is the rest shape, the motion begins at sample 1.;unit_m={:.7g};up_axis={}",
         version(), options_.fps.hz(), strands_.strand_count(), strands_.vertex_count(),
-        options_.space == ExportSpace::Head ? "the head's own space" : "the world", metres_of(options_.unit),
+        options_.space == ExportSpace::Head ? "the head's own space" : "the world", options_.unit_m,
         options_.up == ExportUp::Y ? 'Y' : 'Z');
   }
 

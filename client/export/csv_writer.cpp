@@ -17,12 +17,12 @@ constexpr size_t kMostRowChars = 8 * kMostDecimalChars;
 class CsvWriter : public StrandWriter {
  public:
   CsvWriter(const ExportOptions& options, const StrandSet& strands, OutputFile file)
-      : decimals_(options.unit == ExportUnit::Centimetre ? 4 : 6),
+      : decimals_(export_decimals(options.unit_m)),
         first_number_(options.first_number),
         path_(options.path),
         strands_(strands),
         file_(std::move(file)) {
-    unit_ = options.unit == ExportUnit::Centimetre ? "cm" : "m";
+    unit_ = options.unit_m == 0.01 ? "cm" : options.unit_m == 1.0 ? "m" : "units";
   }
 
   Status begin() {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <glm/glm.hpp>
 #include <optional>
 #include <string>
 
@@ -10,21 +11,23 @@
 
 namespace strandcast {
 
-enum class ExportUnit { Centimetre, Metre };
 enum class ExportUp { Y, Z };
 enum class ExportSpace { Head, World };
 /// What Unreal uses the curves for.
 enum class ExportRole {
-  Strands,  // hair that is drawn
-  Guides,   // hair that drives other hair
+  Strands,    // hair that is drawn
+  Guides,     // hair that drives other hair
+  Followers,  // simulated strands are guides, and those that are drawn between them are hair
 };
 
 struct ExportOptions {
   std::filesystem::path path;  // .usda, .usdc, .usdz, .abc, .ply or .csv
   FrameRate fps;               // without has_fps: that of the states' timecode, if they carry one
   bool has_fps = false;
-  ExportUnit unit = ExportUnit::Centimetre;
+  double unit_m = 0.01;  // metres per unit of the file
   ExportUp up = ExportUp::Y;
+  /// From the space to the file's points, for unit and axis too; empty: as these two say.
+  std::optional<glm::dmat4> file_from_space = {};
   ExportSpace space = ExportSpace::Head;
   ExportRole role = ExportRole::Strands;
   double from_s = 0.0;                               // after the first state
@@ -36,10 +39,5 @@ struct ExportOptions {
   bool is_whole = false;      // all frames of the range or no file: an error of the source ends it
   bool is_quiet = false;      // no progress on standard error
 };
-
-/// Returns the metres per unit of the file.
-inline double metres_of(ExportUnit unit) {
-  return unit == ExportUnit::Centimetre ? 0.01 : 1.0;
-}
 
 }  // namespace strandcast

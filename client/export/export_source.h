@@ -15,12 +15,24 @@
 
 namespace strandcast {
 
+/// What the hair's own files say of it, so that an export carries it on. A list is empty where they say
+/// nothing.
+struct ExportOrigin {
+  std::vector<uint32_t> place;           // (strand_count) of each strand in the files
+  std::vector<int32_t> id, group;        // (strand_count)
+  std::vector<uint32_t> object;          // (strand_count) the curves that it belongs to, in object_name
+  std::vector<std::string> object_name;  // of them
+  std::vector<glm::vec2> root_uv;        // (strand_count)
+  std::vector<float> width_m;            // (strand_count x vertex_count) strand after strand
+};
+
 /// Data that is the same for all states.
 struct ExportScene {
   std::shared_ptr<const SceneAsset> asset;
-  float strand_radius_m = 0.0f;                 // as drawn, at the root
-  float tip_scale = 1.0f;                       // radius at the tip over radius at the root
-  std::shared_ptr<ExportDrawing> drawing = {};  // of what is exported; null: the simulated strands
+  float strand_radius_m = 0.0f;                     // as drawn, at the root
+  float tip_scale = 1.0f;                           // radius at the tip over radius at the root
+  std::shared_ptr<ExportDrawing> drawing = {};      // of what is exported; null: the simulated strands
+  std::shared_ptr<const ExportOrigin> origin = {};  // of the simulated strands; null: not known
 };
 
 class ExportSource {

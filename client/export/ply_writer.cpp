@@ -16,7 +16,8 @@ static_assert(std::endian::native == std::endian::little, "numbers are written a
 
 class PlyWriter : public StrandWriter {
  public:
-  PlyWriter(const ExportOptions& options, const StrandSet& strands) : options_(options), strands_(strands) {}
+  PlyWriter(const ExportOptions& options, const StrandSet& strands)
+      : options_(options), strands_(strands), ids_(strands.ids()), groups_(strands.groups()) {}
 
   Status begin() {
     return options_.is_one_frame ? Status()
@@ -44,15 +45,15 @@ class PlyWriter : public StrandWriter {
     std::string text = fmt::format(
         "ply\nformat binary_little_endian 1.0\n"
         "comment {} strands of {} vertices, root first, {}, in {}\n"
-        "comment unit_m {}\ncomment up_axis {}\n",
+        "comment unit_m {:.7g}\ncomment up_axis {}\n",
         strands_.strand_count(), strands_.vertex_count(), moment,
-        options_.space == ExportSpace::Head ? "the head's own space" : "the world", metres_of(options_.unit),
+        options_.space == ExportSpace::Head ? "the head's own space" : "the world", options_.unit_m,
         options_.up == ExportUp::Y ? 'Y' : 'Z');
     if (points == size_t{strands_.strand_count()} * strands_.vertex_count())
       text += fmt::format("comment strand_vertex_count {}\n", strands_.vertex_count());
     text += fmt::format(
         "element vertex {}\nproperty float x\nproperty float y\nproperty float z\nproperty float width\n"
-        "element strand {}\nproperty ushort nsegs\n",
+        "element strand {}\nproperty ushort nsegs\nproperty int groom_id\nproperty int groom_group_id\n",
         points, strands_.strand_count());
     if (head_vertices > 0)
       text += fmt::format("element face {}\nproperty list uchar uint vertex_indices\n",
@@ -74,7 +75,11 @@ class PlyWriter : public StrandWriter {
     };
     for (size_t i = 0; i < points.size(); ++i) put_point(points[i], strands_.widths()[i]);
     for (const glm::dvec3& point : head) put_point(point, 0.0f);
-    for (const uint32_t count : strands_.vertex_counts()) put(static_cast<uint16_t>(count - 1));
+    for (size_t strand = 0; strand < strands_.strand_count(); ++strand) {
+      put(static_cast<uint16_t>(strands_.vertex_counts()[strand] - 1));
+      put(ids_[strand]);
+      put(groups_[strand]);
+    }
     for (const glm::uvec3& triangle : strands_.head_triangles()) {
       put(uint8_t{3});
       for (int corner = 0; corner < 3; ++corner) put(static_cast<uint32_t>(points.size() + triangle[corner]));
@@ -90,6 +95,7 @@ class PlyWriter : public StrandWriter {
 
   const ExportOptions options_;
   const StrandSet& strands_;
+  const std::vector<int32_t> ids_, groups_;
   WrittenBytes written_;
 };
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "client/export/export_options.h"
@@ -24,7 +25,7 @@ class StrandSet {
   /// Selects the strands; those without length at rest or in the `first` frame are left out.
   StrandSet(const ExportScene& scene, const ExportOptions& options, const PosedStrands& first);
 
-  uint32_t strand_count() const { return static_cast<uint32_t>(strand_.size()); }
+  uint32_t strand_count() const { return static_cast<uint32_t>(members_.size()); }
   /// Returns the vertices of each strand; drawn ones differ.
   const std::vector<uint32_t>& vertex_counts() const { return vertex_counts_; }
   /// Returns the most vertices of a strand.
@@ -37,8 +38,17 @@ class StrandSet {
   std::vector<glm::dvec3> rest_points() const { return points({first_pose_, scene_.asset->rest_position_m}); }
   /// Returns the diameters of all points, in file units.
   const std::vector<float>& widths() const { return width_; }
-  /// Returns longitude and latitude of each root about the centre of all roots, 0..1.
+  /// Returns the coordinates of each root: the file's own, else longitude and latitude about the centre of
+  /// all roots, 0..1.
   std::vector<glm::vec2> root_uv() const;
+  /// Returns the id of each strand: the file's own, else numbers from 0; those of followers come after them.
+  std::vector<int32_t> ids() const;
+  /// Returns the group of each strand: the file's own, else 0.
+  std::vector<int32_t> groups() const;
+  /// Returns 1 for each strand that drives others, else 0.
+  std::vector<int16_t> guides() const;
+  /// Returns the name of the curves that each strand belongs to; empty if no file says it.
+  std::vector<std::string> names() const;
   /// Counts the strands that have no length in points of a frame, having lost it since the first one.
   uint32_t collapsed_count(std::span<const glm::dvec3> points) const;
 
@@ -49,14 +59,23 @@ class StrandSet {
   std::span<const glm::uvec3> head_triangles() const;
 
  private:
+  /// One strand of the file.
+  struct Member {
+    uint32_t strand = 0;  // of shape_
+    uint32_t key = 0;     // the simulated strand that it is, or that is nearest to it
+    bool is_key = true;
+  };
+
+  std::vector<Member> members_of_all(std::span<const glm::vec3> rest_m) const;
   std::vector<glm::vec3> in_head(const std::vector<glm::vec3>& position_m) const;
   glm::dvec3 in_file(const glm::vec3& point_in_head, const Pose& world_from_head) const;
 
   ExportScene scene_;
   ExportOptions options_;
   Pose first_pose_;
-  ExportShape shape_;             // of all strands
-  std::vector<uint32_t> strand_;  // those that are not left out
+  uint32_t key_count_ = 0;       // simulated strands in the shape, which come first
+  ExportShape shape_;            // of all strands
+  std::vector<Member> members_;  // those that are not left out
   std::vector<uint32_t> vertex_counts_;
   uint32_t vertex_count_ = 0;
   uint32_t left_out_count_ = 0;

@@ -2,6 +2,8 @@
 // with the length of an export. One thread.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <glm/glm.hpp>
@@ -28,6 +30,12 @@ struct WrittenBytes {
   uint64_t bytes = 0;
   std::filesystem::path last_path;
 };
+
+/// Returns the decimals of a coordinate in text: steps of kExportStepM or finer.
+inline int export_decimals(double unit_m) {
+  constexpr double kAlmost = 1e-6;
+  return std::clamp(static_cast<int>(std::ceil(std::log10(unit_m / kExportStepM) - kAlmost)), 0, 9);
+}
 
 class StrandWriter {
  public:

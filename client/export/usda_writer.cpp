@@ -18,11 +18,6 @@ namespace {
 constexpr size_t kPointsPerPiece = 4'096;
 constexpr size_t kMostPointChars = 3 * kMostDecimalChars + 8;  // "(x, y, z), "
 
-/// Decimals of a coordinate: steps of kExportStepM.
-int decimals_of(ExportUnit unit) {
-  return unit == ExportUnit::Centimetre ? 4 : 6;
-}
-
 struct Extent {
   glm::dvec3 low, high;
 };
@@ -71,7 +66,7 @@ class UsdaWriter : public StrandWriter {
     std::string text = "#usda 1.0\n(\n";
     text += "    defaultPrim = \"Hair\"\n";
     text += fmt::format("    doc = \"{}\"\n", usd_description(options_, strands_));
-    text += fmt::format("    metersPerUnit = {}\n", metres_of(options_.unit));
+    text += fmt::format("    metersPerUnit = {:.7g}\n", options_.unit_m);
     text += fmt::format("    upAxis = \"{}\"\n", options_.up == ExportUp::Y ? 'Y' : 'Z');
     text += fmt::format("    startTimeCode = {}\n    endTimeCode = ", options_.first_number);
     end_time_at_ = text.size();
@@ -85,7 +80,6 @@ class UsdaWriter : public StrandWriter {
   }
 
   std::string curves_text() const {
-    const bool is_guide = options_.role == ExportRole::Guides;
     std::string text =
         "    def BasisCurves \"Strands\" (\n        prepend apiSchemas = [\"GroomAPI\"]\n    )\n    {\n";
     text += "        uniform token type = \"linear\"\n        uniform token wrap = \"nonperiodic\"\n";
@@ -96,18 +90,26 @@ class UsdaWriter : public StrandWriter {
     text += fmt::format("        custom int userProperties:groom_version_major = {}\n", kUsdGroomMajor);
     text += fmt::format("        custom int userProperties:groom_version_minor = {}\n", kUsdGroomMinor);
     const std::string uniform = " (\n            interpolation = \"uniform\"\n        )\n";
-    text += "        int[] primvars:groom_guide = " + repeated(is_guide ? "1" : "0") + uniform;
-    text += "        int[] primvars:groom_group_id = " + repeated("0") + uniform;
+    text += fmt::format("        int[] primvars:groom_guide = [{}]", fmt::join(strands_.guides(), ", ")) +
+            uniform;
+    text += fmt::format("        int[] primvars:groom_group_id = [{}]", fmt::join(strands_.groups(), ", ")) +
+            uniform;
+    text += fmt::format("        int[] primvars:groom_id = [{}]", fmt::join(strands_.ids(), ", ")) + uniform;
+    if (const std::vector<std::string> names = strands_.names(); !names.empty())
+      text += "        string[] primvars:groom_group_name = [" + quoted_text(names) + "]" + uniform;
     text += "        texCoord2f[] primvars:groom_root_uv = " + root_uv_text() + uniform;
     return text;
   }
 
-  /// An array of the same value for each strand.
-  std::string repeated(const std::string& value) const {
-    std::string text = "[";
-    for (uint32_t strand = 0; strand < strands_.strand_count(); ++strand)
-      text += (strand > 0 ? ", " : "") + value;
-    return text + "]";
+  /// What would end a string is replaced.
+  static std::string quoted_text(const std::vector<std::string>& names) {
+    std::string text;
+    for (const std::string& name : names) {
+      text += text.empty() ? "\"" : ", \"";
+      for (const char c : name) text += c == '"' || c == '\\' || (c >= 0 && c < ' ') ? '_' : c;
+      text += '"';
+    }
+    return text;
   }
 
   std::string root_uv_text() const {
@@ -166,7 +168,7 @@ class UsdaWriter : public StrandWriter {
 
   /// Pieces are made side by side and written in their order.
   Status append_points(std::span<const glm::dvec3> points) {
-    const int decimals = decimals_of(options_.unit);
+    const int decimals = export_decimals(options_.unit_m);
     const size_t piece_count = (points.size() + kPointsPerPiece - 1) / kPointsPerPiece;
     pieces_.resize(piece_count);
     shared_workers().at(Priority::Background).for_ranges(piece_count, 1, [&](size_t begin, size_t end) {
@@ -208,7 +210,8 @@ class UsdaWriter : public StrandWriter {
 
 std::string usd_description(const ExportOptions& options, const StrandSet& strands) {
   return fmt::format(
-      "{} strands of {} vertices, root first, in {}. Time code {} is the rest shape, the motion begins at {}.",
+      "{} strands of {} vertices, root first, in {}. Time code {} is the rest shape, the motion begins at "
+      "{}.",
       strands.strand_count(), strands.vertex_count(),
       options.space == ExportSpace::Head ? "the head's own space" : "the world", options.first_number - 1,
       options.first_number);

@@ -100,6 +100,17 @@ Result<UsdcValue> UsdcFile::ints(std::span<const int32_t> numbers) {
   return UsdcValue::of(UsdcType::Int, offset, UsdcValue::kArray | UsdcValue::kPacked);
 }
 
+Result<UsdcValue> UsdcFile::strings(std::span<const std::string> texts) {
+  std::map<std::string_view, uint32_t> known;  // many strands have the same
+  std::vector<uint32_t> indices;
+  for (const std::string& text : texts) {
+    const auto [index, is_new] = known.emplace(text, 0);
+    if (is_new) index->second = static_cast<uint32_t>(string(text).payload());
+    indices.push_back(index->second);
+  }
+  return array(UsdcType::String, indices.size(), std::as_bytes(std::span(indices)));
+}
+
 Result<UsdcValue> UsdcFile::tokens(std::span<const std::string> texts) {
   std::string bytes = usdc_number(uint64_t{texts.size()});
   for (const std::string& text : texts) bytes += usdc_number(static_cast<uint32_t>(token(text).payload()));

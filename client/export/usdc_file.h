@@ -37,6 +37,8 @@ class UsdcFile {
   Result<UsdcValue> array(UsdcType type, size_t count, std::span<const std::byte> bytes);
   /// Appends whole numbers, packed.
   Result<UsdcValue> ints(std::span<const int32_t> numbers);
+  /// Appends an array of strings.
+  Result<UsdcValue> strings(std::span<const std::string> texts);
   /// Appends a list of tokens: of a prim's children or properties.
   Result<UsdcValue> tokens(std::span<const std::string> texts);
   /// Appends an edit that puts tokens in front of a list.

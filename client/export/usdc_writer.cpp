@@ -23,7 +23,9 @@ class UsdcWriter : public StrandWriter {
     half_width_ = 0.5 * *std::max_element(strands.widths().begin(), strands.widths().end());
   }
 
-  Status begin() { return append_frame(options_.first_number - 1, strands_.rest_points(), strands_.rest_head_points()); }
+  Status begin() {
+    return append_frame(options_.first_number - 1, strands_.rest_points(), strands_.rest_head_points());
+  }
 
   Status write(const ExportFrame& frame) override {
     const bool has_moving_head = options_.has_head && options_.space == ExportSpace::World;
@@ -109,7 +111,7 @@ class UsdcWriter : public StrandWriter {
     root.fields = {{"defaultPrim", file_.token("Hair")},
                    {"documentation", file_.string(usd_description(options_, strands_))},
                    {"upAxis", file_.token(options_.up == ExportUp::Y ? "Y" : "Z")}};
-    for (const auto& [name, value] : {std::pair("metersPerUnit", metres_of(options_.unit)),
+    for (const auto& [name, value] : {std::pair("metersPerUnit", options_.unit_m),
                                       {"startTimeCode", first},
                                       {"endTimeCode", std::max(times_.back(), first)},
                                       {"timeCodesPerSecond", options_.fps.hz()},
@@ -137,17 +139,29 @@ class UsdcWriter : public StrandWriter {
                                        {"userProperties:groom_version_minor", kUsdGroomMinor}})
       add(curves, name, "int", UsdcValue::of(UsdcType::Int, number, UsdcValue::kInlined))
           .fields.emplace_back("custom", UsdcValue::of(UsdcType::Bool, 1, UsdcValue::kInlined));
-    const bool is_guide = options_.role == ExportRole::Guides;
-    for (const auto& [name, number] :
-         {std::pair("primvars:groom_guide", is_guide ? 1 : 0), {"primvars:groom_group_id", 0}})
-      RETURN_IF_ERROR(add_ints(curves, name, std::vector<int32_t>(counts.size(), number), "uniform"));
+    RETURN_IF_ERROR(describe_groom(curves));
+    RETURN_IF_ERROR(add_series(curves, "points", "point3f[]", points_));
+    return add_series(curves, "extent", "float3[]", extent_);
+  }
+
+  /// Adds what Unreal asks of each strand.
+  Status describe_groom(UsdcItem& curves) {
+    const std::vector<int16_t> guides = strands_.guides();
+    RETURN_IF_ERROR(add_ints(curves, "primvars:groom_guide",
+                             std::vector<int32_t>(guides.begin(), guides.end()), "uniform"));
+    RETURN_IF_ERROR(add_ints(curves, "primvars:groom_group_id", strands_.groups(), "uniform"));
+    RETURN_IF_ERROR(add_ints(curves, "primvars:groom_id", strands_.ids(), "uniform"));
+    if (const std::vector<std::string> names = strands_.names(); !names.empty()) {
+      ASSIGN_OR_RETURN(const UsdcValue texts, file_.strings(names));
+      add(curves, "primvars:groom_group_name", "string[]", texts)
+          .fields.emplace_back("interpolation", file_.token("uniform"));
+    }
     const std::vector<glm::vec2> uv = strands_.root_uv();
     ASSIGN_OR_RETURN(const UsdcValue root_uv,
                      file_.array(UsdcType::Vec2f, uv.size(), std::as_bytes(std::span(uv))));
     add(curves, "primvars:groom_root_uv", "texCoord2f[]", root_uv)
         .fields.emplace_back("interpolation", file_.token("uniform"));
-    RETURN_IF_ERROR(add_series(curves, "points", "point3f[]", points_));
-    return add_series(curves, "extent", "float3[]", extent_);
+    return {};
   }
 
   Status describe_head(UsdcItem& head) {

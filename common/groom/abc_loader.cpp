@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <string>
 #include <utility>
@@ -66,6 +67,12 @@ std::vector<double> even_knots(size_t point_count, size_t order) {
   return knots;
 }
 
+/// A group or an id; 0 for what is none.
+int32_t whole_number(double value) {
+  constexpr double kMost = std::numeric_limits<int32_t>::max();
+  return std::abs(value) <= kMost ? static_cast<int32_t>(value) : 0;
+}
+
 std::optional<size_t> element_of(AbcScope scope, const AbcCurves& curves, size_t strand,
                                  size_t first_vertex) {
   switch (scope) {
@@ -94,9 +101,13 @@ class AbcLoading {
       if (const Status added = add_object(tree, node); !added) return at(tree.path(node), added.error());
     }
     leave_out_guides();
-    // Strand coordinates stay when all strands have them.
+    // What strands say stays when all of them say it.
     const auto lacks_uv = [](const glm::vec2& uv) { return std::isnan(uv.x); };
+    const auto lacks = [](float value) { return std::isnan(value); };
     if (std::any_of(groom_.root_uv.begin(), groom_.root_uv.end(), lacks_uv)) groom_.root_uv.clear();
+    if (std::any_of(labels_.width.begin(), labels_.width.end(), lacks)) labels_.width.clear();
+    if (!tally_.has_ids || lacks_ids_) labels_.id.clear();
+    if (tally_.groups.empty()) labels_.group.clear();
     if (groom_.strand_count() > 0) return {};
     return make_error(ErrorCode::BadInput, "there are no curves with strands to read{}",
                       tally_.hidden_objects + tally_.closed_objects + tally_.unknown_objects > 0
@@ -114,6 +125,7 @@ class AbcLoading {
     stated.unit_reason = stated.up_axis_reason = "its description says so";
     stated.notes = notes();
     stated.groom = with_pinning(std::move(groom_), Pinning::Root);
+    stated.labels = std::move(labels_);
     return stated;
   }
 
@@ -144,7 +156,7 @@ class AbcLoading {
       tally_.time_s = reader.time_s(0);
     }
     ASSIGN_OR_RETURN(const glm::dmat4 world, tree.world_from_node(archive_, node, reader.time_s(0)));
-    RETURN_IF_ERROR(count_widths(reader, curves));
+    labels_.object_name.push_back(tree.nodes()[node].object.name);
     return add_strands(reader, curves, world);
   }
 
@@ -153,11 +165,14 @@ class AbcLoading {
     ASSIGN_OR_RETURN(const auto group, strand_param(reader, curves, "groom_group_id"));
     ASSIGN_OR_RETURN(const auto id, strand_param(reader, curves, "groom_id"));
     ASSIGN_OR_RETURN(const auto uv, root_uv(reader, curves));
+    ASSIGN_OR_RETURN(const auto width, width_of(reader, curves));
+    RETURN_IF_ERROR(count_widths(reader, width));
+    const double scale = std::cbrt(std::abs(glm::determinant(glm::dmat3(world))));
     ASSIGN_OR_RETURN(Splines splines, read_splines(reader, curves));
     // One large object is not grown step by step; many small ones are.
     const size_t known = groom_.rest_position_m.size();
     if (curves.points.size() > known) groom_.rest_position_m.reserve(known + curves.points.size());
-    if (id) tally_.has_ids = true;
+    (id ? tally_.has_ids : lacks_ids_) = true;
     size_t first = 0;
     for (size_t strand = 0; strand < curves.vertex_counts.size(); ++strand) {
       const size_t count = curves.vertex_counts[strand];
@@ -187,6 +202,13 @@ class AbcLoading {
       constexpr size_t kMostGroups = 1'000;  // that are told apart
       const double group_id = group ? value_of(group, 0) : NAN;
       if (std::isfinite(group_id) && tally_.groups.size() < kMostGroups) tally_.groups.insert(group_id);
+      labels_.group.push_back(whole_number(group_id));
+      labels_.id.push_back(id ? whole_number(value_of(id, 0)) : 0);
+      labels_.object.push_back(static_cast<uint32_t>(labels_.object_name.size() - 1));
+      for (size_t i = 0; i < count; ++i) {
+        const auto element = width ? element_of(width->scope, curves, strand, begin + i) : std::nullopt;
+        labels_.width.push_back(element ? static_cast<float>(scale * width->param.number(*element)) : NAN);
+      }
       groom_.root_uv.emplace_back(uv ? glm::vec2(value_of(uv, 0), value_of(uv, 1)) : glm::vec2(NAN));
     }
     return {};
@@ -226,23 +248,31 @@ class AbcLoading {
     return std::optional<StrandParam>();
   }
 
-  Status count_widths(const AbcCurvesReader& reader, const AbcCurves& curves) {
-    ASSIGN_OR_RETURN(auto width, reader.param("groom_width", 0));
+  /// Diameters, negative ones never; empty if there are none that fit.
+  static Result<std::optional<StrandParam>> width_of(const AbcCurvesReader& reader, const AbcCurves& curves) {
+    for (const char* const name : {"groom_width", "width"}) {
+      ASSIGN_OR_RETURN(auto width, reader.param(name, 0));
+      if (!width || width->count() == 0) continue;
+      const std::optional<AbcScope> scope = curves.scope_of(*width);
+      bool is_fit = scope.has_value();
+      for (size_t i = 0; i < width->count(); ++i)
+        is_fit = is_fit && width->number(i) >= 0.0 && std::isfinite(width->number(i));
+      return is_fit ? std::optional(StrandParam{std::move(*width), *scope}) : std::nullopt;
+    }
+    return std::optional<StrandParam>();
+  }
+
+  Status count_widths(const AbcCurvesReader& reader, const std::optional<StrandParam>& width) {
     if (!width) {
-      ASSIGN_OR_RETURN(width, reader.param("width", 0));
-    }
-    if (!width || width->count() == 0) return {};
-    bool is_fit = curves.scope_of(*width).has_value();
-    double least = width->number(0), most = least;
-    for (size_t i = 0; i < width->count(); ++i) {
-      const double value = width->number(i);
-      is_fit = is_fit && value >= 0.0 && std::isfinite(value);
-      least = std::min(least, value);
-      most = std::max(most, value);
-    }
-    if (!is_fit) {
-      ++tally_.unfit_widths;
+      ASSIGN_OR_RETURN(const auto named, reader.param("groom_width", 0));
+      ASSIGN_OR_RETURN(const auto plain, reader.param("width", 0));
+      if ((named && named->count() > 0) || (plain && plain->count() > 0)) ++tally_.unfit_widths;
       return {};
+    }
+    double least = width->param.number(0), most = least;
+    for (size_t i = 0; i < width->param.count(); ++i) {
+      least = std::min(least, width->param.number(i));
+      most = std::max(most, width->param.number(i));
     }
     tally_.least_width = tally_.most_width == 0.0 ? least : std::min(tally_.least_width, least);
     tally_.most_width = std::max(tally_.most_width, most);
@@ -290,6 +320,8 @@ class AbcLoading {
     are_all_guides_ = tally_.guides == is_guide_.size();
     if (tally_.guides == 0 || are_all_guides_) return;
     Groom hair;
+    StrandLabels labels;
+    labels.object_name = std::move(labels_.object_name);
     hair.offset.push_back(0);
     for (uint32_t strand = 0; strand < groom_.strand_count(); ++strand) {
       if (is_guide_[strand] != 0) continue;
@@ -298,8 +330,15 @@ class AbcLoading {
                                   points + groom_.offset[strand + 1]);
       hair.offset.push_back(static_cast<uint32_t>(hair.rest_position_m.size()));
       hair.root_uv.push_back(groom_.root_uv[strand]);
+      labels.id.push_back(labels_.id[strand]);
+      labels.group.push_back(labels_.group[strand]);
+      labels.object.push_back(labels_.object[strand]);
+      const auto widths = labels_.width.begin();
+      labels.width.insert(labels.width.end(), widths + groom_.offset[strand],
+                          widths + groom_.offset[strand + 1]);
     }
     groom_ = std::move(hair);
+    labels_ = std::move(labels);
   }
 
   std::vector<std::string> notes() const {
@@ -321,7 +360,7 @@ class AbcLoading {
          fmt::format("{} cubic curves ({}) became as many points on each curve as it has control points; "
                      "groom.file.vertex_count asks for others",
                      t.cubic_strands, t.basis));
-    note(t.most_width > 0.0, fmt::format("widths of {:.4g} to {:.4g} units are not taken over: "
+    note(t.most_width > 0.0, fmt::format("widths of {:.4g} to {:.4g} units are kept for exports: "
                                          "look.strand_radius_m says how thick hair is drawn",
                                          t.least_width, t.most_width));
     note(t.unfit_widths,
@@ -341,12 +380,15 @@ class AbcLoading {
                        : fmt::format("{} guides (groom_guide) are left out", t.guides));
     note(t.groups.size() > 1,
          fmt::format("{} groups (groom_group_id) are one head of hair", t.groups.size()));
-    note(t.has_ids, "ids (groom_id) are not taken over: strands stay in the file's order");
+    note(t.has_ids,
+         "ids (groom_id) change nothing here: strands stay in the file's order, and exports keep ids");
     return notes;
   }
 
   const AbcArchive& archive_;
   Groom groom_;
+  StrandLabels labels_;  // of all strands; NaN for widths that are not there
+  bool lacks_ids_ = false;
   std::vector<uint8_t> is_guide_;  // of each strand
   bool are_all_guides_ = false;
   size_t lost_instances_ = 0;

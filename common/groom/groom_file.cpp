@@ -11,7 +11,6 @@
 #include "common/groom/hair_loader.h"
 #include "common/groom/ply_loader.h"
 #include "common/groom/resample.h"
-#include "common/groom/stated_groom.h"
 #include "common/groom/tfx_loader.h"
 #include "common/groom/usd_loader.h"
 
@@ -66,7 +65,7 @@ Error call_text(const std::filesystem::path& path, Error error) {
 }
 
 Result<StatedGroom> unstated(const std::filesystem::path& path, Result<Groom> groom) {
-  if (groom) return StatedGroom{std::move(groom).value(), {}, {}, {}, {}, {}};
+  if (groom) return StatedGroom{.groom = std::move(groom).value()};
   return groom.error().code == ErrorCode::NotFound ? groom.error() : call_text(path, groom.error());
 }
 
@@ -96,26 +95,20 @@ uint32_t target_vertex_count(const Groom& groom, uint32_t wanted) {
   return std::clamp(largest, kMinVertexCount, kMaxVertexCount);
 }
 
-/// All parts of the hair in one, one behind the other. Strand coordinates stay when all parts have them.
-Groom join(std::vector<Groom> parts) {
-  Groom whole = std::move(parts.front());
-  for (size_t i = 1; i < parts.size(); ++i) {
-    const Groom& part = parts[i];
-    const auto first = static_cast<uint32_t>(whole.rest_position_m.size());
-    const bool has_uv = !whole.root_uv.empty() && !part.root_uv.empty();
-    whole.name += " + " + part.name;
-    for (size_t strand = 1; strand < part.offset.size(); ++strand)
-      whole.offset.push_back(first + part.offset[strand]);
-    whole.rest_position_m.insert(whole.rest_position_m.end(), part.rest_position_m.begin(),
-                                 part.rest_position_m.end());
-    whole.pinned.insert(whole.pinned.end(), part.pinned.begin(), part.pinned.end());
-    if (has_uv) {
-      whole.root_uv.insert(whole.root_uv.end(), part.root_uv.begin(), part.root_uv.end());
-    } else {
-      whole.root_uv.clear();
-    }
-  }
-  return whole;
+/// Adds a part of the hair behind the others.
+void join(StatedGroom& hair, StatedGroom part) {
+  Groom& whole = hair.groom;
+  const uint32_t strands = whole.strand_count();
+  const auto first = static_cast<uint32_t>(whole.rest_position_m.size());
+  join_labels(hair.labels, strands,
+              named(std::move(part.labels), part.groom.strand_count(), part.groom.name));
+  join_list(whole.root_uv, strands, part.groom.root_uv);
+  whole.name += " + " + part.groom.name;
+  for (size_t strand = 1; strand < part.groom.offset.size(); ++strand)
+    whole.offset.push_back(first + part.groom.offset[strand]);
+  whole.rest_position_m.insert(whole.rest_position_m.end(), part.groom.rest_position_m.begin(),
+                               part.groom.rest_position_m.end());
+  whole.pinned.insert(whole.pinned.end(), part.groom.pinned.begin(), part.groom.pinned.end());
 }
 
 /// What two parts of one head of hair say, when both say it, has to be the same.
@@ -131,9 +124,9 @@ Result<StatedGroom> load_parts(const GroomFileOptions& options) {
     return make_error(ErrorCode::LimitExceeded, "{} groom files, at most {} make one head of hair",
                       options.more_paths.size() + 1, kMaxGroomFiles);
   ASSIGN_OR_RETURN(StatedGroom whole, load_by_extension(options.path, options));
-  std::vector<Groom> parts(1);
-  parts.front() = std::move(whole.groom);
-  uint64_t vertex_total = parts.front().rest_position_m.size();
+  uint64_t vertex_total = whole.groom.rest_position_m.size();
+  if (!options.more_paths.empty())
+    whole.labels = named(std::move(whole.labels), whole.groom.strand_count(), whole.groom.name);
   for (const std::filesystem::path& path : options.more_paths) {
     ASSIGN_OR_RETURN(StatedGroom part, load_by_extension(path, options));
     vertex_total += part.groom.rest_position_m.size();
@@ -150,9 +143,8 @@ Result<StatedGroom> load_parts(const GroomFileOptions& options) {
     if (part.unit_m) whole.unit_m = part.unit_m;
     if (part.is_z_up) whole.is_z_up = part.is_z_up;
     whole.notes.insert(whole.notes.end(), part.notes.begin(), part.notes.end());
-    parts.push_back(std::move(part.groom));
+    join(whole, std::move(part));
   }
-  whole.groom = join(std::move(parts));
   return whole;
 }
 
@@ -160,13 +152,33 @@ std::string unit_text(float unit_m) {
   return unit_m < 0.5f ? fmt::format("{:.4g} mm", unit_m * kMmPerM) : fmt::format("{:.4g} m", unit_m);
 }
 
-std::string size_text(const Groom& groom) {
+glm::vec3 size_of(const Groom& groom) {
   glm::vec3 low = groom.rest_position_m.front(), high = low;
   for (const glm::vec3& point : groom.rest_position_m) {
     low = glm::min(low, point);
     high = glm::max(high, point);
   }
-  const glm::vec3 size_m = high - low;
+  return high - low;
+}
+
+/// What to say of a unit with which no head has this hair; empty where one might. `size`: in file units.
+std::string unlikely_unit(float unit_m, const glm::vec3& size) {
+  constexpr float kSmallestHairM = 0.03f, kLargestHairM = 6.0f;
+  const float largest = std::max({size.x, size.y, size.z});
+  const auto is_likely = [largest](float metres) {
+    return largest * metres >= kSmallestHairM && largest * metres <= kLargestHairM;
+  };
+  if (is_likely(unit_m) || !(largest > 0.0f)) return {};
+  std::string sentence = fmt::format("this hair is {} long then, as on no head", unit_text(largest * unit_m));
+  for (const float other_m : {1.0f, 0.01f, 0.001f, 0.0254f})
+    if (is_likely(other_m))
+      return sentence +
+             fmt::format(": groom.file.unit_m={:g} makes it {}", other_m, unit_text(largest * other_m));
+  return sentence;
+}
+
+std::string size_text(const Groom& groom) {
+  const glm::vec3 size_m = size_of(groom);
   return fmt::format("{:.2f} x {:.2f} x {:.2f} m", size_m.x, size_m.y, size_m.z);
 }
 
@@ -213,6 +225,8 @@ PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
     placement.unit_m = *stated.unit_m;
     placed.notes.push_back(fmt::format("1 unit = {}: {} (groom.file.unit_m overrides it)",
                                        unit_text(*stated.unit_m), stated.unit_reason));
+    if (std::string unlikely = unlikely_unit(*stated.unit_m, size_of(groom)); !unlikely.empty())
+      placed.notes.push_back(std::move(unlikely));
   } else {
     const Guess<float> guess = guess_unit(groom);
     placement.unit_m = guess.value;
@@ -224,6 +238,8 @@ PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
   rest.is_z_up = false;
   for (glm::vec3& point : groom.rest_position_m) point = rest.place(point);
   groom.file_unit_m = placement.unit_m;
+  placed.labels = std::move(stated.labels);
+  for (float& width : placed.labels.width) width *= placement.unit_m;
   placed.groom = std::move(groom);
   return placed;
 }
@@ -242,8 +258,10 @@ Result<PlacedGroom> load_placed_groom(const GroomFileOptions& options) {
   // Before resampling, so that overflown coordinates never enter its sums.
   if (const Status checked = validate(placed.groom); !checked) return at(place_name, checked.error());
   const uint32_t vertex_count = target_vertex_count(placed.groom, options.vertex_count);
-  if (placed.groom.uniform_vertex_count() != vertex_count)
+  if (placed.groom.uniform_vertex_count() != vertex_count) {
+    placed.labels.width = resample(placed.groom, placed.labels.width, vertex_count);
     placed.groom = resample(placed.groom, vertex_count);
+  }
   if (options.pinning) placed.groom = with_pinning(std::move(placed.groom), *options.pinning);
   placed.notes.push_back(fmt::format("{} strands x {} vertices, {}", placed.groom.strand_count(),
                                      placed.groom.uniform_vertex_count(), size_text(placed.groom)));

@@ -12,6 +12,7 @@
 #include "common/base/result.h"
 #include "common/groom/groom.h"
 #include "common/groom/placement.h"
+#include "common/groom/stated_groom.h"
 
 namespace strandcast {
 
@@ -32,6 +33,7 @@ struct GroomFileOptions {
 
 struct PlacedGroom {
   Groom groom;
+  StrandLabels labels;  // of its strands and vertices
   GroomPlacement placement;
   std::vector<std::string>
       notes;  // a sentence for each thing that the file says or that was guessed, and why

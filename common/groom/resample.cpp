@@ -1,6 +1,7 @@
 #include "common/groom/resample.h"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 
 #include "common/base/check.h"
@@ -17,19 +18,25 @@ std::vector<double> arc_lengths(std::span<const glm::vec3> strand) {
   return arc;
 }
 
-void append_resampled(std::span<const glm::vec3> strand, uint32_t vertex_count,
-                      std::vector<glm::vec3>& positions) {
+/// Where a vertex of the resampled strand lies: between two of the strand, so far along.
+struct ArcPlace {
+  size_t segment = 0;
+  double blend = 0.0;
+};
+
+/// Places of all vertices; the first and the last are those of the strand.
+std::vector<ArcPlace> arc_places(std::span<const glm::vec3> strand, uint32_t vertex_count) {
   const std::vector<double> arc = arc_lengths(strand);
-  positions.push_back(strand.front());
+  std::vector<ArcPlace> places{{0, 0.0}};
   size_t segment = 0;
   for (uint32_t vertex = 1; vertex + 1 < vertex_count; ++vertex) {
     const double target = arc.back() * vertex / (vertex_count - 1);
     while (segment + 2 < strand.size() && arc[segment + 1] < target) ++segment;
     const double span = arc[segment + 1] - arc[segment];
-    const double blend = span > 0.0 ? std::clamp((target - arc[segment]) / span, 0.0, 1.0) : 0.0;
-    positions.emplace_back(glm::mix(glm::dvec3(strand[segment]), glm::dvec3(strand[segment + 1]), blend));
+    places.push_back({segment, span > 0.0 ? std::clamp((target - arc[segment]) / span, 0.0, 1.0) : 0.0});
   }
-  positions.push_back(strand.back());
+  places.push_back({strand.size() - 2, 1.0});
+  return places;
 }
 
 void append_pins(std::span<const uint8_t> pinned, uint32_t vertex_count, std::vector<uint8_t>& pins) {
@@ -58,12 +65,26 @@ Groom resample(const Groom& groom, uint32_t vertex_count) {
   result.offset.push_back(0);
   for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
     const uint32_t begin = groom.offset[strand], count = groom.vertex_count(strand);
-    append_resampled(std::span(groom.rest_position_m).subspan(begin, count), vertex_count,
-                     result.rest_position_m);
+    const auto points = std::span(groom.rest_position_m).subspan(begin, count);
+    for (const ArcPlace& place : arc_places(points, vertex_count))
+      result.rest_position_m.emplace_back(
+          glm::mix(glm::dvec3(points[place.segment]), glm::dvec3(points[place.segment + 1]), place.blend));
     append_pins(std::span(groom.pinned).subspan(begin, count), vertex_count, result.pinned);
     result.offset.push_back(static_cast<uint32_t>(result.rest_position_m.size()));
   }
   return result;
+}
+
+std::vector<float> resample(const Groom& groom, const std::vector<float>& values, uint32_t vertex_count) {
+  std::vector<float> resampled;
+  for (uint32_t strand = 0; !values.empty() && strand < groom.strand_count(); ++strand) {
+    const uint32_t begin = groom.offset[strand];
+    const auto points = std::span(groom.rest_position_m).subspan(begin, groom.vertex_count(strand));
+    for (const ArcPlace& place : arc_places(points, vertex_count))
+      resampled.push_back(std::lerp(values[begin + place.segment], values[begin + place.segment + 1],
+                                    static_cast<float>(place.blend)));
+  }
+  return resampled;
 }
 
 }  // namespace strandcast

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "common/groom/groom.h"
 
@@ -11,5 +12,8 @@ namespace strandcast {
 /// the old polyline. End points keep their bits; a strand of length zero keeps all vertices at its root.
 /// Vertices pinned at the root and tip keep their number; pins in between are dropped.
 Groom resample(const Groom& groom, uint32_t vertex_count);
+
+/// Returns a value for each of those vertices, of `values` at the groom's own; none of none.
+std::vector<float> resample(const Groom& groom, const std::vector<float>& values, uint32_t vertex_count);
 
 }  // namespace strandcast

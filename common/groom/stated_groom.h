@@ -1,6 +1,8 @@
-// StatedGroom: strands of a groom file with the units and axes that the file states. Plain data.
+// StatedGroom: strands of a groom file with what the file states: units, axes, names and widths. Plain data.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,13 +11,50 @@
 
 namespace strandcast {
 
+/// What files say of strands besides their shape, in their order; a list is empty where they do not say it.
+struct StrandLabels {
+  std::vector<int32_t> id;               // (strand_count)
+  std::vector<int32_t> group;            // (strand_count)
+  std::vector<uint32_t> object;          // (strand_count) the curves that it belongs to, in object_name
+  std::vector<std::string> object_name;  // of them
+  std::vector<float> width;              // (vertex total) diameter; file units, metres once placed
+};
+
+/// Adds a list of further strands or vertices to that of the `count` before: kept where all have it.
+template <class T>
+void join_list(std::vector<T>& whole, size_t count, const std::vector<T>& part) {
+  if (count > 0 && (whole.empty() || part.empty()))
+    whole.clear();
+  else
+    whole.insert(whole.end(), part.begin(), part.end());
+}
+
+/// Adds the labels of further strands to those of the `strand_count` before.
+inline void join_labels(StrandLabels& whole, size_t strand_count, const StrandLabels& part) {
+  join_list(whole.id, strand_count, part.id);
+  join_list(whole.group, strand_count, part.group);
+  join_list(whole.width, strand_count, part.width);
+  const auto first = static_cast<uint32_t>(whole.object_name.size());
+  for (const uint32_t object : part.object) whole.object.push_back(first + object);
+  whole.object_name.insert(whole.object_name.end(), part.object_name.begin(), part.object_name.end());
+}
+
+/// Returns labels in which all strands belong to objects: to this one, if they belong to none.
+inline StrandLabels named(StrandLabels labels, size_t strand_count, const std::string& object_name) {
+  if (!labels.object_name.empty()) return labels;
+  labels.object.assign(strand_count, 0);
+  labels.object_name = {object_name};
+  return labels;
+}
+
 struct StatedGroom {
-  Groom groom;                  // in file units
-  std::optional<float> unit_m;  // metres per file unit; empty: the file does not say
-  std::optional<bool> is_z_up;  // as GroomPlacement; empty: the file does not say
-  std::string unit_reason;      // where the file says it: "its metersPerUnit says so"
-  std::string up_axis_reason;
-  std::vector<std::string> notes;  // a sentence for each thing about the file that a person should know
+  Groom groom = {};  // in file units
+  StrandLabels labels = {};
+  std::optional<float> unit_m = {};  // metres per file unit; empty: the file does not say
+  std::optional<bool> is_z_up = {};  // as GroomPlacement; empty: the file does not say
+  std::string unit_reason = {};      // where the file says it: "its metersPerUnit says so"
+  std::string up_axis_reason = {};
+  std::vector<std::string> notes = {};  // a sentence for each thing about the file that a person should know
 };
 
 }  // namespace strandcast

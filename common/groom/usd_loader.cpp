@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 
 #include "common/groom/curve_basis.h"
 #include "common/groom/text_scan.h"
@@ -17,7 +19,7 @@ constexpr std::string_view kZipMagic = "PK\x03\x04";
 struct Tally {
   size_t curves_prims = 0;
   size_t left_out_prims = 0;
-  size_t cubic_strands = 0;
+  size_t cubic_strands = 0, short_strands = 0;
   std::string basis;
   std::optional<double> time_code;
   float least_width = 0.0f, most_width = 0.0f;
@@ -53,6 +55,31 @@ Result<CurveKind> kind_of(const UsdCurves& curves) {
   return kind;
 }
 
+/// Leaves out what has no segment, and says of how many curves.
+UsdCurves without_short(UsdCurves curves, Tally& tally) {
+  const size_t strands = curves.vertex_counts.size(), points = curves.points.size();
+  const auto is_short = [](uint32_t count) { return count < kMinVertexCount; };
+  const auto total = std::accumulate(curves.vertex_counts.begin(), curves.vertex_counts.end(), uint64_t{0});
+  if (std::none_of(curves.vertex_counts.begin(), curves.vertex_counts.end(), is_short) || total != points)
+    return curves;
+  // Of each list, the elements of the strands that stay: of one a strand, of one a point, or of two a strand.
+  const auto keep = [&](auto& list, size_t per_strand, bool is_of_points) {
+    if (list.size() != (is_of_points ? points : per_strand * strands)) return;
+    size_t from = 0, to = 0;
+    for (const uint32_t count : curves.vertex_counts)
+      for (size_t i = 0, end = is_of_points ? count : per_strand; i < end; ++i, ++from)
+        if (!is_short(count)) list[to++] = list[from];
+    list.resize(to);
+  };
+  keep(curves.widths, 1, curves.widths.size() == points);
+  keep(curves.points, 1, true);
+  keep(curves.ids, 1, false);
+  keep(curves.groups, 1, false);
+  keep(curves.root_uv, 2, false);
+  tally.short_strands += std::erase_if(curves.vertex_counts, is_short);
+  return curves;
+}
+
 Status check_counts(const UsdCurves& curves) {
   uint64_t total = 0;
   for (size_t curve = 0; curve < curves.vertex_counts.size(); ++curve) {
@@ -68,8 +95,35 @@ Status check_counts(const UsdCurves& curves) {
   return {};
 }
 
-Status add_curves(const UsdStage& stage, size_t prim, Groom& groom, Tally& tally) {
-  const UsdCurves& curves = *stage.prim[prim].curves;
+constexpr double kMostLabel = std::numeric_limits<int32_t>::max();  // of an id or a group
+
+/// Labels of these strands; lists that fit nothing are left out. `scale`: of widths.
+StrandLabels labels_of(const UsdCurves& curves, double scale) {
+  const size_t strands = curves.vertex_counts.size();
+  StrandLabels labels;
+  const auto whole_numbers = [strands](const std::vector<double>& from) {
+    std::vector<int32_t> to;
+    if (from.size() == strands)
+      for (const double value : from)
+        to.push_back(std::abs(value) <= kMostLabel ? static_cast<int32_t>(value) : 0);
+    return to;
+  };
+  labels.id = whole_numbers(curves.ids);
+  labels.group = whole_numbers(curves.groups);
+  const size_t widths = curves.widths.size();
+  const bool is_fit = (widths == 1 || widths == strands || widths == curves.points.size()) &&
+                      std::all_of(curves.widths.begin(), curves.widths.end(),
+                                  [](float width) { return width >= 0.0f && std::isfinite(width); });
+  for (size_t strand = 0; is_fit && strand < strands; ++strand)
+    for (uint32_t i = 0; i < curves.vertex_counts[strand]; ++i) {
+      const size_t element = widths == 1 ? 0 : widths == strands ? strand : labels.width.size();
+      labels.width.push_back(static_cast<float>(scale * static_cast<double>(curves.widths[element])));
+    }
+  return labels;
+}
+
+Status add_curves(const UsdStage& stage, size_t prim, Groom& groom, StrandLabels& labels, Tally& tally) {
+  const UsdCurves curves = without_short(*stage.prim[prim].curves, tally);
   RETURN_IF_ERROR(check_counts(curves));
   if (groom.strand_count() + curves.vertex_counts.size() > kMaxStrandCount ||
       groom.rest_position_m.size() + curves.points.size() > kMaxGroomVertices)
@@ -98,6 +152,17 @@ Status add_curves(const UsdStage& stage, size_t prim, Groom& groom, Tally& tally
     }
     groom.offset.push_back(static_cast<uint32_t>(groom.rest_position_m.size()));
   }
+  const size_t strands = curves.vertex_counts.size();
+  join_labels(labels, groom.strand_count() - strands,
+              named(labels_of(curves, std::cbrt(std::abs(glm::determinant(glm::dmat3(world))))), strands,
+                    stage.prim[prim].name));
+  std::vector<glm::vec2> uv;
+  const auto is_finite_number = [](auto value) { return std::isfinite(value); };
+  const bool has_uv = curves.root_uv.size() == 2 * strands &&
+                      std::all_of(curves.root_uv.begin(), curves.root_uv.end(), is_finite_number);
+  for (size_t i = 0; has_uv && i < strands; ++i)
+    uv.emplace_back(curves.root_uv[2 * i], curves.root_uv[2 * i + 1]);
+  join_list(groom.root_uv, groom.strand_count() - strands, uv);
   ++tally.curves_prims;
   if (curves.time_code) tally.time_code = curves.time_code;
   for (const float width : curves.widths) {
@@ -128,12 +193,15 @@ std::vector<std::string> notes_of(const UsdStage& stage, const Tally& tally) {
                     tally.cubic_strands, tally.basis));
   if (tally.most_width > 0.0f)
     notes.push_back(
-        fmt::format("widths of {:.4g} to {:.4g} units are not taken over: look.strand_radius_m says "
+        fmt::format("widths of {:.4g} to {:.4g} units are kept for exports: look.strand_radius_m says "
                     "how thick hair is drawn",
                     tally.least_width, tally.most_width));
   if (tally.left_out_prims > 0)
     notes.push_back(fmt::format("{} BasisCurves are left out: inactive, invisible, a class or an override",
                                 tally.left_out_prims));
+  if (tally.short_strands > 0)
+    notes.push_back(
+        fmt::format("{} curves of fewer than {} points are left out", tally.short_strands, kMinVertexCount));
   if (stage.reference_count > 0)
     notes.push_back(fmt::format("{} references, layers or variants are not followed", stage.reference_count));
   if (stage.other_curve_count > 0)
@@ -216,11 +284,15 @@ Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source) {
       ++tally.left_out_prims;
       continue;
     }
-    const Status added = add_curves(stage, prim, stated.groom, tally);
+    const Status added = add_curves(stage, prim, stated.groom, stated.labels, tally);
     if (!added) return at(fmt::format("prim {}", strandcast::quoted(stage.prim[prim].name)), added.error());
   }
   if (stated.groom.strand_count() == 0)
-    return make_error(ErrorCode::BadInput, "there are no BasisCurves to read{}", where_else(stage));
+    return make_error(ErrorCode::BadInput, "there are no BasisCurves to read{}{}",
+                      tally.short_strands > 0
+                          ? fmt::format("; {} curves have 1 vertices or none", tally.short_strands)
+                          : std::string(),
+                      where_else(stage));
   if (stage.meters_per_unit) stated.unit_m = static_cast<float>(*stage.meters_per_unit);
   stated.is_z_up = stage.is_z_up;
   stated.unit_reason = "its metersPerUnit says so";

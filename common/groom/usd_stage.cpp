@@ -7,9 +7,9 @@
 namespace strandcast {
 
 Status set_up_axis(UsdStage& stage, std::string_view axis) {
-  if (axis != "Y" && axis != "Z")
+  if (axis != "Y" && axis != "Z" && axis != "y" && axis != "z")
     return make_error(ErrorCode::BadInput, "upAxis is {}, known are Y and Z", quoted(axis));
-  stage.is_z_up = axis == "Z";
+  stage.is_z_up = axis == "Z" || axis == "z";
   return {};
 }
 
@@ -26,6 +26,13 @@ std::string* find_curves_word(UsdCurves& curves, std::string_view property) {
          : property == "basis" ? &curves.basis
          : property == "wrap"  ? &curves.wrap
                                : nullptr;
+}
+
+std::vector<double>* find_curves_numbers(UsdCurves& curves, std::string_view property) {
+  return property == "primvars:groom_id"         ? &curves.ids
+         : property == "primvars:groom_group_id" ? &curves.groups
+         : property == "primvars:groom_root_uv"  ? &curves.root_uv
+                                                 : nullptr;
 }
 
 Status set_xform_op(UsdPrim& prim, std::string_view name, std::vector<double> value, bool is_sample) {

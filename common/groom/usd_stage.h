@@ -26,7 +26,8 @@ struct UsdCurves {
   std::vector<glm::vec3> points;
   std::vector<uint32_t> vertex_counts;
   std::vector<float> widths;
-  std::string type = "cubic";  // USD's own defaults
+  std::vector<double> ids, groups, root_uv;  // primvars of Unreal's groom conventions; empty: there are none
+  std::string type = "cubic";                // USD's own defaults
   std::string basis = "bezier";
   std::string wrap = "nonperiodic";
   std::optional<double> time_code;  // of the points; empty: they have none
@@ -64,6 +65,8 @@ Status set_up_axis(UsdStage& stage, std::string_view axis);
 Status set_meters_per_unit(UsdStage& stage, double value);
 /// Returns where a word of curves belongs ("type", "basis", "wrap"), or null for any other property.
 std::string* find_curves_word(UsdCurves& curves, std::string_view property);
+/// Returns where a list of numbers of curves belongs (of Unreal's groom conventions), or null.
+std::vector<double>* find_curves_numbers(UsdCurves& curves, std::string_view property);
 /// Keeps a transform's numbers; those of a time sample stay behind those without. LimitExceeded.
 Status set_xform_op(UsdPrim& prim, std::string_view name, std::vector<double> value, bool is_sample);
 /// Whether a prim of this type is curves of another kind.

@@ -199,6 +199,11 @@ class StageReader {
       ASSIGN_OR_RETURN(curves.widths, scan_.floats(kMaxGroomVertices));
       return {};
     }
+    if (std::vector<double>* const numbers = find_curves_numbers(curves, name)) {
+      if (time && !numbers->empty()) return scan_.skip_value();
+      ASSIGN_OR_RETURN(*numbers, scan_.numbers(2 * size_t{kMaxStrandCount}));
+      return {};
+    }
     std::string* const word = find_curves_word(curves, name);
     if (word == nullptr) return scan_.skip_value();
     ASSIGN_OR_RETURN(const std::string_view value, scan_.string());

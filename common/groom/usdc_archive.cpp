@@ -29,6 +29,12 @@ std::pair<size_t, UsdcType> numbers_of(UsdcType type) {
     case UsdcType::Double:
     case UsdcType::Int:
       return {1, type};
+    case UsdcType::Vec2h:
+      return {2, UsdcType::Half};
+    case UsdcType::Vec2f:
+      return {2, UsdcType::Float};
+    case UsdcType::Vec2d:
+      return {2, UsdcType::Double};
     case UsdcType::Vec3h:
       return {3, UsdcType::Half};
     case UsdcType::Vec3f:
@@ -413,6 +419,23 @@ Result<std::vector<int32_t>> UsdcArchive::ints(UsdcValue value, size_t limit) co
   if (!value.is(UsdcValue::kPacked) || span.count < kLeastUsdcPacked)
     return source_->array<int32_t>(span.offset, span.count);
   return Cursor(*source_, span.offset, source_->size_bytes()).packed_ints(span.count);
+}
+
+Result<std::vector<double>> UsdcArchive::list(UsdcValue value, size_t limit) const {
+  const auto [count, type] = numbers_of(value.type());
+  if (!value.is(UsdcValue::kArray)) return std::vector<double>();
+  if (value.type() == UsdcType::Int || value.type() == UsdcType::UInt) {
+    ASSIGN_OR_RETURN(const auto whole, ints(value, limit));
+    return std::vector<double>(whole.begin(), whole.end());
+  }
+  if (count == 1) {
+    ASSIGN_OR_RETURN(const auto single, floats(value, limit));
+    return std::vector<double>(single.begin(), single.end());
+  }
+  if (count != 2) return std::vector<double>();
+  ASSIGN_OR_RETURN(const Span span, array_span(value, limit));
+  ASSIGN_OR_RETURN(const auto pairs, stored_floats({span.offset, 2 * span.count}, type));
+  return std::vector<double>(pairs.begin(), pairs.end());
 }
 
 Result<std::vector<glm::vec3>> UsdcArchive::points(UsdcValue value, size_t limit) const {

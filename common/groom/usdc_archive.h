@@ -59,6 +59,8 @@ class UsdcArchive {
   Result<std::vector<glm::vec3>> points(UsdcValue value, size_t limit) const;
   Result<std::vector<float>> floats(UsdcValue value, size_t limit) const;
   Result<std::vector<int32_t>> ints(UsdcValue value, size_t limit) const;
+  /// Reads an array of numbers or of pairs of them, one behind the other; empty for other values.
+  Result<std::vector<double>> list(UsdcValue value, size_t limit) const;
 
   struct Sample {
     double time = 0.0;

@@ -142,6 +142,7 @@ class CrateReader {
   static bool is_wanted(std::string_view name, UsdPrim& prim) {
     if (name == "visibility" || name.starts_with("xformOp")) return true;
     return prim.curves && (name == "points" || name == "curveVertexCounts" || name == "widths" ||
+                           find_curves_numbers(*prim.curves, name) != nullptr ||
                            find_curves_word(*prim.curves, name) != nullptr);
   }
 
@@ -199,6 +200,10 @@ class CrateReader {
     }
     if (name == "widths") {
       ASSIGN_OR_RETURN(curves.widths, archive_.floats(value, kMaxGroomVertices));
+      return {};
+    }
+    if (std::vector<double>* const numbers = find_curves_numbers(curves, name)) {
+      ASSIGN_OR_RETURN(*numbers, archive_.list(value, kMaxStrandCount));
       return {};
     }
     ASSIGN_OR_RETURN(const auto text, archive_.text(value));

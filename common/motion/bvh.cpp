@@ -50,6 +50,17 @@ struct Skeleton {
   uint32_t channel_count = 0;
 };
 
+/// A number within bounds, also with the decimal comma of some programs.
+std::optional<double> channel_value(std::string_view word) {
+  std::optional<double> value = parse_number(word);
+  if (!value && std::count(word.begin(), word.end(), ',') == 1) {
+    std::string pointed(word);
+    pointed[pointed.find(',')] = '.';
+    value = parse_number(pointed);
+  }
+  return value && std::abs(*value) <= kMaxChannelValue ? value : std::nullopt;
+}
+
 class HierarchyParser {
  public:
   explicit HierarchyParser(TextCursor& cursor) : cursor_(cursor) {}
@@ -133,9 +144,8 @@ class HierarchyParser {
     glm::dvec3 offset{0.0};
     for (int axis = 0; axis < 3; ++axis) {
       const auto word = cursor_.next_token();
-      const auto value = parse_number(word);
-      if (!value || std::abs(*value) > kMaxChannelValue)
-        return unexpected(word, "a number (OFFSET takes three)");
+      const auto value = channel_value(word);
+      if (!value) return unexpected(word, "a number (OFFSET takes three)");
       offset[axis] = *value;
     }
     return offset;
@@ -169,9 +179,9 @@ class HierarchyParser {
   Skeleton skeleton_;
 };
 
-/// True for "Head", "mixamorig:Head", "joint_head".
+/// True for "Head", "mixamorig:Head", "joint_head", "Bip01 Head".
 bool is_head_name(std::string_view name) {
-  const size_t separator = name.find_last_of(":_");
+  const size_t separator = name.find_last_of(":_ ");
   if (separator != std::string_view::npos) name.remove_prefix(separator + 1);
   return equals_ignoring_case(name, "head");
 }
@@ -208,9 +218,19 @@ bool guess_z_up(const std::vector<const Joint*>& path) {
   return head.z > kUpClearly * std::abs(head.y);
 }
 
+constexpr double kLeastLegShare = 0.1;  // of the height above the hips
+
+/// Where a joint lies from the one above it: its positions in a row go before its OFFSET.
+glm::dvec3 place_of(const Joint& joint, std::span<const double> row) {
+  glm::dvec3 place = joint.offset;
+  for (size_t i = 0; i < joint.channels.size(); ++i)
+    if (!joint.channels[i].is_rotation) place[joint.channels[i].axis] = row[joint.first_channel + i];
+  return place;
+}
+
 /// Body height, file units: the bones from the hips down to the lowest point and up to the highest one, as
 /// long as they are; rest poses often spread the legs. 0 for a skeleton without extent.
-double body_height(const Skeleton& skeleton, bool is_z_up) {
+double body_height(const Skeleton& skeleton, bool is_z_up, std::span<const double> first_row) {
   struct Reach {
     double height = 0.0;  // above the root with all rotations zero
     double bones = 0.0;   // length of the bones from the root
@@ -220,8 +240,12 @@ double body_height(const Skeleton& skeleton, bool is_z_up) {
     return Reach{parent.height + offset[up], parent.bones + glm::length(offset)};
   };
   std::vector<Reach> reach;
-  for (const Joint& joint : skeleton.joints)
-    reach.push_back(joint.parent == kNoJoint ? Reach{} : grown(reach[joint.parent], joint.offset));
+  double root_height = 0.0;
+  for (const Joint& joint : skeleton.joints) {
+    const glm::dvec3 place = place_of(joint, first_row);
+    if (joint.parent == kNoJoint) root_height = place[up];
+    reach.push_back(joint.parent == kNoJoint ? Reach{} : grown(reach[joint.parent], place));
+  }
   const size_t joint_count = reach.size();
   for (const EndSite& site : skeleton.end_sites) {
     CHECK(site.parent < joint_count);
@@ -229,7 +253,9 @@ double body_height(const Skeleton& skeleton, bool is_z_up) {
   }
   const auto [lowest, highest] = std::minmax_element(
       reach.begin(), reach.end(), [](const Reach& a, const Reach& b) { return a.height < b.height; });
-  return lowest->bones + highest->bones;
+  // Of a body without legs the hips are as high as these would be long.
+  const bool has_legs = lowest->height < -kLeastLegShare * highest->height;
+  return (has_legs ? lowest->bones : std::max(root_height, 0.0)) + highest->bones;
 }
 
 /// Sets the clip's unit to the one that makes a body of `height` file units about as tall as people are.
@@ -301,7 +327,7 @@ Result<MotionHeader> parse_motion_header(TextCursor& cursor, uint32_t channel_co
       !equals_ignoring_case(cursor.next_token(), "Time:"))
     return cursor.fail(ErrorCode::BadInput, "expected \"Frame Time:\" after Frames");
   const auto word = cursor.next_token();
-  const auto frame_s = parse_number(word);
+  const auto frame_s = channel_value(word);
   if (!frame_s || *frame_s < kMinFrameTimeS || *frame_s > kMaxFrameTimeS)
     return cursor.fail(ErrorCode::BadInput, "frame time is \"{}\", it must be within {} .. {} s", shown(word),
                        kMinFrameTimeS, kMaxFrameTimeS);
@@ -323,8 +349,8 @@ Status parse_row(TextCursor& cursor, uint32_t frame, std::span<double> row) {
     if (word.empty())
       return cursor.fail(ErrorCode::BadInput, "frame {} has {} values, the hierarchy has {} channels", frame,
                          i, row.size());
-    const auto value = parse_number(word);
-    if (!value || std::abs(*value) > kMaxChannelValue)
+    const auto value = channel_value(word);
+    if (!value)
       return cursor.fail(ErrorCode::BadInput, "value {} of frame {} is \"{}\", not a number within 1e9", i,
                          frame, shown(word));
     row[i] = *value;
@@ -424,10 +450,11 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   }
   clip.frame_s = header.frame_s;
   clip.world_from_head.reserve(header.frame_count);
-  std::vector<double> row(skeleton.channel_count);
+  std::vector<double> row(skeleton.channel_count), first_row;
   std::array<double, 2> rest_share{};
   for (uint32_t frame = 0; frame < header.frame_count; ++frame) {
     RETURN_IF_ERROR(parse_row(cursor, frame, row));
+    if (frame == 0) first_row = row;
     if (frame < rest_share.size()) rest_share[frame] = share_at_rest(skeleton, row);
     clip.world_from_head.push_back(evaluate(path, row));
     const Pose& at_frame = clip.world_from_head.back();
@@ -445,7 +472,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   const bool is_z_up = options.is_z_up.value_or(guess_z_up(path));
   if (is_z_up && !options.is_z_up)
     clip.up_reason = "+Z is taken as up: there the head is above the hips in the rest pose";
-  const double height = body_height(skeleton, is_z_up);
+  const double height = body_height(skeleton, is_z_up, first_row);
   const bool is_guessed = options.unit_m == 0.0;
   if (is_guessed && !(height > 0.0))
     return at(place, make_error(ErrorCode::BadInput,

@@ -5,13 +5,13 @@
 #include <utility>
 
 #include "common/groom/bust_skin.h"
-#include "common/groom/groom_file.h"
 #include "common/groom/head_fit.h"
 #include "common/groom/head_measure.h"
 #include "common/groom/head_shape.h"
 #include "common/groom/head_spheres.h"
 #include "common/groom/procedural.h"
 #include "common/groom/restyled.h"
+#include "common/scene/file_groom.h"
 
 namespace strandcast {
 namespace {
@@ -23,29 +23,6 @@ constexpr uint32_t kScalpVertices = 2'000;
 constexpr double kLeastTargetShare = 0.1;
 glm::vec3 head_center(const HeadDesc& head) {
   return head.has_center ? head.center_m : glm::vec3(0.0f);
-}
-
-/// Hair of files; without an origin its head is moved to the head joint, which a head turns about much more
-/// nearly than about a file's origin between the feet.
-Result<PlacedGroom> load_hair_of(const FileGroomDesc& file) {
-  GroomFileOptions options;
-  options.path = file.path;
-  options.more_paths = file.more_paths;
-  options.unit_m = file.unit_m;
-  options.is_z_up = file.has_up_axis ? std::optional(file.up_axis == UpAxis::Z) : std::nullopt;
-  options.yaw_deg = file.has_yaw ? std::optional(file.yaw_deg) : std::nullopt;
-  if (file.has_origin) options.origin = file.origin;
-  options.vertex_count = file.vertex_count;
-  options.strand_vertex_count = file.strand_vertex_count;
-  if (file.has_pinning) options.pinning = file.pinning;
-  ASSIGN_OR_RETURN(PlacedGroom hair, load_placed_groom(options));
-  if (!file.has_origin) {
-    const glm::vec3 shift_m = -fit_head(hair.groom).center_m;
-    for (glm::vec3& position : hair.groom.rest_position_m) position += shift_m;
-    hair.placement.shift_m = shift_m;
-  }
-  hair.groom = reorder(hair.groom, make_prefix_order(hair.groom));
-  return hair;
 }
 
 /// Hair that grows has the length and the curls that are asked for; those of a file are changed.
@@ -80,8 +57,8 @@ Result<Groom> load_target_of(const SceneDesc& scene, const Groom& groom) {
   const GroomDesc& desc = *scene.target_groom;
   Groom target;
   if (const auto* file = std::get_if<FileGroomDesc>(&desc)) {
-    ASSIGN_OR_RETURN(PlacedGroom hair, load_hair_of(*file));
-    target = std::move(hair.groom);
+    ASSIGN_OR_RETURN(const FileGroom hair, load_file_groom(*file));
+    target = hair.simulated();
   } else {
     ASSIGN_OR_RETURN(target, grow_hair_of(scene, std::get<ProceduralGroomDesc>(desc), {}));
   }
@@ -146,10 +123,10 @@ Result<SceneContent> load_scene_content(const SceneDesc& scene) {
   SceneContent content;
   GroomPlacement placement;
   if (const auto* file = std::get_if<FileGroomDesc>(&scene.groom)) {
-    ASSIGN_OR_RETURN(PlacedGroom hair, load_hair_of(*file));
-    content.groom = std::move(hair.groom);
-    content.notes = std::move(hair.notes);
-    placement = hair.placement;
+    ASSIGN_OR_RETURN(FileGroom hair, load_file_groom(*file));
+    content.groom = hair.simulated();
+    content.notes = std::move(hair.placed.notes);
+    placement = hair.placed.placement;
   } else {
     ASSIGN_OR_RETURN(content.groom,
                      grow_hair_of(scene, std::get<ProceduralGroomDesc>(scene.groom), scene.hair));

@@ -85,8 +85,12 @@ for (const name of ["hair.usda", "hair.usdc", "hair.usdz"]) {
   for (const [time, points] of samples) assertNear(points, frames.get(time).points, `points at ${time}`);
   for (const [name, value] of [["groom_version_major", 1], ["groom_version_minor", 5]])
     assert.equal(Number(valueOf(text, `userProperties:${name}`)), value);
-  for (const name of ["groom_guide", "groom_group_id"])
-    assert.deepEqual(numbers(valueOf(text, `primvars:${name}`)), frames.get(0).counts.map(() => 0));
+  for (const [name, ofStrand] of [["groom_guide", () => 0], ["groom_group_id", (i) => i % 3], ["groom_id", (i) => 1000 - i]])
+    assert.deepEqual(numbers(valueOf(text, `primvars:${name}`)), frames.get(0).counts.map((_, i) => ofStrand(i)));
+  assert.deepEqual(
+    valueOf(text, "primvars:groom_group_name").match(/\w+(?=")/g),
+    frames.get(0).counts.map((_, i) => ["fringe", "back"][i % 2]),
+  );
   assert.equal(numbers(valueOf(text, "primvars:groom_root_uv")).length, 2 * frames.get(0).counts.length);
   for (const [time, box] of samplesOf(text, "extent")) {
     const points = frames.get(time).points;

@@ -32,6 +32,15 @@ class MadeStates : public ExportSource {
     asset.vertex_count = kVertices;
     asset.rest_position_m = positions_at(0.0);
     scene_ = {std::make_shared<const SceneAsset>(asset), 0.0002f, 0.25f};
+    auto origin = std::make_shared<ExportOrigin>();
+    origin->object_name = {"fringe", "back"};
+    for (uint32_t strand = 0; strand < kStrands; ++strand) {
+      origin->place.push_back(strand);
+      origin->id.push_back(1'000 - static_cast<int32_t>(strand));
+      origin->group.push_back(static_cast<int32_t>(strand % 3));
+      origin->object.push_back(strand % 2);
+    }
+    scene_.origin = std::move(origin);
   }
   const ExportScene& scene() const override { return scene_; }
   Result<std::shared_ptr<const Snapshot>> next() override {

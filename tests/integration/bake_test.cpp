@@ -2,19 +2,23 @@
 // nor half a file is left behind.
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <csignal>
 #include <fstream>
+#include <set>
 
 #include "common/base/file.h"
 #include "common/groom/abc_curves.h"
 #include "common/groom/abc_tree.h"
 #include "common/motion/motion_file.h"
 #include "tests/support/child_process.h"
+#include "tests/support/made_abc.h"
 #include "tests/support/temporary_folder.h"
 
 namespace strandcast::bake_program_test {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 constexpr double kClipRateHz = 60.0, kFps = 30.0;
@@ -31,20 +35,38 @@ class Bake : public testing::Test {
             "End Site\n{\nOFFSET 0 0.2 0\n}\n}\n}\nMOTION\nFrames: "
          << kClipFrames << "\nFrame Time: " << 1.0 / kClipRateHz << "\n";
     for (int i = 0; i < kClipFrames; ++i) clip << 0.02 * i << " 0 0 0 0 0 0 0 " << 2 * i << "\n";
-    // Tufts on the crown, in metres.
+    // Tufts on the crown, in inches with +Z up, of two kinds.
     std::ofstream hair(path("hair.usda"));
-    hair << "#usda 1.0\n(\n    metersPerUnit = 1\n    upAxis = \"Y\"\n)\n\ndef BasisCurves \"hair\"\n{\n"
-            "    uniform token type = \"linear\"\n    int[] curveVertexCounts = [";
-    for (int strand = 0; strand < kTufts; ++strand) hair << (strand > 0 ? ", 6" : "6");
-    hair << "]\n    point3f[] points = [";
-    for (int strand = 0; strand < kTufts; ++strand)
-      for (int k = 0; k < 6; ++k) {
-        const double x = 0.03 * (strand % 5 - 2), z = 0.03 * (strand / 5 - 2);
-        hair << (strand + k > 0 ? ", (" : "(") << x * (1 + 0.3 * k) << ", " << 0.13 - 0.004 * k * k << ", "
-             << z * (1 + 0.3 * k) << ")";
+    hair << "#usda 1.0\n(\n    metersPerUnit = 0.0254\n    upAxis = \"Z\"\n)\n";
+    for (int kind = 0; kind < 2; ++kind) {
+      std::string counts, points, widths, ids, groups, uv;
+      for (int strand = kFirst[kind]; strand < kFirst[kind + 1]; ++strand) {
+        counts += fmt::format("{}6", counts.empty() ? "" : ", ");
+        ids += fmt::format("{}{}", ids.empty() ? "" : ", ", id_of(strand));
+        groups += fmt::format("{}{}", groups.empty() ? "" : ", ", group_of(strand));
+        uv += fmt::format("{}({}, {})", uv.empty() ? "" : ", ", uv_of(strand).x, uv_of(strand).y);
+        for (int k = 0; k < 6; ++k) {
+          const glm::dvec3 point = point_of(strand, k);
+          points += fmt::format("{}({}, {}, {})", points.empty() ? "" : ", ", point.x, point.y, point.z);
+          widths += fmt::format("{}{}", widths.empty() ? "" : ", ", width_of(strand, k));
+        }
       }
-    hair << "]\n}\n";
+      hair << fmt::format(
+          "\ndef BasisCurves \"{}\"\n{{\n    uniform token type = \"linear\"\n    int[] curveVertexCounts = "
+          "[{}]\n    point3f[] points = [{}]\n    float[] widths = [{}] (\n        interpolation = "
+          "\"vertex\"\n    )\n    int[] primvars:groom_id = [{}]\n    int[] primvars:groom_group_id = "
+          "[{}]\n    texCoord2f[] primvars:groom_root_uv = [{}]\n}}\n",
+          kName[kind], counts, points, widths, ids, groups, uv);
+    }
   }
+  static glm::dvec3 point_of(int strand, int k) {
+    const double x = 1.2 * (strand % 5 - 2), y = 1.2 * (strand / 5 - 2);
+    return {x * (1 + 0.3 * k), y * (1 + 0.3 * k), 5.2 - 0.16 * k * k};
+  }
+  static int id_of(int strand) { return 1000 - 7 * strand; }
+  static int group_of(int strand) { return strand % 3; }
+  static glm::dvec2 uv_of(int strand) { return {0.04 * strand, 1.0 - 0.03 * strand}; }
+  static double width_of(int strand, int k) { return 0.003 + 1e-4 * strand - 4e-4 * k; }
   std::string path(const char* name) const { return (folder_.path() / name).string(); }
   std::string said() const { return *load_text(path("said"), 1 << 20); }
   std::vector<std::string> words(std::vector<std::string> more) const {
@@ -57,29 +79,130 @@ class Bake : public testing::Test {
     return test::ChildProcess(STRANDCAST_CTL_PROGRAM, words(more), path("said")).wait();
   }
 
-  static constexpr int kTufts = 25;
+  static constexpr int kTufts = 25, kFirst[] = {0, 10, kTufts};
+  static constexpr const char* kName[] = {"fringe", "back"};
   TemporaryFolder folder_;
 };
 
-TEST_F(Bake, FramesAreAtTheTimesOfTheClip) {
-  ASSERT_EQ(run({"--motion", path("walk.bvh"), "--motion-unit", "1", "--units", "m", "--space", "world",
+/// The curves of a file.
+struct BakedFile {
+  explicit BakedFile(const std::string& path)
+      : archive(*AbcArchive::read(*AbcContainer::open(path))), tree(*AbcTree::read(archive)) {
+    for (const auto& node : tree.nodes())
+      if (node.kind == AbcKind::Curves) reader = *AbcCurvesReader::open(archive, node.object);
+  }
+  double value(const char* name, size_t element, uint32_t axis = 0) const {
+    const auto param = reader->param(name, 0);
+    EXPECT_TRUE(param && *param) << name;
+    return param && *param ? (*param)->number(element, axis) : NAN;
+  }
+  AbcArchive archive;
+  AbcTree tree;
+  std::optional<AbcCurvesReader> reader;
+};
+
+TEST_F(Bake, WhatTheHairBroughtComesBackInItsOwnPlaceAndOrder) {
+  ASSERT_EQ(run({"--motion", path("walk.bvh"), "--motion-unit", "1", "--to", "0.1", path("out.abc")}), 0)
+      << said();
+  const BakedFile file(path("out.abc"));
+  ASSERT_TRUE(file.reader);
+  const auto rest = file.reader->read(0, kMaxStrandCount, 1 << 20);
+  ASSERT_TRUE(rest);
+  ASSERT_EQ(rest->points.size(), size_t{kTufts} * 6);
+  const AbcProperty* const names = find_abc_property(file.reader->free_params(), "groom_group_name");
+  ASSERT_NE(names, nullptr);
+  const std::vector<std::string> name_of = file.archive.sample(*names, 0, 10'000)->texts();
+  ASSERT_EQ(name_of.size(), size_t{kTufts});
+  for (int strand = 0; strand < kTufts; ++strand) {
+    const auto at = static_cast<size_t>(strand);
+    EXPECT_EQ(file.value("groom_id", at), id_of(strand));
+    EXPECT_EQ(file.value("groom_group_id", at), group_of(strand));
+    EXPECT_EQ(name_of[at], kName[strand < kFirst[1] ? 0 : 1]);
+    EXPECT_NEAR(file.value("groom_root_uv", at, 0), uv_of(strand).x, 1e-6);
+    EXPECT_NEAR(file.value("groom_root_uv", at, 1), uv_of(strand).y, 1e-6);
+    for (size_t k = 0; k < 6; ++k) {
+      // Floats, through metres and back.
+      EXPECT_LT(glm::distance(glm::dvec3(rest->points[6 * at + k]), point_of(strand, static_cast<int>(k))),
+                2e-5);
+      EXPECT_NEAR(file.value("width", 6 * at + k), width_of(strand, static_cast<int>(k)), 1e-8);
+    }
+  }
+  EXPECT_THAT(file.archive.metadata(), AllOf(HasSubstr("unit_m=0.0254"), HasSubstr("up_axis=Z")));
+  // Who says a unit gets that, about the head's joint.
+  ASSERT_EQ(run({"--motion", path("walk.bvh"), "--motion-unit", "1", "--to", "0.1", "--units", "cm",
+                 path("other.abc")}),
+            0)
+      << said();
+  const BakedFile other(path("other.abc"));
+  const auto other_rest = other.reader->read(0, kMaxStrandCount, 1 << 20);
+  EXPECT_NEAR(glm::distance(other_rest->points[0], other_rest->points[1]),
+              2.54f * glm::distance(rest->points[0], rest->points[1]), 1e-4f);
+}
+
+// What another program has put on an animated head: the hair's roots stay on that head, in its own space.
+TEST_F(Bake, CurvesThatMoveAsOneAreTheMotion) {
+  const auto pose_of = [](double t_s) {
+    return Pose{{3.0 * t_s, 0.5, -4.0 * t_s}, glm::angleAxis(0.8 * t_s, glm::normalize(glm::dvec3(1, 0, 2)))};
+  };
+  test::MadeCurves moving;
+  moving.counts.assign(kTufts, 6);
+  for (int sample = 0; sample < 3; ++sample) {
+    std::vector<glm::vec3>& points = moving.sample.emplace_back();
+    for (int i = 0; i < 6 * kTufts; ++i) {
+      const glm::dvec3 point = point_of(i / 6, i % 6);
+      points.emplace_back(sample == 0 ? point : pose_of(0.25 * sample) * point);
+    }
+  }
+  test::MadeAbc made(path("moving.abc"));
+  made.finish({made.curves(moving)});
+  ASSERT_EQ(run({"--motion", path("moving.abc"), "--fps", "4", path("out.abc")}), 0) << said();
+  const BakedFile file(path("out.abc"));
+  ASSERT_EQ(file.reader->sample_count(), 4u);
+  for (uint64_t frame = 0; frame < 3; ++frame) {
+    const auto curves = file.reader->read(frame + 1, kMaxStrandCount, 1 << 20);
+    ASSERT_TRUE(curves);
+    double tips = 0.0;
+    for (size_t strand = 0; strand < kTufts; ++strand) {
+      const glm::dvec3 rest = point_of(static_cast<int>(strand), 0);
+      const glm::dvec3 expected = frame == 0 ? rest : pose_of(0.25 * static_cast<double>(frame)) * rest;
+      EXPECT_LT(glm::distance(glm::dvec3(curves->points[6 * strand]), expected), 2.0 * kBoundM / 0.0254)
+          << frame;
+      tips += glm::distance(curves->points[6 * strand + 5], moving.sample[frame][6 * strand + 5]);
+    }
+    EXPECT_GT(tips, frame > 0 ? 1e-3 : -1.0) << "the rest of it is simulated";
+  }
+}
+
+TEST_F(Bake, FollowersComeWithTheirGuides) {
+  ASSERT_EQ(run({"--motion", "builtin", "--to", "0.1", "--followers", "--set", "look.followers=3",
                  path("out.abc")}),
+            0)
+      << said();
+  const BakedFile file(path("out.abc"));
+  const auto rest = file.reader->read(0, kMaxStrandCount, 1 << 20);
+  ASSERT_TRUE(rest);
+  const size_t count = rest->vertex_counts.size();
+  EXPECT_GT(count, 2u * kTufts) << "followers besides strands";
+  std::set<double> ids;
+  for (size_t strand = 0; strand < count; ++strand) {
+    EXPECT_EQ(file.value("groom_guide", strand), strand < kTufts ? 1.0 : 0.0) << strand;
+    ids.insert(file.value("groom_id", strand));
+  }
+  EXPECT_EQ(ids.size(), count) << "no two have an id";
+}
+
+TEST_F(Bake, FramesAreAtTheTimesOfTheClip) {
+  ASSERT_EQ(run({"--motion", path("walk.bvh"), "--motion-unit", "1", "--units", "m", "--up", "y", "--space",
+                 "world", path("out.abc")}),
             0)
       << said();
   MotionFileOptions as_stated;
   as_stated.unit_m = 1.0;
   const auto motion = load_motion_file(path("walk.bvh"), as_stated);
   ASSERT_TRUE(motion) << motion.error().to_string();
-  auto container = AbcContainer::open(path("out.abc"));
-  ASSERT_TRUE(container);
-  const auto archive = AbcArchive::read(std::move(*container));
-  ASSERT_TRUE(archive);
-  const auto tree = AbcTree::read(*archive);
-  ASSERT_TRUE(tree);
-  std::optional<AbcCurvesReader> reader;
-  for (const auto& node : tree->nodes())
-    if (node.kind == AbcKind::Curves) reader = *AbcCurvesReader::open(*archive, node.object);
-  ASSERT_TRUE(reader);
+  const BakedFile file(path("out.abc"));
+  ASSERT_TRUE(file.reader);
+  const AbcCurvesReader* const reader = &*file.reader;
   // The rest shape, and the clip's half second at both ends.
   ASSERT_EQ(reader->sample_count(), 1u + 16u);
   // Roots go with the head, so they say where it is.

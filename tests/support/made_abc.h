@@ -18,7 +18,8 @@ struct MadeCurves {
   std::array<uint8_t, 4> kinds = {1, 0, 0, 0};  // type, wrap, basis, basis
   std::vector<int32_t> counts = {3, 2};
   std::vector<glm::vec3> points = {{0, 0, 0}, {0, 0, 1}, {0, 1, 2.5f}, {1, 0, 0}, {1, 0, -1}};
-  std::vector<float> shift = {0};  // of each sample, along x
+  std::vector<float> shift = {0};                   // of each sample, along x
+  std::vector<std::vector<glm::vec3>> sample = {};  // points of each; empty: those above, shifted
 };
 
 class MadeAbc {
@@ -44,12 +45,13 @@ class MadeAbc {
   }
 
   AbcItem curves(MadeCurves made, std::vector<AbcEntry> own = {}, std::vector<AbcEntry> free = {}) {
-    AbcEntry points{"P", AbcForm::Array, AbcType::Float, 3, made.shift.size() > 1 ? 1u : 0u, "", {}, {}};
-    for (const float shift : made.shift) {
-      std::vector<glm::vec3> moved = made.points;
-      for (glm::vec3& point : moved) point.x += shift;
-      CHECK(file_.append(points.series, abc_bytes(moved)).ok());
+    for (const float shift : made.sample.empty() ? made.shift : std::vector<float>()) {
+      made.sample.push_back(made.points);
+      for (glm::vec3& point : made.sample.back()) point.x += shift;
     }
+    AbcEntry points{"P", AbcForm::Array, AbcType::Float, 3, made.sample.size() > 1 ? 1u : 0u, "", {}, {}};
+    for (const std::vector<glm::vec3>& sample : made.sample)
+      CHECK(file_.append(points.series, abc_bytes(sample)).ok());
     own.insert(own.begin(), points);
     own.push_back(entry("nVertices", AbcForm::Array, AbcType::I32, 1, made.counts));
     own.push_back(entry("curveBasisAndType", AbcForm::Scalar, AbcType::U8, 4, made.kinds));

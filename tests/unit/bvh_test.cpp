@@ -174,7 +174,7 @@ TEST(Bvh, UnitUpAxisAndRecentring) {
 
 TEST(Bvh, FindsTheHeadByCommonNames) {
   const std::string rows = "0 0 0 0 0 0 0 0 0 0 0 0\n0 0 0 0 0 0 0 0 0 0 0 0\n";
-  for (const char* name : {"head", "mixamorig:Head", "joint_Head", "HEAD"}) {
+  for (const char* name : {"head", "mixamorig:Head", "joint_Head", "Bip01 Head", "HEAD"}) {
     std::string text = small_with(rows);
     text.replace(text.find("JOINT Head"), 10, std::string("JOINT ") + name);
     EXPECT_EQ(error_of(text), "no error") << name;
@@ -235,9 +235,33 @@ TEST(Bvh, UnitIsGuessedFromTheHeightOfTheSkeleton) {
   BvhOptions options = kPlain;
   options.unit_m = 0.0;
   // Hips, neck 1 up, head 1 up and 0.5 forward, end site 1 up: the bones are as long as the body is tall.
-  const MotionClip clip = parsed(small_with("0 3 0 0 0 0 0 0 0 0 0 0\n0 3 0 0 0 0 0 0 0 0 0 0"), options);
-  EXPECT_DOUBLE_EQ(clip.file_unit_m, kAssumedBodyHeightM / (2.0 + std::sqrt(1.25)));
-  EXPECT_NEAR(clip.world_from_head[0].position_m.y, 5.0 * clip.file_unit_m, 1e-12);
+  const double bones = 2.0 + std::sqrt(1.25);
+  const MotionClip low = parsed(small_with("0 0 0 0 0 0 0 0 0 0 0 0\n0 0 0 0 0 0 0 0 0 0 0 0"), options);
+  EXPECT_DOUBLE_EQ(low.file_unit_m, kAssumedBodyHeightM / bones);
+  // There are no legs, so the hips' own height stands for them.
+  const MotionClip clip = parsed(small_with("0 1 0 0 0 0 0 0 0 0 0 0\n0 1 0 0 0 0 0 0 0 0 0 0"), options);
+  EXPECT_DOUBLE_EQ(clip.file_unit_m, kAssumedBodyHeightM / (1.0 + bones));
+  EXPECT_NEAR(clip.world_from_head[0].position_m.y, 3.0 * clip.file_unit_m, 1e-12);
+}
+
+TEST(Bvh, UnitIsGuessedWherePositionsStandInTheRowsAlone) {
+  BvhOptions options = kPlain;
+  options.unit_m = 0.0;
+  const std::string joint = "OFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n";
+  const std::string text = "HIERARCHY\nROOT Hips\n{\n" + joint + "JOINT Head\n{\n" + joint +
+                           "End Site\n{\nOFFSET 0 0 0\n}\n}\nJOINT Foot\n{\n" + joint +
+                           "End Site\n{\nOFFSET 0 0 0\n}\n}\n}\nMOTION\nFrames: 1\nFrame Time: .01\n";
+  EXPECT_EQ(parsed(text + "0 90 0 0 80 0 0 -90 0\n", options).file_unit_m, 0.01);
+  EXPECT_THAT(error_of(text + "0 0 0 0 0 0 0 0 0\n", options), HasSubstr("no height"));
+}
+
+TEST(Bvh, DecimalCommasAreRead) {
+  const std::string row = "1.5 0 0 -2.25 0 0 0 0 0 0 0 0\n";
+  std::string commas = small_with(row + row);
+  std::replace(commas.begin(), commas.end(), '.', ',');
+  EXPECT_EQ(parsed(commas).world_from_head, parsed(small_with(row + row)).world_from_head);
+  EXPECT_EQ(parsed(commas).frame_s, 0.0083333);
+  EXPECT_THAT(error_of(small_with(row + "1,000,000 0 0 0 0 0 0 0 0 0 0 0\n")), HasSubstr("\"1,000,000\""));
 }
 
 /// A file whose bones from foot to crown are so many units long.

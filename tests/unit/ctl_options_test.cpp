@@ -21,7 +21,8 @@ inline void tell(FieldTexts& told, const std::string& where, const FeedOptions& 
                 timecode, ltc, fps, wind_mps, gust_intensity, seed, as, to);
 }
 inline void tell(FieldTexts& told, const std::string& where, const ExportCommand& all) {
-  OPTION_FIELDS(all, paths, fps, unit, up, space, is_guides, is_drawn, has_head, from, to, seconds, at_s);
+  OPTION_FIELDS(all, paths, fps, grooms, unit, up, space, is_guides, is_drawn, has_followers, has_head, from,
+                to, seconds, at_s);
 }
 inline void tell(FieldTexts& told, const std::string& where, const SceneRecordingOptions& all) {
   OPTION_FIELDS(all, scene, overrides, motion, wind, seconds, server);
@@ -129,6 +130,8 @@ const OptionRow kCommandRows[] = {
     {"--up", {"z"}, {{"exported.up", "z"}}, kOut, "export"},
     {"--space", {"world"}, {{"exported.space", "world"}}, kOut, "export"},
     {"--guides", {}, {{"exported.is_guides", "true"}}, kOut, "export"},
+    {"--groom", {"a.ply", "--groom", "b.ply"}, {{"exported.grooms", "a.ply b.ply"}}, kOut, "export"},
+    {"--followers", {}, {{"exported.has_followers", "true"}}, kOut, "export"},
     {"--drawn", {}, {{"exported.is_drawn", "true"}}, kOut, "export"},
     {"--head", {}, {{"exported.has_head", "true"}}, kOut, "export"},
     {"--from", {"2"}, {{"exported.from", "2"}}, kOut, "export"},
@@ -152,6 +155,7 @@ const OptionRow kCommandRows[] = {
     {"--up", {"z"}, {{"bake.exported.up", "z"}}, kOut, "bake"},
     {"--space", {"world"}, {{"bake.exported.space", "world"}}, kOut, "bake"},
     {"--guides", {}, {{"bake.exported.is_guides", "true"}}, kOut, "bake"},
+    {"--followers", {}, {{"bake.exported.has_followers", "true"}}, kOut, "bake"},
     {"--drawn", {}, {{"bake.exported.is_drawn", "true"}}, kOut, "bake"},
     {"--head", {}, {{"bake.exported.has_head", "true"}}, kOut, "bake"},
     {"--from", {"2"}, {{"bake.exported.from", "2"}}, kOut, "bake"},

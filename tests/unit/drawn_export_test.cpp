@@ -66,7 +66,7 @@ class DrawnExport : public testing::Test {
   DrawnExport() {
     look_.followers = 2;
     look_.style.length_spread = 0.3f;  // strands of different lengths
-    options_.unit = ExportUnit::Metre;
+    options_.unit_m = 1.0;
     options_.is_quiet = true;
     expected_ = DrawnHair::make(*asset_, look_)->strands(asset_->rest_position_m);
   }
@@ -184,8 +184,7 @@ TEST_F(DrawnExport, TheHeadIsThatOfTheSceneOnItsPose) {
     const auto placed = *usdc.archive.points(usdc_points, 1 << 20);
     ASSERT_EQ(placed.size(), points.size());
     for (size_t i = 0; i < points.size(); ++i)
-      EXPECT_LT(glm::distance(glm::dvec3(placed[i]), pose * glm::dvec3(head.position_m[i])), 1e-6)
-          << i;
+      EXPECT_LT(glm::distance(glm::dvec3(placed[i]), pose * glm::dvec3(head.position_m[i])), 1e-6) << i;
   }
   options_.is_one_frame = true;
   EXPECT_THAT(*load_text(written("hair.ply"), 1 << 26),

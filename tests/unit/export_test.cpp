@@ -12,6 +12,7 @@
 #include "common/groom/abc_tree.h"
 #include "common/groom/groom_file.h"
 #include "common/groom/usd_stage.h"
+#include "tests/support/made_states.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/usdc_found.h"
 
@@ -22,68 +23,7 @@ using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
-constexpr uint32_t kStrands = 7, kVertices = 5;
-constexpr float kQuantumM = 1e-5f;
 constexpr double kReimportM = 1e-5, kBinaryReimportM = 1e-6;
-constexpr int64_t kStepNs = 16'666'667;
-
-/// Hair that hangs from a ring and swings as cubics of time do, on a head that walks and turns.
-glm::vec3 place_of(uint32_t strand, uint32_t vertex, double t_s) {
-  const double angle = 0.9 * strand, down = 0.05 * vertex;
-  const double swing = vertex * (0.01 * t_s + 0.02 * t_s * t_s - 0.015 * t_s * t_s * t_s);
-  return {0.1 * std::cos(angle) + swing, 0.1 - down, 0.1 * std::sin(angle) - 0.5 * swing};
-}
-Pose pose_of(double t_s) {
-  return {{0.3 * t_s, 1.6, -0.2 * t_s}, glm::angleAxis(0.4 * t_s, glm::dvec3(0, 1, 0))};
-}
-std::vector<glm::vec3> positions_at(double t_s) {
-  std::vector<glm::vec3> positions;
-  for (uint32_t vertex = 0; vertex < kVertices; ++vertex)
-    for (uint32_t strand = 0; strand < kStrands; ++strand) positions.push_back(place_of(strand, vertex, t_s));
-  return positions;
-}
-std::shared_ptr<const Snapshot> state_at(int64_t sim_time_ns, const std::vector<glm::vec3>& positions) {
-  QuantiseInput input;
-  input.sim_time_ns = sim_time_ns;
-  input.world_from_head = pose_of(static_cast<double>(sim_time_ns) * 1e-9);
-  input.strand_count = kStrands;
-  input.vertex_count = kVertices;
-  input.quantum_m = kQuantumM;
-  input.position_in_head_m = positions;
-  return std::make_shared<Snapshot>(quantise(input).snapshot);
-}
-std::shared_ptr<const Snapshot> state_at(int64_t sim_time_ns) {
-  return state_at(sim_time_ns, positions_at(static_cast<double>(sim_time_ns) * 1e-9));
-}
-
-class MadeStates : public ExportSource {
- public:
-  explicit MadeStates(size_t count) {
-    SceneAsset asset;
-    asset.strand_count = kStrands;
-    asset.vertex_count = kVertices;
-    asset.rest_position_m = positions_at(0.0);
-    scene_ = {std::make_shared<const SceneAsset>(asset), 0.0002f, 0.25f};
-    for (size_t i = 0; i < count; ++i) states_.push_back(state_at(static_cast<int64_t>(i) * kStepNs));
-  }
-  const ExportScene& scene() const override { return scene_; }
-  Result<std::shared_ptr<const Snapshot>> next() override {
-    if (next_ == stop_at_) stop_ = true;
-    if (next_ < states_.size()) return states_[next_++];
-    if (end_) return *end_;
-    return std::shared_ptr<const Snapshot>();
-  }
-  std::vector<std::string> remarks() const override { return {"the source says so"}; }
-  const TimecodeTrack& timecodes() const override { return timecodes_; }
-
-  ExportScene scene_;
-  TimecodeTrack timecodes_;
-  std::vector<std::shared_ptr<const Snapshot>> states_;
-  std::optional<Error> end_;
-  size_t stop_at_ = ~size_t{0};  // whoever exports is stopped with this state
-  std::atomic<bool> stop_{false};
-  size_t next_ = 0;
-};
 
 const std::atomic<bool> kNeverStopped{false};
 
@@ -164,13 +104,13 @@ TEST(FrameSampler, ARangeIsKeptAndTimeThatBeginsAnewEndsIt) {
 TEST(Export, EveryFormatUnitAxisAndSpaceComesBackWithinTheBound) {
   const TemporaryFolder folder;
   for (const std::string extension : {".usda", ".usdc", ".usdz", ".abc", ".ply"}) {
-    for (const ExportUnit unit : {ExportUnit::Centimetre, ExportUnit::Metre}) {
+    for (const double unit_m : {0.01, 1.0}) {
       for (const ExportUp up : {ExportUp::Y, ExportUp::Z}) {
         for (const ExportSpace space : {ExportSpace::Head, ExportSpace::World}) {
           MadeStates states(30);
           ExportOptions options;
           options.path = folder.path() / ("hair" + extension);
-          options.unit = unit;
+          options.unit_m = unit_m;
           options.up = up;
           options.space = space;
           options.from_s = 0.2;
@@ -423,11 +363,11 @@ struct AbcFound {
 
 TEST(Export, AbcSamplesAreTheFramesWithinAMicrometre) {
   const TemporaryFolder folder;
-  for (const ExportUnit unit : {ExportUnit::Centimetre, ExportUnit::Metre}) {
+  for (const double unit_m : {0.01, 1.0}) {
     MadeStates states(61);
     ExportOptions options;
     options.path = folder.path() / "hair.abc";
-    options.unit = unit;
+    options.unit_m = unit_m;
     options.space = ExportSpace::World;
     options.fps = {24, 1};
     const ExportReport report = exported(states, options);
@@ -446,8 +386,7 @@ TEST(Export, AbcSamplesAreTheFramesWithinAMicrometre) {
       ASSERT_TRUE(curves) << curves.error().to_string();
       EXPECT_EQ(curves->vertex_counts, std::vector<uint32_t>(kStrands, kVertices));
       for (size_t i = 0; i < expected.size(); ++i)
-        EXPECT_LT(glm::distance(glm::dvec3(curves->points[i]), expected[i]) * metres_of(unit),
-                  kBinaryReimportM);
+        EXPECT_LT(glm::distance(glm::dvec3(curves->points[i]), expected[i]) * unit_m, kBinaryReimportM);
     };
     expect_sample(0, strands.rest_points());
     for (; frame; frame = sampler.next()) expect_sample(frame->index + 1, strands.points(frame->strands));
@@ -456,11 +395,11 @@ TEST(Export, AbcSamplesAreTheFramesWithinAMicrometre) {
 
 TEST(Export, UsdcSamplesAreTheFramesWithinAMicrometre) {
   const TemporaryFolder folder;
-  for (const ExportUnit unit : {ExportUnit::Centimetre, ExportUnit::Metre}) {
+  for (const double unit_m : {0.01, 1.0}) {
     MadeStates states(61);
     ExportOptions options;
     options.path = folder.path() / "hair.usdc";
-    options.unit = unit;
+    options.unit_m = unit_m;
     options.space = ExportSpace::World;
     options.fps = {24, 1};
     const ExportReport report = exported(states, options);
@@ -481,9 +420,9 @@ TEST(Export, UsdcSamplesAreTheFramesWithinAMicrometre) {
       const auto points = *found.archive.points(kept->value, kMaxGroomVertices);
       ASSERT_EQ(points.size(), expected.size());
       const auto box = *found.archive.points((*found.archive.sample(boxes, sample))->value, 2);
-      const double room = 0.5 * 0.0004 / metres_of(unit) + 1e-4;  // strands of 0.4 mm
+      const double room = 0.5 * 0.0004 / unit_m + 1e-4;  // strands of 0.4 mm
       for (size_t i = 0; i < expected.size(); ++i) {
-        EXPECT_LT(glm::distance(glm::dvec3(points[i]), expected[i]) * metres_of(unit), kBinaryReimportM);
+        EXPECT_LT(glm::distance(glm::dvec3(points[i]), expected[i]) * unit_m, kBinaryReimportM);
         EXPECT_TRUE(glm::all(glm::lessThanEqual(box[0], points[i])) &&
                     glm::all(glm::lessThanEqual(points[i], box[1])));
       }
@@ -506,8 +445,13 @@ TEST(Export, UsdcSaysWhatUsdaSays) {
   options.fps = {25, 1};
   options.up = ExportUp::Z;
   options.role = ExportRole::Guides;
+  auto origin = std::make_shared<ExportOrigin>();
+  origin->object_name = {"fringe"};
+  origin->object.assign(kStrands, 0);
+  for (uint32_t strand = 0; strand < kStrands; ++strand) origin->place.push_back(strand);
   for (const char* const name : {"hair.usda", "hair.usdc"}) {
     MadeStates states(61);
+    states.scene_.origin = origin;
     options.path = folder.path() / name;
     exported(states, options);
   }
@@ -523,6 +467,11 @@ TEST(Export, UsdcSaysWhatUsdaSays) {
   EXPECT_EQ(curves.vertex_counts, expected.vertex_counts);
   EXPECT_EQ(curves.type, expected.type);
   EXPECT_EQ(curves.wrap, expected.wrap);
+  EXPECT_EQ(curves.ids, expected.ids);
+  EXPECT_EQ(curves.groups, expected.groups);
+  ASSERT_EQ(curves.root_uv.size(), 2 * kStrands);
+  for (size_t i = 0; i < curves.root_uv.size(); ++i)
+    EXPECT_NEAR(curves.root_uv[i], expected.root_uv.at(i), 1e-5);
   ASSERT_EQ(curves.widths.size(), expected.widths.size());
   for (size_t i = 0; i < curves.widths.size(); ++i) EXPECT_NEAR(curves.widths[i], expected.widths[i], 1e-7);
 
@@ -551,6 +500,7 @@ TEST(Export, UsdcSaysWhatUsdaSays) {
   // Every property of the text is in the binary form with the same type.
   for (const char* const typed :
        {"token type", "token wrap", "int[] curveVertexCounts", "float[] widths", "int[] primvars:groom_guide",
+        "int[] primvars:groom_group_id", "int[] primvars:groom_id", "string[] primvars:groom_group_name",
         "texCoord2f[] primvars:groom_root_uv", "point3f[] points", "float3[] extent"}) {
     EXPECT_THAT(text, HasSubstr(fmt::format("{} = ", typed)));
     const std::string_view both = typed;
@@ -624,6 +574,55 @@ TEST(Export, AbcSaysWhatUnrealAsksOfAGroom) {
     EXPECT_EQ(found.archive.sample(*find_abc_property(*user, "groom_version_major"), 0, 1)->number(0), 1.0);
     EXPECT_EQ(found.archive.sample(*find_abc_property(*user, "groom_version_minor"), 0, 1)->number(0), 5.0);
   }
+}
+
+TEST(Export, WhatTheHairsFileSaysComesBackInItsOrder) {
+  const TemporaryFolder folder;
+  const auto place_in_file = [](uint32_t strand) { return kStrands - 1 - strand; };
+  const auto width_m_of = [](uint32_t strand, uint32_t vertex) {
+    return 1e-4f * static_cast<float>(1 + strand) - 1e-5f * static_cast<float>(vertex);
+  };
+  auto origin = std::make_shared<ExportOrigin>();
+  origin->object_name = {"fringe", "back"};
+  for (uint32_t strand = 0; strand < kStrands; ++strand) {
+    origin->place.push_back(place_in_file(strand));
+    origin->id.push_back(50 - 3 * static_cast<int32_t>(strand));
+    origin->group.push_back(static_cast<int32_t>(strand % 3));
+    origin->object.push_back(strand % 2);
+    origin->root_uv.emplace_back(0.1f * static_cast<float>(strand), 0.5f);
+    for (uint32_t vertex = 0; vertex < kVertices; ++vertex)
+      origin->width_m.push_back(width_m_of(strand, vertex));
+  }
+  for (const std::string extension : {".abc", ".usda", ".usdc"}) {
+    MadeStates states(3);
+    states.scene_.origin = origin;
+    ExportOptions options;
+    options.path = folder.path() / ("hair" + extension);
+    exported(states, options);
+    GroomFileOptions again;
+    again.path = options.path;
+    const auto placed = load_placed_groom(again);
+    ASSERT_TRUE(placed) << placed.error().to_string();
+    ASSERT_EQ(placed->labels.id.size(), kStrands) << extension;
+    for (uint32_t strand = 0; strand < kStrands; ++strand) {
+      const uint32_t place = place_in_file(strand);
+      EXPECT_EQ(placed->labels.id[place], origin->id[strand]);
+      EXPECT_EQ(placed->labels.group[place], origin->group[strand]);
+      EXPECT_LT(glm::distance(placed->groom.root_uv[place], origin->root_uv[strand]), 1e-5f);
+      for (uint32_t vertex = 0; vertex < kVertices; ++vertex) {
+        EXPECT_NEAR(placed->labels.width[place * kVertices + vertex], width_m_of(strand, vertex), 1e-9f);
+        const glm::vec3 found = placed->groom.rest_position_m[place * kVertices + vertex];
+        EXPECT_LT(glm::distance(found, place_of(strand, vertex, 0.0)), 1e-5f);
+      }
+    }
+  }
+  const AbcFound found(folder.path() / "hair.abc");
+  const AbcProperty* const names = find_abc_property(found.reader->free_params(), "groom_group_name");
+  ASSERT_NE(names, nullptr);
+  const std::vector<std::string> texts = found.archive.sample(*names, 0, 1'000)->texts();
+  ASSERT_EQ(texts.size(), kStrands);
+  EXPECT_EQ(texts[place_in_file(3)], "back");
+  EXPECT_EQ(texts[place_in_file(4)], "fringe");
 }
 
 TEST(Export, FramesOfHairThatStandsStillTakeNoSpace) {

@@ -1,6 +1,7 @@
 // Strands in USD text files: what is read, what is left out and said, and what is refused with its line.
 #include <cmath>
 
+#include "common/base/file.h"
 #include "common/groom/curve_basis.h"
 #include "common/groom/groom_file.h"
 #include "common/groom/usd_loader.h"
@@ -171,8 +172,8 @@ TEST(Usda, CubicCurvesBecomePointsOnThem) {
 TEST(Usda, CubicCurvesAreSaidToHaveBecomePoints) {
   const auto groom =
       read_usd(stage("uniform token type = \"cubic\"\nuniform token basis = \"bspline\"\n"
-                      "uniform token wrap = \"pinned\"\nint[] curveVertexCounts = [4]\n"
-                      "point3f[] points = [(0,0,0), (0,0,1), (0,0,2), (0,0,3)]\n"));
+                     "uniform token wrap = \"pinned\"\nint[] curveVertexCounts = [4]\n"
+                     "point3f[] points = [(0,0,0), (0,0,1), (0,0,2), (0,0,3)]\n"));
   ASSERT_TRUE(groom) << groom.error().to_string();
   EXPECT_EQ(groom->groom.uniform_vertex_count(), 4u);
   EXPECT_THAT(groom->notes,
@@ -202,7 +203,73 @@ TEST(Usda, SeveralPrimsAreOneGroomAndWhatDoesNotCountIsLeftOut) {
   EXPECT_THAT(groom->notes, Contains(HasSubstr("4 BasisCurves are left out")));
   EXPECT_THAT(groom->notes, Contains(HasSubstr("2 references, layers or variants are not followed")));
   EXPECT_THAT(groom->notes, Contains(HasSubstr("1 NurbsCurves or HermiteCurves are not read")));
-  EXPECT_THAT(groom->notes, Contains(HasSubstr("widths of 0.02 to 0.1 units are not taken over")));
+  EXPECT_THAT(groom->notes, Contains(HasSubstr("widths of 0.02 to 0.1 units are kept for exports")));
+}
+
+TEST(Usda, WhatTheFileSaysOfStrandsIsKeptWhereItFits) {
+  const std::string ids = "int[] primvars:groom_id = [7, -3]\n";
+  const std::string more =
+      "int[] primvars:groom_group_id = [4, 5]\nfloat[] widths = [0.1, 0.2]\n"
+      "texCoord2f[] primvars:groom_root_uv = [(0.1, 0.2), (0.3, 0.4)]\n";
+  const auto hair = read_usd(stage(kLines + ids + more,
+                                   "double3 xformOp:scale = (2, 2, 2)\nuniform token[] "
+                                   "xformOpOrder = [\"xformOp:scale\"]\n"));
+  ASSERT_TRUE(hair) << hair.error().to_string();
+  EXPECT_EQ(hair->labels.id, (std::vector<int32_t>{7, -3}));
+  EXPECT_EQ(hair->labels.group, (std::vector<int32_t>{4, 5}));
+  EXPECT_EQ(hair->labels.width, (std::vector<float>{0.2f, 0.2f, 0.2f, 0.4f, 0.4f})) << "as large as the hair";
+  EXPECT_EQ(hair->groom.root_uv, (std::vector<glm::vec2>{{0.1f, 0.2f}, {0.3f, 0.4f}}));
+  EXPECT_EQ(hair->labels.object_name, std::vector<std::string>{"Hair"});
+  // What not all strands say nobody says, and a list that fits nothing says nothing.
+  const std::string other = "def BasisCurves \"Other\" {\n" + kLines + more + "}\n";
+  const auto two = read_usd(stage(kLines + ids + more) + other);
+  ASSERT_TRUE(two) << two.error().to_string();
+  EXPECT_TRUE(two->labels.id.empty());
+  EXPECT_EQ(two->labels.group, (std::vector<int32_t>{4, 5, 4, 5}));
+  EXPECT_EQ(two->labels.object, (std::vector<uint32_t>{0, 0, 1, 1}));
+  const auto unfit = read_usd(stage(kLines + "int[] primvars:groom_id = [7]\nfloat[] widths = [1, 2, 3]\n"));
+  ASSERT_TRUE(unfit) << unfit.error().to_string();
+  EXPECT_TRUE(unfit->labels.id.empty() && unfit->labels.width.empty());
+}
+
+TEST(Usda, CurvesWithoutASegmentAreLeftOutAndCounted) {
+  const std::string head = "uniform token type = \"linear\"\nint[] curveVertexCounts = [2, 1, 2]\n";
+  const std::string points = "point3f[] points = [(0, 0, 0), (0, 0, 1), (5, 5, 5), (1, 0, 0), (1, 0, -1)]\n";
+  const auto hair = read_usd(stage(head + points +
+                                   "int[] primvars:groom_id = [1, 2, 3]\n"
+                                   "float[] widths = [0.1, 0.2, 0.3, 0.4, 0.5]\n"));
+  ASSERT_TRUE(hair) << hair.error().to_string();
+  EXPECT_EQ(hair->groom.offset, (std::vector<uint32_t>{0, 2, 4}));
+  EXPECT_EQ(hair->groom.rest_position_m,
+            (std::vector<glm::vec3>{{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {1, 0, -1}}));
+  EXPECT_EQ(hair->labels.id, (std::vector<int32_t>{1, 3}));
+  EXPECT_EQ(hair->labels.width, (std::vector<float>{0.1f, 0.2f, 0.4f, 0.5f}));
+  EXPECT_THAT(hair->notes, Contains(HasSubstr("1 curves of fewer than 2 points are left out")));
+}
+
+TEST(Usda, AnUpAxisMayBeWrittenSmall) {
+  const auto hair =
+      read_usd("#usda 1.0\n(\n    upAxis = \"z\"\n)\ndef BasisCurves \"Hair\" {\n" + kLines + "}\n");
+  ASSERT_TRUE(hair) << hair.error().to_string();
+  EXPECT_EQ(hair->is_z_up, true);
+}
+
+TEST(Usda, AUnitThatFitsNoHeadIsSaid) {
+  const TemporaryFolder folder;
+  const auto notes_with = [&](const char* unit) {
+    const std::string text = fmt::format(
+        "#usda 1.0\n(\n    metersPerUnit = {}\n)\ndef BasisCurves \"Hair\" {{\n{}}}\n", unit, kLines);
+    GroomFileOptions options;
+    options.path = folder.path() / "hair.usda";
+    EXPECT_TRUE(save_file(options.path, std::as_bytes(std::span(text))));
+    const auto placed = load_placed_groom(options);
+    EXPECT_TRUE(placed) << placed.error().to_string();
+    return placed ? placed->notes : std::vector<std::string>();
+  };
+  // The hair is 3.5 units long.
+  EXPECT_THAT(notes_with("0.001"),
+              Contains(AllOf(HasSubstr("3.5 mm long"), HasSubstr("groom.file.unit_m=1 makes"))));
+  EXPECT_THAT(notes_with("1"), testing::Not(Contains(HasSubstr("as on no head"))));
 }
 
 TEST(Usda, WhatIsWrongIsNamedWithItsLine) {
@@ -220,7 +287,7 @@ TEST(Usda, WhatIsWrongIsNamedWithItsLine) {
                     "[(0, 0, 0)]\n")),
       AllOf(HasSubstr("prim 'Hair'"), HasSubstr("need 2 points, there are 1")));
   EXPECT_THAT(refusal(stage("int[] curveVertexCounts = [1]\npoint3f[] points = [(0, 0, 0)]\n")),
-              HasSubstr("curve 0 has 1 vertices"));
+              HasSubstr("1 curves have 1 vertices or none"));
   EXPECT_THAT(refusal(stage(kLines + "uniform token wrap = \"periodic\"\n")), HasSubstr("closed curves"));
   EXPECT_THAT(refusal(stage(kLines + "uniform token type = \"wavy\"\n")), HasSubstr("type is 'wavy'"));
   EXPECT_THAT(refusal(stage(kLines, "uniform token[] xformOpOrder = [\"xformOp:bend\"]\n")),

@@ -142,6 +142,14 @@ MadeSpec made_prim(MadeUsdc& file, const UsdStage& stage, size_t index, size_t& 
         "curveVertexCounts", file.ints({curves.vertex_counts.begin(), curves.vertex_counts.end()})));
     items.push_back(
         MadeUsdc::attribute("widths", file.array(8, curves.widths.size(), raw_bytes(curves.widths))));
+    const auto whole = [&](const std::vector<double>& numbers) {
+      return file.ints({numbers.begin(), numbers.end()});
+    };
+    const std::vector<float> uv(curves.root_uv.begin(), curves.root_uv.end());
+    items.push_back(MadeUsdc::attribute("primvars:groom_id", whole(curves.ids)));
+    items.push_back(MadeUsdc::attribute("primvars:groom_group_id", whole(curves.groups)));
+    items.push_back(
+        MadeUsdc::attribute("primvars:groom_root_uv", file.array(20, uv.size() / 2, raw_bytes(uv))));
     items.push_back(MadeUsdc::attribute("type", file.token(curves.type)));
     items.push_back(MadeUsdc::attribute("basis", file.token(curves.basis)));
     items.push_back(MadeUsdc::attribute("wrap", file.token(curves.wrap)));
@@ -192,6 +200,9 @@ void expect_same(const UsdStage& a, const UsdStage& b) {
     EXPECT_EQ(one.points, other.points);
     EXPECT_EQ(one.vertex_counts, other.vertex_counts);
     EXPECT_EQ(one.widths, other.widths);
+    EXPECT_EQ(one.ids, other.ids);
+    EXPECT_EQ(one.groups, other.groups);
+    EXPECT_EQ(one.root_uv, other.root_uv);
     EXPECT_EQ(one.type, other.type);
     EXPECT_EQ(one.basis, other.basis);
     EXPECT_EQ(one.wrap, other.wrap);
@@ -210,6 +221,8 @@ const std::string kRichText =
     " def BasisCurves \"b\" { uniform token type = \"cubic\" uniform token basis = \"catmullRom\" uniform "
     "token "
     "wrap = \"pinned\" int[] curveVertexCounts = [2, 3] float[] widths = [0.1, 0.25] "
+    "int[] primvars:groom_id = [7, -3] int[] primvars:groom_group_id = [4, 5] "
+    "texCoord2f[] primvars:groom_root_uv = [(0.25, 0.5), (0.75, 1)] "
     "point3f[] points.timeSamples = { -1.5: [(0,0,0), (0,0,1), (0,1,2), (1,0,0), (7,8,9.5)], 2: None, } }\n"
     " def NurbsCurves \"n\" {}\n}\n"
     "def Scope \"A second\" ( active = false ) { def \"x\" { def BasisCurves \"inner\" { int[] "
@@ -226,6 +239,46 @@ TEST(Usdc, TextAndBinaryFillTheSameStageFieldByField) {
   const auto binary = read_usdc_stage(std::make_shared<GroomSource>(bytes_of(file)));
   ASSERT_TRUE(binary) << binary.error().to_string();
   expect_same(*text, *binary);
+}
+
+TEST(Usdc, WhatTheFileSaysOfStrandsIsKeptWhereItFits) {
+  const std::vector<float> widths = {0.1f, 0.2f, 0.3f, 0.4f, 0.5f};
+  const std::vector<double> uv = {0.25, 0.5, 0.75, 1.0};
+  MadeUsdc file;
+  const auto hair = read_usd(
+      lines(file, {MadeUsdc::attribute("primvars:groom_id", file.ints({7, -3})),
+                   MadeUsdc::attribute("primvars:groom_group_id", file.array(8, 2, raw_bytes(widths))),
+                   MadeUsdc::attribute("primvars:groom_root_uv", file.array(19, 2, raw_bytes(uv))),
+                   MadeUsdc::attribute("widths", file.array(8, widths.size(), raw_bytes(widths)))}));
+  ASSERT_TRUE(hair) << hair.error().to_string();
+  EXPECT_EQ(hair->labels.id, (std::vector<int32_t>{7, -3}));
+  EXPECT_EQ(hair->labels.group, (std::vector<int32_t>{0, 0}));
+  EXPECT_EQ(hair->labels.width, widths);
+  EXPECT_EQ(hair->groom.root_uv, (std::vector<glm::vec2>{{0.25f, 0.5f}, {0.75f, 1.0f}}));
+  EXPECT_EQ(hair->labels.object_name, std::vector<std::string>{"Hair"});
+  // A list of another type says nothing, and one value for all is no list.
+  MadeUsdc other;
+  const auto unfit =
+      read_usd(lines(other, {MadeUsdc::attribute("primvars:groom_id", other.tokens({"a", "b"})),
+                             MadeUsdc::attribute("primvars:groom_group_id", MadeUsdc::inlined(3, 5))}));
+  ASSERT_TRUE(unfit) << unfit.error().to_string();
+  EXPECT_TRUE(unfit->labels.id.empty() && unfit->labels.group.empty());
+}
+
+TEST(Usdc, CurvesWithoutASegmentAreLeftOutAndCounted) {
+  MadeUsdc file;
+  const auto hair =
+      read_usd(file.finish({file.prim("Hair", "BasisCurves",
+                                      {MadeUsdc::attribute("type", file.token("linear")),
+                                       MadeUsdc::attribute("curveVertexCounts", file.ints({2, 1, 2})),
+                                       MadeUsdc::attribute("points", file.array(24, 5, raw_bytes(kPoints))),
+                                       MadeUsdc::attribute("primvars:groom_id", file.ints({1, 2, 3}))})},
+                           {{"upAxis", file.token("z")}}));
+  ASSERT_TRUE(hair) << hair.error().to_string();
+  EXPECT_EQ(hair->groom.offset, (std::vector<uint32_t>{0, 2, 4}));
+  EXPECT_EQ(hair->labels.id, (std::vector<int32_t>{1, 3}));
+  EXPECT_EQ(hair->is_z_up, true) << "written small";
+  EXPECT_THAT(hair->notes, Contains(HasSubstr("1 curves of fewer than 2 points are left out")));
 }
 
 TEST(Usdc, EveryVersionAndWayToPackNumbersReadsTheSame) {

@@ -1,0 +1,113 @@
+#include "client/app/hair_origin.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <string>
+#include <utility>
+
+#include "client/app/attempts.h"
+#include "client/app/save_scene.h"
+#include "common/base/profile.h"
+#include "common/scene/file_groom.h"
+
+namespace strandcast {
+namespace {
+
+constexpr float kSameRootM = 1e-4f;
+constexpr std::chrono::milliseconds kSceneWait{100};
+
+/// How a place in the head's space gets back to where the file has it.
+glm::dmat4 file_from_head_of(const GroomPlacement& placement) {
+  glm::dmat3 head_from_file(0.0);
+  for (int axis = 0; axis < 3; ++axis) {
+    glm::vec3 unit(0.0f);
+    unit[axis] = 1.0f;
+    head_from_file[axis] = glm::dvec3(placement.turn(unit));
+  }
+  const auto unit_m = static_cast<double>(placement.unit_m);
+  const glm::dmat3 turn = glm::transpose(head_from_file) / unit_m;
+  glm::dmat4 file_from_head(turn);
+  file_from_head[3] = glm::dvec4(-(turn * glm::dvec3(placement.place(glm::vec3(0.0f)))), 1.0);
+  return file_from_head;
+}
+
+/// The number that a text says, which a float is near: 0.01, not 0.00999999978.
+double as_written(float number) {
+  const std::string text = fmt::format("{}", number);
+  double written = 0.0;
+  std::from_chars(text.data(), text.data() + text.size(), written);
+  return written;
+}
+
+/// Values of strands in the order in which they are simulated.
+template <class T>
+std::vector<T> in_order(const std::vector<T>& values, const std::vector<uint32_t>& order) {
+  std::vector<T> ordered;
+  for (size_t i = 0; !values.empty() && i < order.size(); ++i) ordered.push_back(values[order[i]]);
+  return ordered;
+}
+
+Status check_same(const FileGroom& hair, const SceneAsset& asset) {
+  const Groom& groom = hair.placed.groom;
+  if (groom.strand_count() != asset.strand_count || groom.uniform_vertex_count() != asset.vertex_count)
+    return make_error(ErrorCode::BadInput, "{} strands x {} vertices, but {} x {} are simulated: other hair",
+                      groom.strand_count(), groom.uniform_vertex_count(), asset.strand_count,
+                      asset.vertex_count);
+  for (uint32_t strand = 0; strand < asset.strand_count; ++strand)
+    if (glm::distance(groom.rest_position_m[groom.offset[hair.order[strand]]],
+                      asset.rest_position_m[strand]) > kSameRootM)
+      return make_error(ErrorCode::BadInput,
+                        "strand {} has its root elsewhere than what is simulated: other hair",
+                        hair.order[strand]);
+  return {};
+}
+
+}  // namespace
+
+Result<HairOrigin> load_origin(const FileGroomDesc& file, const SceneAsset& asset) {
+  ASSIGN_OR_RETURN(const FileGroom hair, load_file_groom(file));
+  if (const Status same = check_same(hair, asset); !same) return at(file.path.string(), same.error());
+  const StrandLabels& labels = hair.placed.labels;
+  auto strands = std::make_shared<ExportOrigin>();
+  strands->place = hair.order;
+  strands->id = in_order(labels.id, hair.order);
+  strands->group = in_order(labels.group, hair.order);
+  strands->object = in_order(labels.object, hair.order);
+  strands->object_name = labels.object_name;
+  strands->root_uv = in_order(hair.placed.groom.root_uv, hair.order);
+  for (size_t i = 0; !labels.width.empty() && i < hair.order.size(); ++i) {
+    const auto first = labels.width.begin() + hair.placed.groom.offset[hair.order[i]];
+    strands->width_m.insert(strands->width_m.end(), first, first + asset.vertex_count);
+  }
+  const GroomPlacement& placement = hair.placed.placement;
+  return HairOrigin{std::move(strands), as_written(placement.unit_m), placement.is_z_up,
+                    file_from_head_of(placement)};
+}
+
+std::function<Pose(double t_s)> head_motion(CurveMotion motion, const HairOrigin& origin) {
+  const glm::dmat4 head_from_file = glm::inverse(origin.file_from_head);
+  const glm::dquat turn = glm::normalize(glm::quat_cast(glm::dmat3(head_from_file) / origin.unit_m));
+  return [motion = std::move(motion), head_from_file, turn,
+          head_in_file = glm::dvec3(origin.file_from_head[3])](double t_s) {
+    const Pose moved = motion.sample(t_s);
+    return Pose{glm::dvec3(head_from_file * glm::dvec4(moved * head_in_file, 1.0)),
+                turn * moved.rotation * glm::conjugate(turn)};
+  };
+}
+
+Result<SceneDesc> ask_scene(const CtlTarget& target) {
+  ASSIGN_OR_RETURN(ClientConfig config, client_config_for(target, Role::Controller));
+  config.hello.gets_no_stream = true;
+  ASSIGN_OR_RETURN(const auto client, connect_patiently(config));
+  RETURN_IF_ERROR(client->send(SceneRequest{}));
+  const int64_t begin_ns = now_ns();
+  while (now_ns() - begin_ns < std::chrono::nanoseconds(kCommandPatience).count())
+    for (const ClientEvent& event : client->wait(kSceneWait)) {
+      if (const auto* closed = std::get_if<ClosedEvent>(&event)) return closed->error;
+      if (const auto* text = std::get_if<SceneText>(&event)) return scene_of(*text);
+    }
+  return make_error(ErrorCode::Timeout, "the server did not say its scene");
+}
+
+}  // namespace strandcast
