@@ -216,7 +216,7 @@ class StageReader {
                                                                           : nullptr;
     if (list != nullptr) {
       if (time && !list->empty()) return scan_.skip_value();
-      ASSIGN_OR_RETURN(*list, scan_.numbers(2 * size_t{kMaxStrandCount}));
+      ASSIGN_OR_RETURN(*list, scan_.numbers(2 * size_t{kMaxGroomVertices}));
       return {};
     }
     std::string* const token = name == "type"    ? &curves.type
