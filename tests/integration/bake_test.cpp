@@ -219,6 +219,7 @@ TEST_F(Bake, FramesAreAtTheTimesOfTheClip) {
                  "world", path("out.abc")}),
             0)
       << said();
+  EXPECT_THAT(said(), HasSubstr("16 frames at 30 fps from 0.000 s on")) << "the clip's time";
   MotionFileOptions as_stated;
   as_stated.unit_m = 1.0;
   const auto motion = load_motion_file(path("walk.bvh"), as_stated);
