@@ -166,9 +166,12 @@ Result<std::shared_ptr<const Snapshot>> BakedStates::next() {
       return ended(pumped.error());
     if (const Status taken = take_steps(); !taken) return ended(taken.error());
     if (waiting_.empty()) continue;
-    std::shared_ptr<const Snapshot> state = std::move(waiting_.front());
+    // In the time of the motion, which is behind the lead.
+    auto state = std::make_shared<Snapshot>(*waiting_.front());
     waiting_.pop_front();
-    return state;
+    if (!first_ns_) first_ns_ = state->sim_time_ns;
+    state->sim_time_ns -= *first_ns_;
+    return std::shared_ptr<const Snapshot>(std::move(state));
   }
 }
 

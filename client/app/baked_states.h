@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,7 +46,8 @@ class BakedStates : public ExportSource {
   void begin(const BakeFeed& feed);
 
   const ExportScene& scene() const override { return scene_; }
-  /// Simulates on, and returns the next state. Unavailable when stopped, or when the server has ended.
+  /// Simulates on, and returns the next state, its time that of the motion. Unavailable when stopped, or when
+  /// the server has ended.
   Result<std::shared_ptr<const Snapshot>> next() override;
   std::vector<std::string> remarks() const override;
   /// Returns the scene that the server simulates.
@@ -69,8 +71,9 @@ class BakedStates : public ExportSource {
   SceneDesc simulated_;
   ExportScene scene_;
   std::deque<std::shared_ptr<const Snapshot>> waiting_;
-  uint64_t first_tick_ = 0;  // of the first state that is given
-  uint64_t stride_ = 1;      // from one to the next
+  uint64_t first_tick_ = 0;          // of the first state that is given
+  std::optional<int64_t> first_ns_;  // its simulated time
+  uint64_t stride_ = 1;              // from one to the next
   uint64_t asked_tick_ = 0, done_tick_ = 0, seen_tick_ = 0;
   int64_t done_ns_ = 0;  // when the steps were done
   uint64_t lost_ = 0;

@@ -201,7 +201,7 @@ class StageReader {
     }
     if (std::vector<double>* const numbers = find_curves_numbers(curves, name)) {
       if (time && !numbers->empty()) return scan_.skip_value();
-      ASSIGN_OR_RETURN(*numbers, scan_.numbers(2 * size_t{kMaxStrandCount}));
+      ASSIGN_OR_RETURN(*numbers, scan_.numbers(2 * size_t{kMaxGroomVertices}));
       return {};
     }
     std::string* const word = find_curves_word(curves, name);

@@ -139,6 +139,29 @@ TEST_F(Bake, WhatTheHairBroughtComesBackInItsOwnPlaceAndOrder) {
               2.54f * glm::distance(rest->points[0], rest->points[1]), 1e-4f);
 }
 
+// A recording has no ids: who names the hair's file gets them, and other hair is found out.
+TEST_F(Bake, ARecordingIsExportedWithWhatTheHairsFileSays) {
+  ASSERT_EQ(test::ChildProcess(STRANDCAST_SERVER_PROGRAM,
+                               {"--groom", path("hair.usda"), "--set", "quality=fast", "--port", "0",
+                                "--record", path("run.mcap"), "--seconds", "0.5"},
+                               path("said"))
+                .wait(),
+            0)
+      << said();
+  const auto exported = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"export", path("run.mcap"), path("out.abc"), "--to", "0.1"});
+    return test::ChildProcess(STRANDCAST_CTL_PROGRAM, more, path("said")).wait();
+  };
+  ASSERT_EQ(exported({"--groom", path("hair.usda")}), 0) << said();
+  EXPECT_EQ(BakedFile(path("out.abc")).value("groom_id", 3), id_of(3));
+  ASSERT_EQ(exported({}), 0) << said();
+  EXPECT_EQ(BakedFile(path("out.abc")).value("groom_id", 3), 3.0) << "numbers, where nobody says";
+  test::MadeAbc made(path("other.abc"));
+  made.finish({made.curves({})});
+  EXPECT_EQ(exported({"--groom", path("other.abc")}), 2);
+  EXPECT_THAT(said(), HasSubstr("other hair"));
+}
+
 // What another program has put on an animated head: the hair's roots stay on that head, in its own space.
 TEST_F(Bake, CurvesThatMoveAsOneAreTheMotion) {
   const auto pose_of = [](double t_s) {
@@ -196,6 +219,7 @@ TEST_F(Bake, FramesAreAtTheTimesOfTheClip) {
                  "world", path("out.abc")}),
             0)
       << said();
+  EXPECT_THAT(said(), HasSubstr("16 frames at 30 fps from 0.000 s on")) << "the clip's time";
   MotionFileOptions as_stated;
   as_stated.unit_m = 1.0;
   const auto motion = load_motion_file(path("walk.bvh"), as_stated);

@@ -67,7 +67,7 @@ inline constexpr double kTimesFewerThanPlain = 5.7;
 
 inline constexpr uint32_t kStepStrands = 2'000;
 /// Bits per vertex of the built-in head motions with hair of full quality: idle, turning, violent.
-inline constexpr double kFullStepBits[] = {0.23, 0.18, 0.31};
+inline constexpr double kFullStepBits[] = {0.23, 0.2, 0.31};
 inline constexpr double kFullTangentBits[] = {1.2, 2.3, 6.0};
 /// Bits per vertex of the built-in head motions.
 inline constexpr double kStepIdleBits = 0.18;

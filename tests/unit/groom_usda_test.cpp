@@ -230,6 +230,10 @@ TEST(Usda, WhatTheFileSaysOfStrandsIsKeptWhereItFits) {
   const auto unfit = read_usd(stage(kLines + "int[] primvars:groom_id = [7]\nfloat[] widths = [1, 2, 3]\n"));
   ASSERT_TRUE(unfit) << unfit.error().to_string();
   EXPECT_TRUE(unfit->labels.id.empty() && unfit->labels.width.empty());
+  // One for each point may be more than there can be strands.
+  std::string many = "float[] primvars:groom_id = [1";
+  for (uint32_t i = 0; i <= 2 * kMaxStrandCount; ++i) many += ",1";
+  EXPECT_EQ(refusal(stage(kLines + many + "]\n")), "accepted");
 }
 
 TEST(Usda, CurvesWithoutASegmentAreLeftOutAndCounted) {
