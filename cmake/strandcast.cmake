@@ -122,7 +122,8 @@ endfunction()
 # suite in it is one CTest test, NAME.Suite; with ALONE every TEST is, NAME.Suite.Test, in a process of its own. Tests of
 # the label `integration` run alone and get the label `network` too, which allows a second try (tests/run.sh), unless
 # they are OFFLINE; two of them run at once, beside tests that compute (list_tests.cmake). BUSY: suites that load both
-# cores: one other test runs beside them. PATIENT: suites of which one runs at a time. TIMEOUT: of one CTest test.
+# cores: one other test runs beside them. PATIENT: suites that wait longest; one of them runs at a time, as a third.
+# TIMEOUT: of one CTest test.
 function(strandcast_test name)
   cmake_parse_arguments(ARG "ALONE;OFFLINE" "LABEL;TIMEOUT" "SOURCES;LIBS;BUSY;PATIENT;ENVIRONMENT" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})

@@ -5,8 +5,8 @@
 #include <map>
 #include <utility>
 
-#include "common/record/chunk_list.h"
 #include "common/base/crc32.h"
+#include "common/record/chunk_list.h"
 #include "common/record/recording_reader.h"
 #include "common/record/strand_frames.h"
 

@@ -118,7 +118,7 @@ class Session : public std::enable_shared_from_this<Session> {
   std::optional<ModeChange> untold_change_;  // goes right before the first frame of the next mode
   bool is_mode_request_waiting_ = false;
   int64_t status_sent_ns_ = 0;  // the newest one
-  bool has_asset_ = false;           // sent, or next in line
+  bool has_asset_ = false;      // sent, or next in line
   bool has_joined_ = false;
 
   beast::flat_buffer read_buffer_{kMaxSessionReadBytes};

@@ -8,8 +8,8 @@
 
 namespace strandcast {
 
-/// Creates the folder with its parents and tries to write in it. BadInput if something else has its name; the error of
-/// writing if no file may be written.
+/// Creates the folder with its parents and tries to write in it. BadInput if something else has its name; the
+/// error of writing if no file may be written.
 Status make_report_folder(const std::filesystem::path& folder);
 
 /// Writes one file of a report.
