@@ -48,6 +48,8 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
   timecode->excludes(ltc);
   app.add_option("--fps", feed.fps,
                  "Frames per second that --timecode or --ltc counts, such as 24, 23.976 or 24000/1001")
+      ->check(CLI::Validator(
+          [](std::string text) { return make_frame_rate(text, kLeastFrameRate, kMostFrameRate); }, ""))
       ->capture_default_str();
   app.add_option_function<std::vector<float>>(
          "--wind-mean",
