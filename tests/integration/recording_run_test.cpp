@@ -6,7 +6,9 @@
 #include "common/record/recording_check.h"
 #include "common/record/recording_reader.h"
 #include "server/record/replay.h"
+#include "server/source/scene_change.h"
 #include "tests/support/server_fixture.h"
+#include "tests/support/stepped_hair.h"
 #include "tests/support/temporary_folder.h"
 
 namespace strandcast::recording_run_test {
@@ -115,6 +117,50 @@ TEST_F(RecordedRun, IsSimulatedAgainBitForBit) {
     EXPECT_EQ(result.compared, check->states);
   }
   EXPECT_TRUE(notes_.empty()) << testing::PrintToString(notes_);
+}
+
+/// Strands go on from those of viewers where a keyframe tells them: frames are exact, and the run can be
+/// simulated again for all that.
+TEST_F(RecordedRun, GoesOnFromWhatKeyframesTell) {
+  for (const std::string quality : {"fast", "full"}) {
+    ServerConfig recorded = config();
+    recorded.scene = test::bald_scene(40, 8);
+    const auto scene = change_scene(recorded.scene, "quality=" + quality);
+    ASSERT_TRUE(scene) << scene.error().to_string();
+    recorded.scene = *scene;
+    recorded.record->path = folder_.path() / (quality + ".mcap");
+    ASSERT_TRUE(start(recorded));
+    const auto join = [&] {
+      const auto viewer = open(client_config());
+      ASSERT_NE(viewer, nullptr);
+      EXPECT_TRUE(pump_until({viewer.get()}, [&] { return viewer->replay().stats().keyframes > 0; }));
+    };
+    run_steps(30);
+    for (int i = 0; i < 3; ++i) {
+      join();
+      run_steps(15);
+    }
+    EXPECT_EQ(command(Command::Reset), kDoneExit);
+    run_steps(15);
+    join();
+    run_steps(15);
+    server_->stop();
+    server_.reset();
+
+    const auto reader = RecordingReader::open(recorded.record->path);
+    ASSERT_TRUE(reader) << reader.error().to_string();
+    int hand_overs = 0, exact_frames = 0;
+    for (auto item = (*reader)->next(); item && *item; item = (*reader)->next()) {
+      if (const auto* frame = std::get_if<RecordedFrame>(&(*item)->what))
+        exact_frames += is_exact(*frame->frame) ? 1 : 0;
+      else
+        hand_overs += std::holds_alternative<RecordedHandOver>(std::get<RecordedMessage>((*item)->what));
+    }
+    EXPECT_GE(hand_overs, 3) << quality;
+    EXPECT_GE(exact_frames, 20) << quality;
+    const ReplayResult result = replay(recorded.record->path);
+    EXPECT_TRUE(result.is_equal()) << quality << ": " << to_sentence(result);
+  }
 }
 
 // A groom so small that decoding all of it takes nothing.
