@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "client/app/hair_sliders.h"
-#include "client/app/look_control.h"
+#include "client/app/look_form.h"
 #include "client/app/save_scene.h"
 #include "client/app/strand_drawer.h"
 #include "client/app/view_hud.h"

@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "client/app/hair_sliders.h"
-#include "client/app/look_control.h"
 #include "client/app/save_scene.h"
 #include "client/window/form_panel.h"
 #include "common/base/file.h"
