@@ -9,8 +9,6 @@
 #include <iterator>
 #include <utility>
 
-#include "client/window/hud_panel.h"
-
 namespace strandcast {
 namespace {
 

@@ -8,6 +8,8 @@
 #include <variant>
 #include <vector>
 
+#include "client/window/hud.h"
+
 namespace strandcast {
 
 /// Value of a number, of a colour or direction, or of a name.
@@ -79,7 +81,6 @@ glm::vec3 direction_of(const DirectionAngles& angles, float length);
 float to_srgb(float linear);
 float from_srgb(float shown);
 
-struct PanelSize;
 /// Draws the form at the right edge with Dear ImGui, between its NewFrame() and Render(), at most as high as
 /// the window. Adds the person's edits to `actions`. Main thread only.
 PanelSize draw_form_panel(const FormState& form, FormActions& actions);

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "client/window/form.h"
-#include "client/window/hud_panel.h"
+#include "client/window/hud.h"
 #include "common/base/units.h"
 #include "common/log/log.h"
 
