@@ -143,7 +143,7 @@ def planted(page):
     yield check_files, page.replace(f"`{first[1]}`", f"`{first[1]}_gone`", 1)
     yield check_files, page.replace("- then *Vertex* from `", "- then *Vertex* from `no/", 1)
     yield check_links, page.replace(first[0], "- client/web/page: `wire.ts` is far from it\n" + first[0], 1)
-    yield check_counts, page.replace(first[0], first[0] + "\n- server/net: `log_budget` is one too many", 1)
+    yield check_counts, page.replace(first[0], first[0] + "\n- server/net: `ip_address` is one too many", 1)
     yield check_counts, re.sub(r"^(\| Look \|) \d+", r"\1 1", page, flags=re.M)
     yield check_counts, re.sub(r"^## Look:", "## Sight:", page, flags=re.M)
     yield check_words, page.replace(first[0], first[0] + " and much more that nobody will ever want to read", 1)
