@@ -12,7 +12,7 @@ import sys
 
 PAGE = "docs/internals/walks.md"
 # Files that a walk has at most. A shorter walk lowers its number here and in the page.
-MOST = {"Head pose": 45, "Vertex": 30, "Mode": 21, "Look": 22, "Recording": 20}
+MOST = {"Head pose": 45, "Vertex": 30, "Mode": 21, "Look": 22, "Recording": 19}
 MOST_WORDS, LEAST_WORDS = 8, 3
 TOPS = ("client", "common", "proto", "server", "shaders")
 ENDINGS = (".cpp", ".h", ".ts", ".comp", ".glsl", ".frag", ".vert", ".proto")
