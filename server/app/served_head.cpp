@@ -13,7 +13,7 @@
 #include "server/app/codec_choice.h"
 #include "server/app/server_passes.h"
 #include "server/app/viewer_codec.h"
-#include "server/encode/picture_passes.h"
+#include "server/encode/picture_painter.h"
 
 namespace strandcast {
 namespace {
