@@ -14,11 +14,10 @@
 #include <utility>
 #include <variant>
 
-#include "client/app/line_budget.h"
 #include "client/app/ltc.h"
+#include "client/app/notice_list.h"
 #include "client/app/save_scene.h"
 #include "client/app/steady_client.h"
-#include "client/app/step_speed.h"
 #include "client/app/stream_check.h"
 #include "client/app/view_options.h"
 #include "client/net/http_get.h"
@@ -26,6 +25,7 @@
 #include "common/base/units.h"
 #include "common/client/client_token.h"
 #include "common/client/datagram_sender.h"
+#include "common/kernels/step_speed.h"
 #include "common/motion/mocap_packet.h"
 #include "common/motion/wind_csv.h"
 #include "common/scene/scene_file.h"

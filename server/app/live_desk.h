@@ -14,8 +14,8 @@
 #include "common/wire/messages.h"
 #include "server/input/input_hub.h"
 #include "server/input/live/live_source.h"
+#include "server/net/address_guard.h"
 #include "server/net/live_receiver.h"
-#include "server/net/log_budget.h"
 
 namespace strandcast {
 

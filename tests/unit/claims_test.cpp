@@ -14,7 +14,7 @@
 #include "server/net/send_gate.h"
 #include "server/report/streaming.h"
 #include "server/report/work_precision.h"
-#include "server/source/sim_loop.h"
+#include "server/source/simulation_source.h"
 
 namespace strandcast::claims_test {
 namespace {

@@ -1,4 +1,4 @@
-#include "client/window/hud_panel.h"
+#include "client/window/hud.h"
 
 #include <fmt/format.h>
 #include <imgui.h>

@@ -2,6 +2,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "common/base/command_line_error.h"
+#include "common/motion/motion_file.h"
 #include "server/report/report_commands.h"
 #include "server/report/report_executor.h"
 
@@ -41,6 +43,21 @@ Result<std::vector<std::unique_ptr<Executor>>> open_report_executors(const Execu
   ASSIGN_OR_RETURN(auto executor, open_report_executor(one));
   if (executor) executors.push_back(std::move(executor));
   return executors;
+}
+
+void add_motion_file_options(CLI::App& command, MotionFileOptions& options) {
+  command
+      .add_option("--unit", options.unit_m, "metres per unit of the .bvh file; 0 = guessed from the bones")
+      ->check(without_nan(CLI::Range(0.0, 1e3)))
+      ->capture_default_str();
+  command.add_option("--up", options.up, "up axis of the .bvh file; default: guessed from the rest pose")
+      ->check(CLI::IsMember({"y", "z"}));
+  command.add_option("--joint", options.joint, "head joint of the .bvh file; default: found by name");
+  command.add_flag("--filter-glitches", options.is_filtering_glitches,
+                   "take steps out of the .bvh file that are faster than any head moves");
+  command.add_flag(
+      "--keep-first-frames", options.is_keeping_first_frames,
+      "keep frames of the .bvh file that the head jumps from, as from a T-pose before the motion");
 }
 
 }  // namespace strandcast
