@@ -10,10 +10,10 @@
 
 namespace strandcast {
 
-/// Largest number of vertices that are shared, since a state is copied whenever viewers were corrected.
+/// Largest number of vertices that are shared, since a state is copied every tick.
 inline constexpr size_t kMostSharedVertices = 400'000;
 
-/// State that all viewers have after a frame. Immutable; any thread.
+/// State that all viewers have after a frame, or will have. Immutable; any thread.
 class SharedState {
  public:
   virtual ~SharedState() = default;
@@ -26,6 +26,8 @@ class SharedStrands {
   virtual void take(const SharedState& state) = 0;
   /// Simulates the tick, which ends at `end_time_ns` of simulated time.
   virtual void step(const StepTick& tick, const StepScene& scene, int64_t end_time_ns) = 0;
+  /// Copies the whole state out, for an encoder that then needs no step of its own.
+  virtual std::shared_ptr<const SharedState> state() = 0;
   /// Copies positions and velocities out, as SolverBlocks has them. Both have the groom's size.
   virtual void read(StrandBlocks& position_m, StrandBlocks& velocity_mps) const = 0;
 };

@@ -17,7 +17,9 @@
 
 namespace strandcast {
 
-struct SharedUpdate;  // shared_strands.h
+// shared_strands.h
+class SharedState;
+struct SharedUpdate;
 
 /// One state as two messages: for viewers that follow the chain and for viewers that join it.
 struct JoinFrames {
@@ -43,6 +45,11 @@ class StrandEncoder {
   /// Returns the state that viewers have after the last frame, unless steps of the state before, a tick a
   /// frame, lead to it as well. Nothing for codecs that do not predict by steps.
   virtual std::shared_ptr<SharedUpdate> take_shared() { return nullptr; }
+  /// Tells the state of the strands in the next snapshot, where the simulation goes on from an update; null
+  /// without one. The bytes are the same with and without it.
+  virtual void set_state(std::shared_ptr<const SharedState>) {}
+  /// Returns how many ticks were simulated here to predict frames, since the encoder was made.
+  virtual uint64_t step_count() const { return 0; }
 };
 
 /// Decodes one stream of all strands or of the first ones (strand_prefix.h). A keyframe states their number;

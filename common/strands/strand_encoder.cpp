@@ -36,6 +36,8 @@ class PrefixEncoder final : public StrandEncoder {
     return encoder_->encode_for_join(snapshot);
   }
   std::shared_ptr<SharedUpdate> take_shared() override { return encoder_->take_shared(); }
+  void set_state(std::shared_ptr<const SharedState> state) override { encoder_->set_state(std::move(state)); }
+  uint64_t step_count() const override { return encoder_->step_count(); }
 
  private:
   void adopt(const Snapshot& snapshot) {

@@ -182,6 +182,7 @@ JoinFrames StrandEncodeWorker::encode(const Snapshot& published, const StrandEnc
     reduced = prefix_of(published, prefix_count(published.strand_count, config.strand_share));
   if (config.coarsening > 1) reduced = coarsen(reduced ? *reduced : published, config.coarsening);
   const Snapshot& snapshot = reduced ? *reduced : published;
+  if (shared_ != nullptr) encoder_->set_state(shared_->take_state(snapshot.tick));
   JoinFrames frames;
   if (audience == Audience::Joiners) {
     frames = encoder_->encode_for_join(snapshot);

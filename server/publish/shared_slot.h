@@ -1,8 +1,10 @@
-// SharedSlot: passes the strands that viewers have from the encoder to the simulation that goes on from them.
-// The newest update counts. Any thread.
+// SharedSlot: passes the strands that viewers have from the encoder to the simulation that goes on from them,
+// and back. The newest ones count. Any thread.
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -29,10 +31,28 @@ class SharedSlot {
     return std::exchange(update_, std::nullopt);
   }
 
+  /// Keeps the simulation's state of this tick, and the one before.
+  void put_state(uint64_t tick, std::shared_ptr<const SharedState> state) {
+    const std::lock_guard lock(mutex_);
+    states_[1] = std::exchange(states_[0], {tick, std::move(state)});
+  }
+  /// Returns it once; null if it is not there.
+  std::shared_ptr<const SharedState> take_state(uint64_t tick) {
+    read_tick_ = tick;
+    const std::lock_guard lock(mutex_);
+    for (auto& [of_tick, state] : states_)
+      if (of_tick == tick) return std::exchange(state, nullptr);
+    return nullptr;
+  }
+  /// Returns whether somebody is likely to take the state of this tick.
+  bool is_read(uint64_t tick) const { return tick <= read_tick_ + kMostTrailTicks; }
+
  private:
   std::atomic<bool> is_wanted_{false};
   std::mutex mutex_;
   std::optional<SharedUpdate> update_;
+  std::array<std::pair<uint64_t, std::shared_ptr<const SharedState>>, 2> states_;
+  std::atomic<uint64_t> read_tick_{0};
 };
 
 }  // namespace strandcast

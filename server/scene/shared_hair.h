@@ -24,6 +24,8 @@ class SharedHair {
   void follow(SharedUpdate update, const StepTrail& trail, double step_rate_hz);
   /// Simulates a step of the announced model; needs is_active().
   void step(const StepTick& tick, const StepScene& scene, double step_rate_hz);
+  /// Returns a copy of their state, for encoders; needs is_active().
+  std::shared_ptr<const SharedState> state() const { return strands_->state(); }
   /// Returns the strands; valid until the next call.
   SolverBlocks read_blocks();
   /// Hands the strands to the solver that goes on with them at this tick, under this rotation of the head.

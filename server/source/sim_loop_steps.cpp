@@ -205,6 +205,10 @@ void SimLoop::publish() {
   step_log_.set_scene(builder_->step_scene(solver_features_));
   if (!solver_features_.is_carried) input.trail = step_log_.trail(shared_hair_.number());
   CHECK(stages_->publish(turn).ok());  // likewise
+  // Strands that were put back are not those of the viewers any more.
+  const bool is_whole = publisher_->quarantined().empty();
+  if (shared_hair_.is_active() && is_whole && config_.shared != nullptr && config_.shared->is_read(tick_))
+    config_.shared->put_state(tick_, shared_hair_.state());
   std::shared_ptr<const Snapshot> snapshot = std::move(turn.snapshot);
   if (solver_features_.is_carried) carried_ = snapshot;
   if (is_counting()) counted_state_ = snapshot;
@@ -212,7 +216,7 @@ void SimLoop::publish() {
   sink_.put(std::move(snapshot));
   published_tick_ = tick_;
   ++published_count_;
-  if (publisher_->quarantined().empty()) return;
+  if (is_whole) return;
   leave_viewers();
   publisher_->repair(*solver_);
   report_quarantine();

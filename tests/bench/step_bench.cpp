@@ -1,6 +1,7 @@
 // What the codec "step" takes beside "tangent" on the same frames of the server's own solvers, told all of
 // the wind, its mean or nothing: bits a vertex, CPU milliseconds of both sides, and the largest error. One
 // thread per side. --classes yes: what every class of strands takes against the first, by both codecs.
+// --shared yes: what an encoder takes while the simulation goes on from its viewers' strands.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -10,12 +11,14 @@
 #include <string_view>
 
 #include "common/base/profile.h"
+#include "common/strands/shared_strands.h"
 #include "common/strands/strand_codec.h"
 #include "common/strands/strand_prefix.h"
 #include "server/encode/strand_encode_worker.h"
 #include "server/net/strand_class.h"
 #include "server/report/stream_codec.h"
 #include "server/report/stream_recording.h"
+#include "server/scene/shared_hair.h"
 #include "server/sim/executor/lanes_executor.h"
 
 namespace strandcast {
@@ -29,6 +32,7 @@ struct Options {
   double bound_m = 1e-4;
   MotionPart part = MotionPart::Median;
   bool has_classes = false;
+  bool has_shared = false;
 };
 
 constexpr size_t kStart = 9;
@@ -108,6 +112,63 @@ Status compare_classes(const StreamRecording& recording, double bound_m) {
   return {};
 }
 
+/// Strands that go on from those of the encoder's viewers, whatever the recording has.
+Status measure_shared(const StreamRecording& recording, double bound_m) {
+  const StreamShape& shape = recording.shape;
+  ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m("step", static_cast<float>(bound_m)));
+  ASSIGN_OR_RETURN(const auto told, make_strand_encoder("step"));
+  ASSIGN_OR_RETURN(const auto alone, make_strand_encoder("step"));
+  told->set_rest_shape(shape.rest_in_head_m);
+  alone->set_rest_shape(shape.rest_in_head_m);
+  SharedHair shared;
+  int64_t told_ns = 0, alone_ns = 0, copy_ns = 0, step_ns = 0;
+  double frames = 0.0;
+  for (const StreamFrame& frame : recording.frames) {
+    Snapshot state = on_lattice(frame, quantum_m);
+    const bool is_shared = shared.is_active();
+    const int64_t begin_ns = cpu_ns();
+    if (is_shared) shared.step(state.trail->ticks.back(), *state.trail->scene, 1.0 / kStreamFrameS);
+    const int64_t stepped_ns = cpu_ns();
+    auto trail = std::make_shared<StepTrail>(*state.trail);
+    trail->shared = shared.number();
+    const auto copy = is_shared ? shared.state() : nullptr;
+    const int64_t copied_ns = cpu_ns();
+    if (is_shared) {
+      const SolverState strands = state_of(shared.read_blocks());
+      QuantiseInput input;
+      static_cast<SnapshotInfo&>(input) = state;
+      std::vector<glm::vec3> in_head_m;
+      for (const glm::vec3& point : strands.position_m)
+        in_head_m.emplace_back(glm::conjugate(state.world_from_head.rotation) * glm::dvec3(point));
+      input.position_in_head_m = in_head_m;
+      state = quantise(input).snapshot;
+    }
+    state.trail = trail;
+    told->set_state(copy);
+    const int64_t told_begin_ns = cpu_ns();
+    const EncodedFramePtr by_told = told->encode(state);
+    const int64_t alone_begin_ns = cpu_ns();
+    const EncodedFramePtr by_alone = alone->encode(state);
+    const int64_t end_ns = cpu_ns();
+    if (by_told->message != by_alone->message) return make_error(ErrorCode::Internal, "frames differ");
+    const auto update = told->take_shared();
+    alone->take_shared();
+    if (update != nullptr) shared.follow(*update, *trail, 1.0 / kStreamFrameS);
+    if (!is_shared || update != nullptr) continue;
+    frames += 1.0;
+    step_ns += stepped_ns - begin_ns;
+    copy_ns += copied_ns - stepped_ns;
+    told_ns += alone_begin_ns - told_begin_ns;
+    alone_ns += end_ns - alone_begin_ns;
+  }
+  const auto ms = [&](int64_t ns) { return static_cast<double>(ns) * 1e-6 / frames; };
+  fmt::print(
+      "{:.0f} exact frames, CPU of each: the encoder {:.2f} ms by steps of its own, {:.2f} ms with the "
+      "simulation's state, whose copy takes {:.2f} ms: {:.3f} of it; the simulation's step {:.2f} ms\n",
+      frames, ms(alone_ns), ms(told_ns), ms(copy_ns), ms(told_ns + copy_ns) / ms(alone_ns), ms(step_ns));
+  return {};
+}
+
 Status run(const Options& options) {
   ASSIGN_OR_RETURN(const auto executor, make_lanes_executor());
   RecordingDesc desc;
@@ -123,6 +184,7 @@ Status run(const Options& options) {
     ASSIGN_OR_RETURN(desc.motion, load_stream_motion(options.motion, {}));
   }
   ASSIGN_OR_RETURN(const StreamRecording recording, record_strands(desc));
+  if (options.has_shared) return measure_shared(recording, options.bound_m);
   if (options.has_classes) return compare_classes(recording, options.bound_m);
   for (const StreamCodecRow& row : own_stream_codecs(options.bound_m)) {
     if (row.name != "tangent" && row.name != "step") continue;
@@ -177,6 +239,7 @@ int main(int argc, char** argv) {
     if (name == "--seconds") options.seconds = std::stod(value);
     if (name == "--bound-mm") options.bound_m = 1e-3 * std::stod(value);
     if (name == "--classes") options.has_classes = value == "yes";
+    if (name == "--shared") options.has_shared = value == "yes";
     if (name == "--part" && value == "wildest") options.part = MotionPart::Wildest;
     if (name == "--size" &&
         std::sscanf(value.c_str(), "%ux%u", &options.size.strand_count, &options.size.vertex_count) != 2)

@@ -460,22 +460,28 @@ class EncodingSink final : public LoopSink {
     encoder_->set_rest_shape(make_scene_asset(groom, {}).rest_position_m);
   }
   void put(std::shared_ptr<const Snapshot> snapshot) override {
+    encoder_->set_state(slot_.take_state(snapshot->tick));
     encoder_->encode(*snapshot);
     const auto update = encoder_->take_shared();
     if (update != nullptr && slot_.is_wanted()) slot_.put(*update);
     shared_ = snapshot->trail == nullptr ? 0 : snapshot->trail->shared;
     if (shared_ == 0) ++alone_count_;
+    if (shared_ != 0 && shared_ == known_ && encoder_->step_count() == steps_) ++handed_count_;
+    known_ = shared_;
+    steps_ = encoder_->step_count();
     ++count_;
   }
   uint64_t shared() const { return shared_; }
   int count() const { return count_; }
-  int alone_count() const { return alone_count_; }  // states of strands that are not shared
+  int alone_count() const { return alone_count_; }    // states of strands that are not shared
+  int handed_count() const { return handed_count_; }  // that the encoder did not step to
 
  private:
   SharedSlot& slot_;
   std::unique_ptr<StrandEncoder> encoder_;
   std::atomic<uint64_t> shared_ = 0;
-  std::atomic<int> count_ = 0, alone_count_ = 0;
+  std::atomic<int> count_ = 0, alone_count_ = 0, handed_count_ = 0;
+  uint64_t known_ = 0, steps_ = 0;
 };
 
 // With an observer, which stands for a recording, they are not: what is recorded does not hang on viewers.
@@ -507,6 +513,7 @@ TEST(SimLoopShared, StrandsGoOnFromThoseOfViewersUnlessSomebodyRecords) {
       continue;
     }
     ASSERT_TRUE(wait_for([&] { return sink.shared() != 0; }));
+    ASSERT_TRUE(wait_for([&] { return sink.handed_count() > 5; }));
     const int before = sink.alone_count();
     const uint64_t number = sink.shared();
     (*loop)->post(ControlCommand{Command::Reset}, [](const Notice&) {});

@@ -28,6 +28,7 @@ struct SteppedState {
   Snapshot snapshot;
   std::vector<glm::vec3> position_in_head_m;  // (vertex_count x strand_count), strand fastest
   std::vector<glm::vec3> velocity_mps;        // likewise; world
+  std::shared_ptr<const SharedState> shared;  // for encoders; null: the solver stepped it
 };
 
 /// The built-in scene with its head, wind and follicles, with so many strands.
@@ -135,6 +136,7 @@ class SteppedHair {
     input.quantum_m = lattice_step_m("step", kBoundM).value();
     log_.set_scene(builder_.step_scene(features_));
     input.trail = log_.trail(shared_.number());
+    if (shared_.is_active()) state.shared = shared_.state();
     input.position_in_head_m = state.position_in_head_m;
     state.snapshot = quantise(input).snapshot;
     return state;

@@ -48,15 +48,31 @@ class Stream {
   }
 
   SteppedHair& hair() { return hair_; }
+  /// Has another encoder, which steps every state by itself, write the same bytes.
+  void bring_witness() {
+    witness_ = make_strand_encoder("step").value();
+    witness_->set_rest_shape(hair_.rest_in_head_m());
+  }
+  void give(const SteppedState& state) {
+    encoder_->set_state(state.shared);
+    encoder_->encode(state.snapshot);
+  }
+  uint64_t encoder_steps() const { return encoder_->step_count(); }
+  uint64_t witness_steps() const { return witness_->step_count(); }
   /// Whether viewers had to be corrected in the frame, or were told a rounded state.
   bool send(const InputFrame& input, bool joins = false) {
     state_ = hair_.step(input);
     // As it comes from afar, now sooner, now later.
     const auto jitter_ns = static_cast<int64_t>(state_.snapshot.tick * 7919 % 4'000'000);
     state_.snapshot.motion_time_ns = 1'000'000'000'000 + state_.snapshot.sim_time_ns + jitter_ns;
+    if (witness_ != nullptr) witness(joins);
+    encoder_->set_state(state_.shared);
     if (joins) {
       const JoinFrames frames = encoder_->encode_for_join(state_.snapshot);
       take(frames.frame);
+      if (witness_ != nullptr) {
+        EXPECT_EQ(frames.keyframe->message, witnessed_.keyframe->message);
+      }
       joiner_ = new_viewer();
       joined_bytes_ = frames.keyframe->message.size();
       const auto joined = joiner_->decode(frames.keyframe->message);
@@ -70,6 +86,10 @@ class Stream {
       }
     }
     const auto update = encoder_->take_shared();
+    if (witness_ != nullptr) {
+      EXPECT_EQ(frame_->message, witnessed_.frame->message);
+      EXPECT_EQ(witness_->take_shared() != nullptr, update != nullptr);
+    }
     told_.push_back(update);
     if (told_.size() <= delay_) return update != nullptr;
     if (told_.front() && shares_) hair_.share(*told_.front());
@@ -103,6 +123,10 @@ class Stream {
     viewer->set_rest_shape(hair_.rest_in_head_m());
     return viewer;
   }
+  void witness(bool joins) {
+    witnessed_ = joins ? witness_->encode_for_join(state_.snapshot)
+                       : JoinFrames{witness_->encode(state_.snapshot), {}};
+  }
   void take(const EncodedFramePtr& frame) {
     if (look_) look_(*frame, *viewer_);
     const auto seen = viewer_->decode(frame->message);
@@ -118,6 +142,8 @@ class Stream {
   const size_t delay_;
   std::deque<std::shared_ptr<SharedUpdate>> told_;
   std::unique_ptr<StrandEncoder> encoder_;
+  std::unique_ptr<StrandEncoder> witness_;
+  JoinFrames witnessed_;
   std::unique_ptr<StrandDecoder> viewer_;
   std::unique_ptr<StrandDecoder> joiner_;
   SteppedState state_;
@@ -185,6 +211,67 @@ TEST_P(SharedStrands, AreNotMovedByDamagedFrames) {
   });
   EXPECT_EQ(stream.corrected(kSettledFrames, 4), 0);
   EXPECT_GT(refused, 4u * 40u);
+}
+
+/// The simulation's state is what viewers predict: an encoder that hears of it writes the same bytes without
+/// a step of its own, but for the ticks until the simulation goes on from what a joiner was told.
+TEST_P(SharedStrands, CostTheEncoderNoStep) {
+  for (const size_t delay : {0, 2}) {
+    Stream stream(scene_of(GetParam()), true, delay);
+    stream.bring_witness();
+    stream.corrected(0, kSettledFrames + 5);
+    for (int join = 0; join < 3; ++join) {
+      const uint64_t before = stream.encoder_steps(), witness_before = stream.witness_steps();
+      EXPECT_EQ(stream.corrected(kSettledFrames + 5 + 20 * join, 19), 0);
+      EXPECT_EQ(stream.encoder_steps() - before, join == 0 ? 0 : delay) << join;
+      EXPECT_EQ(stream.witness_steps() - witness_before, 19u);
+      EXPECT_TRUE(stream.send(shaken(kSettledFrames + 24 + 20 * join), true));
+    }
+  }
+}
+
+/// It has the state before whatever comes, and goes on from it by steps of its own.
+TEST_P(SharedStrands, AreTheEncodersAgainWhereNothingIsShared) {
+  SceneDesc scene = scene_of(GetParam());
+  Stream stream(scene, true);
+  stream.bring_witness();
+  stream.corrected(0, kSettledFrames + 5);
+  const auto goes_on = [&](int first) {
+    stream.corrected(first, 12);
+    const uint64_t before = stream.encoder_steps();
+    EXPECT_EQ(stream.corrected(first + 12, 8), 0);
+    EXPECT_EQ(stream.encoder_steps(), before);
+  };
+  stream.hair().step(shaken(kSettledFrames + 5));  // no frame has it
+  goes_on(kSettledFrames + 6);
+  stream.hair().reset();
+  goes_on(80);
+  scene.gravity_mps2.y *= 0.5;
+  stream.hair().change(scene);
+  goes_on(100);
+  stream.hair().forget_model();
+  stream.corrected(120, 3);
+  stream.hair().tell_model();
+  goes_on(123);
+  scene.solver = {scene.solver.name == "dftl" ? "direct_rod" : "dftl", {}};
+  stream.hair().change(scene);
+  goes_on(150);
+}
+
+/// A state that others led to is not taken for the viewers'.
+TEST_P(SharedStrands, AreNotTakenFromElsewhere) {
+  Stream stream(scene_of(GetParam()), true);
+  stream.corrected(0, kSettledFrames + 5);
+  SteppedHair& hair = stream.hair();
+  // A step that viewers are told otherwise.
+  SteppedState state = hair.step(shaken(kSettledFrames + 5));
+  ASSERT_NE(state.shared, nullptr);
+  auto trail = std::make_shared<StepTrail>(*state.snapshot.trail);
+  trail->ticks.back().wind_mps.x += 3.0;
+  state.snapshot.trail = trail;
+  const uint64_t before = stream.encoder_steps();
+  stream.give(state);
+  EXPECT_EQ(stream.encoder_steps(), before + 1);
 }
 
 /// A viewer that has nothing to count from asks for a keyframe.

@@ -3,9 +3,38 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/base/hash.h"
 #include "common/base/units.h"
 
 namespace strandcast::step {
+
+std::shared_ptr<PredictedState> StateCopies::make(const Predictor::State& state) {
+  std::unique_ptr<PredictedState> copy;
+  {
+    const std::lock_guard lock(dropped_->mutex);
+    if (!dropped_->states.empty()) {
+      copy = std::move(dropped_->states.back());
+      dropped_->states.pop_back();
+    }
+  }
+  if (copy == nullptr) copy = std::make_unique<PredictedState>();
+  Predictor::copy(state, copy->state);
+  return {copy.release(), [dropped = dropped_](PredictedState* done) {
+            std::unique_ptr<PredictedState> owned(done);
+            const std::lock_guard lock(dropped->mutex);
+            dropped->states.push_back(std::move(owned));
+          }};
+}
+
+uint64_t told_after(uint64_t before, const ToldStep& step) {
+  const uint64_t of_moment =
+      hash_word(static_cast<uint64_t>(step.end_time_ns), hash_word(step.scene, before));
+  return hash_bytes(step.tick, hash_bytes(std::as_bytes(std::span(&step.world_from_head, 1)), of_moment));
+}
+
+uint64_t told_from(const Moment& moment) {
+  return told_after(moment.tick, {0, {}, moment.world_from_head, moment.sim_time_ns});
+}
 
 Result<std::shared_ptr<SharedSteps>> SharedSteps::make(StepModel model,
                                                        std::span<const glm::vec3> rest_in_head_m,
@@ -23,6 +52,18 @@ void SharedSteps::take(const SharedState& state) {
   now_.base = from.base;
   now_.lattice = from.lattice;
   now_.quantum_m = from.quantum_m;
+  now_.tick = from.tick;
+  now_.told = from.told;
+}
+
+std::shared_ptr<const SharedState> SharedSteps::state() {
+  std::shared_ptr<PredictedState> copy = copies_.make(predictor_->state());
+  copy->base = now_.base;
+  copy->lattice = now_.lattice;
+  copy->quantum_m = now_.quantum_m;
+  copy->tick = now_.tick;
+  copy->told = now_.told;
+  return copy;
 }
 
 void SharedSteps::step(const StepTick& tick, const StepScene& scene, int64_t end_time_ns) {
@@ -31,6 +72,7 @@ void SharedSteps::step(const StepTick& tick, const StepScene& scene, int64_t end
     has_scene_ = true;
     std::vector<std::byte> bytes;
     told_scene_ = told_scene(scene, bytes);
+    scene_hash_ = hash_bytes(bytes);
   }
   std::vector<std::byte> bytes;
   const std::vector<StepTick> ticks =
@@ -38,6 +80,8 @@ void SharedSteps::step(const StepTick& tick, const StepScene& scene, int64_t end
   predictor_->set_scene(told_scene_);
   predictor_->advance({now_.lattice, now_.quantum_m}, ticks, static_cast<double>(end_time_ns) / kNsPerS);
   predictor_->expect(now_.quantum_m, now_.lattice);
+  now_.tick = tick.tick;
+  now_.told = told_after(now_.told, {scene_hash_, bytes, ticks.back().world_from_head, end_time_ns});
 }
 
 void SharedSteps::read(StrandBlocks& position_m, StrandBlocks& velocity_mps) const {

@@ -128,7 +128,16 @@ void EncoderSteps::set_rest_shape(std::span<const glm::vec3> rest_in_head_m) {
 }
 
 void EncoderSteps::take_scene(const StepScene& scene) {
+  const size_t begin = bytes_.size();
   scene_ = told_scene(scene, bytes_);
+  scene_hash_ = hash_bytes(std::span(bytes_).subspan(begin));
+}
+
+/// From here on the state is the predictor's own.
+void EncoderSteps::own_state() {
+  if (handed_ == nullptr) return;
+  predictor_->set_state(handed_->state);
+  handed_.reset();
 }
 
 /// False where this build cannot step it.
@@ -153,6 +162,7 @@ bool EncoderSteps::take_model(const std::shared_ptr<const StepModel>& model, con
 
 void EncoderSteps::restart(const SnapshotInfo& snapshot, const tangent::Layout& layout) {
   predictor_.reset();
+  handed_.reset();
   next_predictor_.reset();
   told_model_.reset();
   told_scene_.reset();
@@ -191,18 +201,17 @@ uint8_t EncoderSteps::judge(const tangent::Layout& layout, const tangent::Histor
   return by_steps <= by_nothing + kMostBitsBeside && age_ >= kFirstFrames ? kFollowFlag : 0;
 }
 
-uint8_t EncoderSteps::begin(const SnapshotInfo& snapshot, const tangent::Layout& layout,
-                            tangent::History& history, tangent::Planes<int32_t>& target) {
+void EncoderSteps::begin(const SnapshotInfo& snapshot, const tangent::Layout& layout) {
   bytes_.clear();
-  is_stepping_ = is_following_ = false;
+  said_.clear();
+  ticks_.reset();
+  is_stepping_ = is_following_ = is_handing_ = false;
   rounding_ = Rounding::Coarse;
-  flags_ = say(snapshot, layout, history, target);
-  return flags_;
+  flags_ = say(snapshot, layout);
 }
 
-/// The flags; bytes_ are what they announce.
-uint8_t EncoderSteps::say(const SnapshotInfo& snapshot, const tangent::Layout& layout,
-                          tangent::History& history, tangent::Planes<int32_t>& target) {
+/// The flags of what is told anew, with its bytes_; ticks_ where steps can lead to the snapshot.
+uint8_t EncoderSteps::say(const SnapshotInfo& snapshot, const tangent::Layout& layout) {
   if (snapshot.trail == nullptr || snapshot.trail->scene == nullptr) return 0;
   const StepTrail& trail = *snapshot.trail;
   uint8_t flags = 0;
@@ -213,35 +222,56 @@ uint8_t EncoderSteps::say(const SnapshotInfo& snapshot, const tangent::Layout& l
     if (predictor_) predictor_->set_scene(scene_);
   }
   if (trail.model != told_model_) {
-    if (take_model(trail.model, layout)) {
-      ByteWriter(bytes_).put_bytes(model_bytes_);
-      return flags | kModelFlag;
-    }
-    return flags;
+    if (!take_model(trail.model, layout)) return flags;
+    ByteWriter(bytes_).put_bytes(model_bytes_);
+    return flags | kModelFlag;
   }
   const uint64_t count = snapshot.tick - last_.tick;
   const bool is_covered = snapshot.tick >= last_.tick && count <= trail.ticks.size() &&
                           (count == 0 || trail.ticks.back().tick == snapshot.tick);
   if (!predictor_ || !has_model_ || !is_covered) return flags;
   if (vertex_rounds(predictor_->model(), scene_, count) > kMostVertexRounds) return flags;
-  std::vector<std::byte> said;
-  TickBase base = base_;
-  const std::vector<StepTick> ticks =
-      told_ticks(ticks_since(snapshot), {snapshot.tick, snapshot.world_from_head}, scene_, base, said);
-  step(ticks, moment_of(snapshot), layout, history);
-  if (count == 0 && !is_near(history.lattice, target)) return flags;
-  uint8_t how = judge(layout, history, target);
-  if (is_waiting(snapshot) && (trail.shared != 0 || (how & kSparseFlag) != 0)) {
-    how = kStepFlag | kSparseFlag;
-    target = expected_;
+  next_base_ = base_;
+  ticks_ =
+      told_ticks(ticks_since(snapshot), {snapshot.tick, snapshot.world_from_head}, scene_, next_base_, said_);
+  is_handing_ = count == 1 && hands(trail, snapshot);
+  return flags;
+}
+
+/// Returns whether the simulation has taken the viewers' next step, from their state.
+bool EncoderSteps::hands(const StepTrail& trail, const SnapshotInfo& snapshot) {
+  next_told_ = told_after(told_, {scene_hash_, said_, snapshot.world_from_head, snapshot.sim_time_ns});
+  if (told_state_ == nullptr || shared_number_ == 0 || trail.shared != shared_number_ || is_disturbed_)
+    return false;
+  return told_state_->tick == snapshot.tick && told_state_->quantum_m == snapshot.quantum_m &&
+         told_state_->told == next_told_;
+}
+
+uint8_t EncoderSteps::predict(const SnapshotInfo& snapshot, const tangent::Layout& layout,
+                              tangent::History& history, tangent::Planes<int32_t>& target) {
+  if (!ticks_) return flags_;
+  uint8_t how = kStepFlag | kSparseFlag;
+  if (is_handing_) {
+    target = told_state_->lattice;
+    expected_ = target;
+  } else {
+    own_state();
+    step(*ticks_, moment_of(snapshot), layout, history);
+    step_count_ += ticks_->size();
+    if (ticks_->empty() && !is_near(history.lattice, target)) return flags_;
+    how = judge(layout, history, target);
+    if (is_waiting(snapshot) && (snapshot.trail->shared != 0 || (how & kSparseFlag) != 0)) {
+      how = kStepFlag | kSparseFlag;
+      target = expected_;
+    }
   }
-  if (how == 0) return flags;
-  base_ = std::move(base);
-  bytes_.insert(bytes_.end(), said.begin(), said.end());
+  if (how == 0) return flags_;
+  base_ = std::move(next_base_);
+  bytes_.insert(bytes_.end(), said_.begin(), said_.end());
   is_stepping_ = (how & kStepFlag) != 0;
   is_following_ = how == kFollowFlag;
   if (is_stepping_) std::swap(history.lattice, expected_);
-  return flags | how;
+  return flags_ |= how;
 }
 
 /// Returns whether the simulation has yet to take over the newest update. Its strands are then those that it
@@ -262,14 +292,24 @@ void EncoderSteps::append_bytes(std::span<const std::byte> head, std::vector<std
 
 void EncoderSteps::finish(const SnapshotInfo& snapshot, const tangent::Frame& frame,
                           const tangent::History& history) {
-  const bool is_one_step = is_stepping_ && snapshot.tick == last_.tick + 1;
-  is_disturbed_ = is_disturbed_ || !is_one_step || frame.lattice != history.lattice;
+  const bool is_corrected = frame.lattice != history.lattice;
+  end(snapshot, !is_stepping_ || is_corrected);
+  if (is_handing_ && !is_corrected && rounding_ == Rounding::Coarse) return follow_exact(moment_of(snapshot));
+  own_state();
   follow(moment_of(snapshot), frame, history);
 }
 
 void EncoderSteps::finish_exact(const SnapshotInfo& snapshot) {
-  is_disturbed_ = is_disturbed_ || snapshot.tick != last_.tick + 1;
+  end(snapshot, false);
   follow_exact(moment_of(snapshot));
+}
+
+/// Of a frame that is done: which state viewers have, and whether more than their step led to it.
+void EncoderSteps::end(const SnapshotInfo& snapshot, bool is_disturbed) {
+  is_disturbed_ = is_disturbed_ || is_disturbed || snapshot.tick != last_.tick + 1;
+  told_ = next_told_;
+  if (is_handing_) handed_ = told_state_;
+  told_state_.reset();
 }
 
 std::shared_ptr<SharedUpdate> EncoderSteps::take_shared(const tangent::Layout& layout,
@@ -291,18 +331,22 @@ std::shared_ptr<SharedUpdate> EncoderSteps::take_shared(const tangent::Layout& l
     update->strands = std::move(*strands);
     shared_model_ = told_model_;
   }
-  auto free = std::find_if(shared_states_.begin(), shared_states_.end(),
-                           [](const auto& state) { return state.use_count() == 1; });
-  if (free == shared_states_.end())
-    free = shared_states_.insert(shared_states_.end(), std::make_shared<PredictedState>());
-  PredictedState& state = **free;
-  Predictor::copy(predictor_->state(), state.state);
-  state.base = base_;
-  state.lattice = history.lattice;
-  state.quantum_m = history.quantum_m;
-  update->state = *free;
+  own_state();
+  std::shared_ptr<PredictedState> state = shared_states_.make(predictor_->state());
+  state->base = base_;
+  state->lattice = history.lattice;
+  state->quantum_m = history.quantum_m;
+  state->tick = last_.tick;
+  state->told = told_ = told_from(last_);
+  update->state = std::move(state);
   is_disturbed_ = false;
   return update;
+}
+
+void EncoderSteps::settle(const tangent::History& history) {
+  own_state();
+  Steps::settle(history);
+  is_disturbed_ = true;
 }
 
 void EncoderSteps::append_state(std::vector<std::byte>& body) {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -59,10 +60,20 @@ class EncoderSteps : public Steps {
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m);
   /// Begins a chain with an empty state.
   void restart(const SnapshotInfo& snapshot, const tangent::Layout& layout);
+  /// As StrandEncoder::set_state().
+  void set_state(std::shared_ptr<const SharedState> state) {
+    told_state_ = std::static_pointer_cast<const PredictedState>(std::move(state));
+  }
+  /// Begins a frame: says what acts.
+  void begin(const SnapshotInfo& snapshot, const tangent::Layout& layout);
+  /// After begin(): whether the simulation has taken the viewers' step already (set_state()).
+  /// predict() then needs no target.
+  bool is_handing() const { return is_handing_; }
   /// Decides how the frame is predicted. Returns its flags; append_bytes() writes the bytes that follow them.
-  /// Sets the target to the prediction if the simulation is about to take the viewers' state over.
-  uint8_t begin(const SnapshotInfo& snapshot, const tangent::Layout& layout, tangent::History& history,
-                tangent::Planes<int32_t>& target);
+  /// Sets the target to the prediction if the simulation has taken the viewers' step, or is about to take
+  /// their state over.
+  uint8_t predict(const SnapshotInfo& snapshot, const tangent::Layout& layout, tangent::History& history,
+                  tangent::Planes<int32_t>& target);
   /// The frame at work becomes an anchor.
   void begin_anchor(Rounding rounding) { rounding_ = rounding; }
   /// `head`: of an exact frame.
@@ -72,36 +83,50 @@ class EncoderSteps : public Steps {
   void finish(const SnapshotInfo& snapshot, const tangent::Frame& frame, const tangent::History& history);
   void finish_exact(const SnapshotInfo& snapshot);
   /// After an anchor: rounds the state to the one that joiners receive.
-  void settle(const tangent::History& history) {
-    Steps::settle(history);
-    is_disturbed_ = true;
-  }
+  void settle(const tangent::History& history);
+  /// Returns how many ticks were simulated here.
+  uint64_t step_count() const { return step_count_; }
   /// Appends the state for a joiner; call settle() first.
   void append_state(std::vector<std::byte>& body);
   /// As StrandEncoder::take_shared(), after a frame.
   std::shared_ptr<SharedUpdate> take_shared(const tangent::Layout& layout, const tangent::History& history);
 
  private:
-  uint8_t say(const SnapshotInfo& snapshot, const tangent::Layout& layout, tangent::History& history,
-              tangent::Planes<int32_t>& target);
+  uint8_t say(const SnapshotInfo& snapshot, const tangent::Layout& layout);
+  bool hands(const StepTrail& trail, const SnapshotInfo& snapshot);
+  void end(const SnapshotInfo& snapshot, bool is_disturbed);
   bool is_waiting(const SnapshotInfo& snapshot) const;
   std::span<const StepTick> ticks_since(const SnapshotInfo& snapshot) const;
   uint8_t judge(const tangent::Layout& layout, const tangent::History& history,
                 const tangent::Planes<int32_t>& target) const;
   void take_scene(const StepScene& scene);
+  void own_state();
   bool take_model(const std::shared_ptr<const StepModel>& model, const tangent::Layout& layout);
 
   std::shared_ptr<const StepModel> told_model_;
   bool has_model_ = false;  // that this build can step
   std::shared_ptr<const StepScene> told_scene_;
   std::vector<std::byte> model_bytes_;
-  std::vector<std::byte> bytes_;                   // that the flags of the frame at work announce
-  uint8_t flags_ = 0;                              // of the frame at work
+  // Of the frame at work.
+  std::vector<std::byte> bytes_;                // that its flags announce
+  std::vector<std::byte> said_;                 // of its ticks
+  std::optional<std::vector<StepTick>> ticks_;  // as viewers read them; none: no steps lead to it
+  TickBase next_base_;
+  uint64_t next_told_ = 0;
+  uint8_t flags_ = 0;
+  bool is_handing_ = false;
+
   bool is_disturbed_ = false;                      // more than a step a frame acted since take_shared()
   std::shared_ptr<const StepModel> shared_model_;  // whose strands were given away
   uint64_t shared_number_ = 0;                     // of the newest update
   uint64_t shared_tick_ = 0;                       // of its state
-  std::vector<std::shared_ptr<PredictedState>> shared_states_;  // for their memory
+  StateCopies shared_states_;
+  uint64_t scene_hash_ = 0;  // of the told scene's bytes
+  uint64_t told_ = 0;        // PredictedState::told of viewers since the newest update
+  uint64_t step_count_ = 0;
+  /// The simulation's.
+  std::shared_ptr<const PredictedState> told_state_;  // of the frame at work
+  std::shared_ptr<const PredictedState> handed_;      // of the last frame; nullptr: the predictor's own is it
 };
 
 class DecoderSteps final : public Steps, public StepReader {

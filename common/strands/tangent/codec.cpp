@@ -128,6 +128,10 @@ class Encoder final : public StrandEncoder {
     return frames;
   }
 
+  void set_state(std::shared_ptr<const SharedState> state) override {
+    if (steps_) steps_->set_state(std::move(state));
+  }
+  uint64_t step_count() const override { return steps_ ? steps_->step_count() : 0; }
   std::shared_ptr<SharedUpdate> take_shared() override {
     return steps_ && has_chain_ ? steps_->take_shared(layout_, chain_.history) : nullptr;
   }
@@ -183,10 +187,11 @@ class Encoder final : public StrandEncoder {
 
   /// What every frame begins with.
   void begin(const Snapshot& snapshot, Followers followers) {
-    take(snapshot);
     flags_ = 0;
-    if (steps_ && followers == Followers::Some)
-      flags_ = steps_->begin(snapshot, layout_, chain_.history, target_);
+    const bool has_steps = steps_ && followers == Followers::Some;
+    if (has_steps) steps_->begin(snapshot, layout_);
+    if (!has_steps || !steps_->is_handing()) take(snapshot);
+    if (has_steps) flags_ = steps_->predict(snapshot, layout_, chain_.history, target_);
     if ((flags_ & step::kStepFlag) != 0)
       frame_.head = {snapshot.world_from_head, {}};
     else
@@ -199,7 +204,7 @@ class Encoder final : public StrandEncoder {
   /// After begin(): whether steps tell all of the frame.
   bool is_foretold(const SnapshotInfo& snapshot) const {
     return flags_ == kExactFlags && snapshot.bust == steps_->chest() &&
-           tangent::is_foretold(chain_.history.lattice, target_);
+           (steps_->is_handing() || tangent::is_foretold(chain_.history.lattice, target_));
   }
 
   /// What every frame ends with.
