@@ -56,7 +56,7 @@ run_part() {
       build ci && bash deploy/fleet/try.sh --bin build/ci/bin
       ;;
     wasm)
-      bash deploy/install_deps.sh emscripten esbuild nodejs dpkg-dev node-typescript chromium libjs-three
+      bash deploy/install_deps.sh emscripten esbuild nodejs dpkg-dev node-typescript chromium firefox-esr libjs-three
       build ci -DSTRANDCAST_WEB=ON && STRANDCAST_SOAK_S=600 STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci 1 -R '^web\.' &&
         cmake --preset ci -DSTRANDCAST_WEB=OFF >/dev/null
       ;;
