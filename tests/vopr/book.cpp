@@ -51,19 +51,18 @@ void Book::note_well(Party& party) {
   if (party.fault_end_ns > 0) back_ms_.push_back((time_ns - party.fault_end_ns) / kMs);
 }
 
-void Book::on_decoded(Party& party, const std::string& server, uint16_t stream, uint64_t tick, uint64_t hash,
-                      bool is_exact) {
+void Book::on_decoded(Party& party, const StateKey& key, uint64_t hash, bool is_exact) {
   note_well(party);
   ++compared_;
   if (is_exact) {
-    const auto found = published_.find(tick);
+    const auto found = published_.find(key.tick);
     if (found != published_.end() && !found->second.contains(hash))
-      world::fail(fmt::format("{} has another state {} than the server published", party.name, tick));
+      world::fail(fmt::format("{} has another state {} than the server published", party.name, key.tick));
   }
-  const Key key{server, stream, tick};
   const auto [known, is_new] = decoded_.try_emplace(key, hash);
   if (known->second != hash)
-    world::fail(fmt::format("{} has another state {} of stream {} than others", party.name, tick, stream));
+    world::fail(fmt::format("{} has another state {} of stream {}, frame {}, than others", party.name,
+                            key.tick, key.stream, key.sequence));
   if (!is_new) return;
   decoded_order_.push_back(key);
   if (decoded_order_.size() <= kKeptStates) return;

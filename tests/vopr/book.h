@@ -2,13 +2,13 @@
 // One thread runs at a time (world.h), so that nothing here is locked.
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <deque>
 #include <map>
 #include <memory>
 #include <set>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "common/client/reconnect_policy.h"
@@ -40,6 +40,16 @@ struct Party {
   bool was_well = false;
 };
 
+/// What all who decode it have the same bits of. A tick that is encoded again, for those who join, has
+/// another number.
+struct StateKey {
+  std::string server;  // as it calls itself since its start
+  uint16_t stream = 0;
+  uint32_t sequence = 0;
+  uint64_t tick = 0;
+  auto operator<=>(const StateKey&) const = default;
+};
+
 class Book {
  public:
   explicit Book(std::vector<std::string> secrets) : secrets_(std::move(secrets)) {}
@@ -51,9 +61,8 @@ class Book {
   void disturb(NodeId node, int64_t end_ns, int64_t extra_ns);
 
   void on_published(const Snapshot& state);
-  /// A viewer has decoded this state of a stream of the server that calls itself so.
-  void on_decoded(Party& party, const std::string& server, uint16_t stream, uint64_t tick, uint64_t hash,
-                  bool is_exact);
+  /// A viewer has decoded a state. With `is_exact` the codec loses nothing.
+  void on_decoded(Party& party, const StateKey& key, uint64_t hash, bool is_exact);
   /// A line of the log.
   void on_line(const std::string& line);
   /// A change that nobody else asks for is sent.
@@ -66,18 +75,16 @@ class Book {
   uint64_t answered() const { return answers_.size(); }
   /// How long after the end of a fault parties were well again, ms, sorted.
   std::vector<int64_t> back_ms() const;
-  std::string failures_of(const std::string& why) const;
 
  private:
-  using Key = std::tuple<std::string, uint16_t, uint64_t>;
   void note_well(Party& party);
 
   std::vector<std::string> secrets_;
   std::deque<Party> parties_;
   std::map<uint64_t, std::set<uint64_t>> published_;  // hashes of a tick, of the newest runs
   std::deque<uint64_t> published_order_;
-  std::map<Key, uint64_t> decoded_;
-  std::deque<Key> decoded_order_;
+  std::map<StateKey, uint64_t> decoded_;
+  std::deque<StateKey> decoded_order_;
   std::map<std::string, int> asked_;  // changes, and how often the server has begun them
   std::set<std::string> answers_;
   std::vector<int64_t> back_ms_;

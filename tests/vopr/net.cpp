@@ -94,11 +94,13 @@ ssize_t Socket::send(const char* bytes, size_t size) {
     return -1;
   }
   if (!has_room()) {
+    wants_room_ = true;
     errno = EAGAIN;
     return -1;
   }
-  size = std::min(size, send_buffer_bytes - on_way_bytes_);
-  if (unsent_limit_bytes != ~size_t{0}) size = std::min(size, unsent_limit_bytes);
+  const size_t wanted = size;
+  size = std::min({size, send_buffer_bytes - on_way_bytes_, unsent_limit_bytes});
+  wants_room_ = size < wanted;
   on_way_bytes_ += size;
   if (is_silent) return static_cast<ssize_t>(size);
   last_arrival_ns_ = std::max(last_arrival_ns_, Network::get().arrival_ns(local.node, remote.node, size));
@@ -144,9 +146,11 @@ void Socket::take_held() {
     received_ns = world::time_ns();
     has_news = true;
     if (peer == nullptr) continue;
-    const bool had_room = peer->has_room();
     peer->on_way_bytes_ -= std::min(size, peer->on_way_bytes_);
-    if (!had_room || peer->unsent_limit_bytes != ~size_t{0}) peer->tell();
+    if (peer->wants_room_ && peer->has_room()) {
+      peer->wants_room_ = false;
+      peer->tell();
+    }
   }
   if (held_.empty() && is_end_held_ && !has_ended_) has_ended_ = has_news = true;
   if (has_news) tell();

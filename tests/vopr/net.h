@@ -79,6 +79,7 @@ class Socket : public File, public std::enable_shared_from_this<Socket> {
   std::string received_;
   size_t read_ = 0;               // of those
   std::deque<std::string> held_;  // on their way, but the buffer there is full
+  bool wants_room_ = false;       // somebody could not send all
   bool has_ended_ = false, is_end_held_ = false, has_sent_end_ = false, is_reset_ = false, is_closed_ = false;
   size_t on_way_bytes_ = 0;  // to the peer
   int64_t last_arrival_ns_ = 0;
