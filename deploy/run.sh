@@ -15,7 +15,7 @@ usage: bash deploy/run.sh [options]
   --motion-up y|z      up axis of the BVH                                       (default: guessed from the rest pose)
   --joint NAME         head joint of the BVH                                    (default: found by its name)
   --filter-glitches    take steps out of the BVH that are faster than any head moves
-  --mocap PROTOCOL     head motion from a stage instead: vmc, opentrack, freed, livelinkface, opentrackio (PROTOCOL:PORT),
+  --mocap PROTOCOL     head motion from a stage instead: vmc, opentrack, freed, livelinkface, opentrackio, vrchat, mvn (PROTOCOL:PORT),
                        natnet://HOST, vrpn://HOST
   --wind FILE          wind to feed: CSV                                        (default: built-in gusts)
   --record FILE        records the run as MCAP, into a new file: strandcast-view FILE plays it
