@@ -11,10 +11,11 @@ usage: bash deploy/run.sh [options]
                        hair in several files: the option repeated, or FILE,FILE
   --motion FILE        head motion to feed: BVH                                 (default: built in)
   --motion-unit M      metres per unit of the BVH                               (default: from the body's height)
+  --motion-fps N       frames per second of a BVH that states none
   --motion-up y|z      up axis of the BVH                                       (default: guessed from the rest pose)
   --joint NAME         head joint of the BVH                                    (default: found by its name)
   --filter-glitches    take steps out of the BVH that are faster than any head moves
-  --mocap PROTOCOL     head motion from a stage instead: vmc, opentrack, freed, livelinkface, opentrackio (PROTOCOL:PORT),
+  --mocap PROTOCOL     head motion from a stage instead: vmc, opentrack, freed, livelinkface, opentrackio, vrchat, mvn (PROTOCOL:PORT),
                        natnet://HOST, vrpn://HOST
   --wind FILE          wind to feed: CSV                                        (default: built-in gusts)
   --record FILE        records the run as MCAP, into a new file: strandcast-view FILE plays it
@@ -38,7 +39,7 @@ while [ $# -gt 0 ]; do
     --headless) headless=1; shift; continue ;;
     --web) web=1; shift; continue ;;
     --filter-glitches) motion_options+=(--filter-glitches); shift; continue ;;
-    --groom|--motion|--mocap|--motion-unit|--motion-up|--joint|--wind|--record|--scene|--set|--seconds|--out) ;;
+    --groom|--motion|--mocap|--motion-unit|--motion-up|--motion-fps|--joint|--wind|--record|--scene|--set|--seconds|--out) ;;
     *) usage >&2; fail "unknown option: $1" ;;
   esac
   [ $# -ge 2 ] || fail "$1 needs a value"
@@ -53,6 +54,7 @@ while [ $# -gt 0 ]; do
     --record) server_options+=(--record "$(realpath -m "$2")") ;;
     --motion-unit) motion_options+=(--unit "$2") ;;
     --motion-up) motion_options+=(--up "$2") ;;
+    --motion-fps) motion_options+=(--fps "$2") ;;
     --joint) motion_options+=(--joint "$2") ;;
     --wind) need_file "$1" "$2"; wind=$(realpath "$2") ;;
     --seconds) [[ "$2" =~ ^[0-9]+(\.[0-9]+)?$ ]] || fail "--seconds: not a number: $2"; seconds=$2 ;;

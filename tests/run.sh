@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.."
 bash deploy/install_deps.sh lld xvfb xauth glslang-tools glslc spirv-tools libavcodec-dev libavutil-dev python3 nodejs haproxy
 page=OFF
 if [ "${STRANDCAST_TEST_PAGE:-on}" != off ]; then
-  if bash deploy/install_deps.sh emscripten esbuild dpkg-dev node-typescript chromium libjs-three && bash client/web/fetch_zstd.sh build/ci/web/zstd; then
+  if bash deploy/install_deps.sh emscripten esbuild dpkg-dev node-typescript chromium firefox-esr libjs-three && bash client/web/fetch_zstd.sh build/ci/web/zstd; then
     page=ON
   else
     echo "The page for browsers is left out, and its tests: what it is built with cannot be had"

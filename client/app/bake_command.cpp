@@ -8,6 +8,7 @@
 #include "client/app/baked_states.h"
 #include "client/app/scenario/server_process.h"
 #include "common/base/command_line_error.h"
+#include "common/base/frame_rate.h"
 #include "common/groom/groom_file.h"
 
 namespace strandcast {
@@ -103,9 +104,10 @@ void declare_bake(CLI::App& app, BakeCommand& command) {
   FeedOptions& feed = command.feed;
   feed.motion = "none";
   feed.wind = kStillAir;
-  app.add_option("paths", command.exported.paths,
-                 "HAIR.ply [MORE.ply ..] OUT.abc: hair files as for strandcast-server --groom (without: the "
-                 "scene's hair), and the file to write: .abc, .usda, .ply or .csv; it is replaced")
+  app.add_option(
+         "paths", command.exported.paths,
+         "HAIR.ply [MORE.ply ..] OUT.abc: hair files as for strandcast-server --groom (without: the "
+         "scene's hair), and the file to write: .usda, .usdc, .usdz, .abc, .ply or .csv; it is replaced")
       ->required()
       ->expected(1, static_cast<int>(kMaxGroomFiles) + 1);
   app.add_option(
@@ -115,6 +117,9 @@ void declare_bake(CLI::App& app, BakeCommand& command) {
   app.add_option("--wind", feed.wind, "CSV file, gusts, scene (what the scene says) or none")
       ->capture_default_str();
   declare_motion_file(app, feed.motion_file, "--motion-");
+  app.add_option("--motion-fps", feed.fps, "Frames per second of a BVH file that states none")
+      ->check(CLI::Validator(
+          [](std::string text) { return make_frame_rate(text, kLeastFrameRate, kMostFrameRate); }, ""));
   app.add_option(
          "--lead", command.lead_s,
          "Seconds before the first frame, in which the head gets from rest to the motion's first speed")

@@ -14,11 +14,10 @@
 #include <utility>
 #include <variant>
 
-#include "client/app/line_budget.h"
 #include "client/app/ltc.h"
+#include "client/app/notice_list.h"
 #include "client/app/save_scene.h"
 #include "client/app/steady_client.h"
-#include "client/app/step_speed.h"
 #include "client/app/stream_check.h"
 #include "client/app/view_options.h"
 #include "client/net/http_get.h"
@@ -26,6 +25,7 @@
 #include "common/base/units.h"
 #include "common/client/client_token.h"
 #include "common/client/datagram_sender.h"
+#include "common/kernels/step_speed.h"
 #include "common/motion/mocap_packet.h"
 #include "common/motion/wind_csv.h"
 #include "common/scene/scene_file.h"
@@ -38,6 +38,7 @@ using std::chrono::milliseconds;
 constexpr milliseconds kAnswerTimeout{5000};
 constexpr milliseconds kHealthTimeout{3000};
 constexpr float kGustLengthM = 9.0f;
+constexpr const char* kUsualTimecodeFps = "24";
 constexpr double kLongWaitS = 0.5;    // less is what a connection takes
 constexpr double kLeastFeedS = 0.01;  // 0 is without end
 constexpr int64_t kInputsIntervalNs = 2'000'000'000;
@@ -85,6 +86,10 @@ Status add_motion(const FeedOptions& options, FeedPlan& plan, double& length_s) 
   }
   MotionFileOptions file = options.motion_file;
   file.has_body = true;
+  if (!options.fps.empty()) {
+    ASSIGN_OR_RETURN(const FrameRate fps, parse_frame_rate(options.fps));
+    file.fps = fps.hz();
+  }
   ASSIGN_OR_RETURN(MotionFile loaded, load_motion_file(options.motion, file));
   for (const std::string& note : loaded.notes) std::cerr << note << '\n';
   const auto path = std::make_shared<const ClipPath>(std::move(loaded.clip),
@@ -134,13 +139,13 @@ Result<FeedPlan> make_feed_plan(const FeedOptions& options) {
   FeedPlan plan;
   plan.rate_hz = options.rate_hz;
   plan.speed = options.speed;
+  ASSIGN_OR_RETURN(const FrameRate fps,
+                   parse_frame_rate(options.fps.empty() ? kUsualTimecodeFps : options.fps));
   if (!options.timecode.empty()) {
-    ASSIGN_OR_RETURN(const FrameRate fps, parse_frame_rate(options.fps));
     ASSIGN_OR_RETURN(const Timecode first, parse_timecode(options.timecode, fps));
     plan.timecode = [first](double t_s) { return advanced(first, t_s * first.rate.hz()); };
   }
   if (!options.ltc.empty()) {
-    ASSIGN_OR_RETURN(const FrameRate fps, parse_frame_rate(options.fps));
     ASSIGN_OR_RETURN(plan.timecode, open_ltc(options.ltc, fps));
   }
   double length_s = 0.0;  // of a motion file; 0 = without end

@@ -44,9 +44,9 @@ struct FeedOptions {
   double speed = 1.0;
   double seconds = 0.0;  // 0 = the length of the motion, or without end when looped or built in
   double rate_hz = 120.0;
-  std::string timecode = {};             // of the motion's beginning; empty: none is sent
-  std::string ltc = {};                  // WAV file, or - : timecode of its sound; empty: none
-  std::string fps = "24";                // that it counts
+  std::string timecode = {};  // of the motion's beginning; empty: none is sent
+  std::string ltc = {};       // WAV file, or - : timecode of its sound; empty: none
+  std::string fps = {};  // that it counts (empty: 24), and of a BVH file that states none (empty: refused)
   glm::vec3 wind_mps{1.5f, 0.0f, 1.0f};  // mean of the gusts, world
   float gust_intensity = 0.6f;
   uint32_t seed = 1;

@@ -46,11 +46,12 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
   auto* ltc = app.add_option(
       "--ltc", feed.ltc, "Linear timecode, which the hair carries: a WAV file, or - for sound as it comes");
   timecode->excludes(ltc);
-  app.add_option("--fps", feed.fps,
-                 "Frames per second that --timecode or --ltc counts, such as 24, 23.976 or 24000/1001")
+  app.add_option(
+         "--fps", feed.fps,
+         "Frames per second that --timecode or --ltc counts, such as 23.976 or 24000/1001 (default: 24), "
+         "and those of a BVH file that states none")
       ->check(CLI::Validator(
-          [](std::string text) { return make_frame_rate(text, kLeastFrameRate, kMostFrameRate); }, ""))
-      ->capture_default_str();
+          [](std::string text) { return make_frame_rate(text, kLeastFrameRate, kMostFrameRate); }, ""));
   app.add_option_function<std::vector<float>>(
          "--wind-mean",
          [&feed](const std::vector<float>& mps) { feed.wind_mps = glm::vec3(mps[0], mps[1], mps[2]); },

@@ -28,6 +28,7 @@ class StatesOfScene : public ExportSource {
   StatesOfScene(std::unique_ptr<ExportSource> source, ExportScene scene)
       : source_(std::move(source)), scene_(std::move(scene)) {}
   const ExportScene& scene() const override { return scene_; }
+  std::optional<CountedState> counted() const override { return source_->counted(); }
   const TimecodeTrack& timecodes() const override { return source_->timecodes(); }
   Result<std::optional<int64_t>> skip_to(double from_s) override { return source_->skip_to(from_s); }
   Result<std::shared_ptr<const Snapshot>> next() override { return source_->next(); }

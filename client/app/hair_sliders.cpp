@@ -8,7 +8,7 @@
 #include <iterator>
 #include <utility>
 
-#include "client/app/look_control.h"
+#include "client/app/look_form.h"
 #include "common/scene/hair_controls.h"
 #include "common/scene/scene_desc.h"
 

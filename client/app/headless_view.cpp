@@ -1,4 +1,4 @@
-#include "client/app/headless_view.h"
+#include "client/app/views.h"
 
 #include <algorithm>
 #include <utility>

@@ -5,10 +5,10 @@
 #include "client/app/ctl_commands.h"
 #include "client/app/frame_trace.h"
 #include "client/app/live_connection.h"
-#include "client/app/step_speed.h"
 #include "client/app/view_options.h"
 #include "common/base/file.h"
 #include "common/base/units.h"
+#include "common/kernels/step_speed.h"
 
 namespace strandcast {
 namespace {

@@ -1,7 +1,10 @@
 #include "client/app/live_states.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
+
+#include "common/base/units.h"
 
 namespace strandcast {
 namespace {
@@ -16,7 +19,9 @@ Result<std::unique_ptr<LiveStates>> LiveStates::open(const ClientConfig& config,
   ASSIGN_OR_RETURN(auto live, LiveConnection::open(config));
   std::unique_ptr<LiveStates> states(new LiveStates(std::move(live), stop));
   const int64_t begin_ns = now_ns();
-  while (states->waiting_.empty() || states->live_->session().asset() == nullptr) {
+  // Statuses have the timecode.
+  while (states->waiting_.empty() || states->live_->session().asset() == nullptr ||
+         !states->live_->session().has_status()) {
     if (stop) return make_error(ErrorCode::Unavailable, "stopped before the first state had come");
     if (static_cast<double>(now_ns() - begin_ns) * 1e-9 > kNoStateTimeoutS)
       return make_error(ErrorCode::Timeout, "the server sent no state for {} s", kNoStateTimeoutS);
@@ -24,6 +29,7 @@ Result<std::unique_ptr<LiveStates>> LiveStates::open(const ClientConfig& config,
   }
   ViewerSession& session = states->live_->session();
   const LookDesc& look = session.look().look;
+  states->counted_ = states->newest_counted();
   states->scene_ = {session.shared_asset(), look.strand_radius_m, look.tip_scale};
   return states;
 }
@@ -67,8 +73,32 @@ Result<std::shared_ptr<const Snapshot>> LiveStates::next() {
   return state;
 }
 
+/// Of the newest status: its step says the simulated time.
+std::optional<CountedState> LiveStates::newest_counted() const {
+  ViewerSession& session = live_->session();
+  const ServerStatus& status = session.status();
+  if (!status.timecode) return std::nullopt;
+  const double time_s = static_cast<double>(status.tick) / session.client().welcome().step_rate_hz;
+  return CountedState{std::llround(time_s * kNsPerS), *status.timecode};
+}
+
+Result<std::optional<int64_t>> LiveStates::skip_to(double) {
+  return std::optional(waiting_.front()->sim_time_ns);
+}
+
+std::optional<CountedState> LiveStates::counted() const {
+  return counted_;
+}
+
 std::vector<std::string> LiveStates::remarks() const {
   std::vector<std::string> remarks;
+  if (const auto now = newest_counted();
+      counted_ && now && is_same_count(now->timecode, counted_->timecode)) {
+    const double hz = now->timecode.rate.hz();
+    const double passed = static_cast<double>(now->sim_time_ns - counted_->sim_time_ns) / kNsPerS * hz;
+    if (std::abs(frames_between(advanced(counted_->timecode, passed), now->timecode)) > 1.0)
+      remarks.emplace_back("the timecode jumped meanwhile: frames are counted on from its first");
+  }
   SessionTotals totals = live_->earlier();
   totals += totals_of(live_->session());
   const uint64_t lost = totals.missed_frames + totals.dropped_by_client;

@@ -23,6 +23,8 @@ class LiveStates : public ExportSource {
   const ExportScene& scene() const override { return scene_; }
   /// Waits for a state, also for a server that is away. Returns null once stopped, Timeout if none comes.
   Result<std::shared_ptr<const Snapshot>> next() override;
+  Result<std::optional<int64_t>> skip_to(double from_s) override;
+  std::optional<CountedState> counted() const override;
   std::vector<std::string> remarks() const override;
   /// Returns the newest look.
   const LookDesc& look() const { return live_->session().look().look; }
@@ -31,10 +33,12 @@ class LiveStates : public ExportSource {
   LiveStates(std::unique_ptr<LiveConnection> live, const std::atomic<bool>& stop);
   Status pump();
   void listen();
+  std::optional<CountedState> newest_counted() const;
 
   std::unique_ptr<LiveConnection> live_;
   const std::atomic<bool>& stop_;
   ExportScene scene_;
+  std::optional<CountedState> counted_;                    // with the first state
   std::deque<std::shared_ptr<const Snapshot>> waiting_;    // as much as one pump() brings
   int64_t last_ns_ = std::numeric_limits<int64_t>::min();  // simulated time of the newest
 };

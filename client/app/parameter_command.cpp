@@ -7,7 +7,7 @@
 
 #include "client/app/attempts.h"
 #include "client/app/ctl_commands.h"
-#include "client/app/line_budget.h"
+#include "client/app/notice_list.h"
 #include "common/base/profile.h"
 
 namespace strandcast {

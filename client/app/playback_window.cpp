@@ -1,4 +1,4 @@
-#include "client/app/playback_window.h"
+#include "client/app/views.h"
 
 #include <algorithm>
 #include <utility>

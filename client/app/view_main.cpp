@@ -3,13 +3,11 @@
 #include <iostream>
 
 #include "client/app/diagnose.h"
-#include "client/app/headless_view.h"
-#include "client/app/playback_window.h"
 #include "client/app/recording_film.h"
 #include "client/app/stop_signal.h"
 #include "client/app/view_options.h"
 #include "client/app/view_report.h"
-#include "client/app/windowed_view.h"
+#include "client/app/views.h"
 #include "common/base/output_file.h"
 #include "common/log/log.h"
 

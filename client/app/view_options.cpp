@@ -6,11 +6,11 @@
 #include <iostream>
 
 #include "client/app/recording_film.h"
-#include "client/app/step_speed.h"
 #include "common/base/command_line_error.h"
 #include "common/base/frame_rate.h"
 #include "common/base/version.h"
 #include "common/client/client_token.h"
+#include "common/kernels/step_speed.h"
 #include "common/strands/strand_codec.h"
 
 namespace strandcast {

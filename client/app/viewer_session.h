@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "client/app/frame_trace.h"
-#include "client/app/line_budget.h"
 #include "client/app/mode_control.h"
 #include "client/app/notice_list.h"
 #include "client/app/picture_latency.h"

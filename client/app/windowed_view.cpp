@@ -1,4 +1,4 @@
-#include "client/app/windowed_view.h"
+#include "client/app/views.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "client/app/hair_sliders.h"
-#include "client/app/look_control.h"
+#include "client/app/look_form.h"
 #include "client/app/save_scene.h"
 #include "client/app/strand_drawer.h"
 #include "client/app/view_hud.h"

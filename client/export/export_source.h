@@ -35,6 +35,12 @@ struct ExportScene {
   std::shared_ptr<const ExportOrigin> origin = {};  // of the simulated strands; null: not known
 };
 
+/// A state's timecode.
+struct CountedState {
+  int64_t sim_time_ns = 0;
+  Timecode timecode;
+};
+
 class ExportSource {
  public:
   virtual ~ExportSource() = default;
@@ -45,6 +51,8 @@ class ExportSource {
   virtual Result<std::optional<int64_t>> skip_to([[maybe_unused]] double from_s) {
     return std::optional<int64_t>();
   }
+  /// Returns the timecode of a running server's state, from which it counts on; empty where nobody counts.
+  virtual std::optional<CountedState> counted() const { return std::nullopt; }
   /// Returns the timecode of all states; that of a running server is not known beforehand.
   virtual const TimecodeTrack& timecodes() const {
     static const TimecodeTrack kNone;

@@ -38,6 +38,11 @@ struct FramePlan {
   std::string first_timecode;  // empty: frames are so many seconds after the first state
 };
 
+Error other_rate(const FrameRate& rate) {
+  return make_error(ErrorCode::BadInput, "the states count {} frames per second: leave --fps out",
+                    frame_rate_text(rate.hz()));
+}
+
 /// Whether frames are those of the states' timecode: where it is asked for, or of all states where it counts
 /// as frames do.
 Result<bool> goes_by_timecode(const ExportOptions& options, const TimecodeTrack& track, int64_t first_ns) {
@@ -46,9 +51,7 @@ Result<bool> goes_by_timecode(const ExportOptions& options, const TimecodeTrack&
   if (!count && is_asked)
     return make_error(ErrorCode::BadInput, "the states carry no timecode: say seconds after the first state");
   const bool is_of_count = count && (!options.has_fps || options.fps == count->rate);
-  if (is_asked && !is_of_count)
-    return make_error(ErrorCode::BadInput, "the states count {} frames per second: leave --fps out",
-                      frame_rate_text(count->rate.hz()));
+  if (is_asked && !is_of_count) return other_rate(count->rate);
   const bool is_all = options.from_s == 0.0 && !options.to_s && !options.is_one_frame;
   return is_asked || (is_of_count && is_all && track.is_whole(first_ns));
 }
@@ -72,10 +75,49 @@ Status plan_by_timecode(const TimecodeTrack& track, const FrameRate& rate, Frame
   return {};
 }
 
+/// Frames at the timecode that a running server counts, from its next whole frame or the one asked for.
+Status count_on(const CountedState& now, FramePlan& plan) {
+  ExportOptions& options = plan.options;
+  const FrameRate& rate = now.timecode.rate;
+  const bool is_asked = !options.from_timecode.empty() || !options.to_timecode.empty();
+  const bool is_of_count = !options.has_fps || options.fps == rate;
+  if (is_asked && !is_of_count) return other_rate(rate);
+  if (!is_of_count || options.is_one_frame || (options.from_s > 0.0 && !is_asked)) return {};
+  const double passed_s = static_cast<double>(*plan.range.first_ns - now.sim_time_ns) / kNsPerS;
+  const Timecode first = advanced(now.timecode, passed_s * rate.hz());
+  constexpr double kSamePart = 1e-6;  // of a frame
+  Timecode from = advanced(first, first.part > kSamePart ? 1.0 - first.part : 0.0);
+  if (!options.from_timecode.empty()) {
+    ASSIGN_OR_RETURN(from, parse_timecode(options.from_timecode, rate));
+  }
+  from.part = 0.0;
+  const double waited = frames_between(first, from);
+  if (waited < -kSamePart)
+    return make_error(ErrorCode::BadInput, "it is {} already, {} is over", timecode_text(first),
+                      timecode_text(from));
+  options.from_s = plan.range.from_s = std::max(0.0, waited) / rate.hz();
+  if (!options.to_timecode.empty()) {
+    ASSIGN_OR_RETURN(const Timecode to, parse_timecode(options.to_timecode, rate));
+    options.to_s = frames_between(first, to) / rate.hz();
+    if (*options.to_s < options.from_s)
+      return make_error(ErrorCode::BadInput, "the end, {}, is before the beginning, {}", timecode_text(to),
+                        timecode_text(from));
+  }
+  plan.range.to_s = options.to_s;
+  options.fps = plan.range.fps = rate;
+  options.first_number = from.frame;
+  plan.first_timecode = timecode_text(from);
+  return {};
+}
+
 Result<FramePlan> plan_frames(ExportSource& source, const ExportOptions& options) {
   FramePlan plan{options, {options.fps, options.from_s, options.to_s}, {}};
   const TimecodeTrack& track = source.timecodes();
   ASSIGN_OR_RETURN(plan.range.first_ns, source.skip_to(0.0));
+  if (const auto running = source.counted(); running && plan.range.first_ns) {
+    RETURN_IF_ERROR(count_on(*running, plan));
+    return plan;
+  }
   ASSIGN_OR_RETURN(const bool is_by_timecode,
                    goes_by_timecode(options, track, plan.range.first_ns.value_or(0)));
   if (is_by_timecode) RETURN_IF_ERROR(plan_by_timecode(track, track.first()->rate, plan));

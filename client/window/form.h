@@ -1,5 +1,5 @@
-// A form beside the picture: fields with ranges, and the person's edits. Plain data: the application defines
-// the fields' meaning, form_panel.h draws them.
+// A form beside the picture: fields with ranges, the person's edits, and the panel that shows them. The
+// application defines what the fields mean.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -7,6 +7,8 @@
 #include <string>
 #include <variant>
 #include <vector>
+
+#include "client/window/hud.h"
 
 namespace strandcast {
 
@@ -78,5 +80,9 @@ glm::vec3 direction_of(const DirectionAngles& angles, float length);
 /// Converts linear light, 0..1, to display values and back (sRGB, IEC 61966-2-1).
 float to_srgb(float linear);
 float from_srgb(float shown);
+
+/// Draws the form at the right edge with Dear ImGui, between its NewFrame() and Render(), at most as high as
+/// the window. Adds the person's edits to `actions`. Main thread only.
+PanelSize draw_form_panel(const FormState& form, FormActions& actions);
 
 }  // namespace strandcast

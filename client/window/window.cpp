@@ -10,8 +10,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "client/window/form_panel.h"
-#include "client/window/hud_panel.h"
+#include "client/window/form.h"
+#include "client/window/hud.h"
 #include "common/base/units.h"
 #include "common/log/log.h"
 

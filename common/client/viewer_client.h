@@ -5,18 +5,21 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/client/address.h"
 #include "common/client/mailbox.h"
-#include "common/client/outbox.h"
 #include "common/replay/clock_offset.h"
 #include "common/wire/messages.h"
 
@@ -60,6 +63,30 @@ inline constexpr std::chrono::milliseconds kQuickPingInterval{20};
 inline constexpr std::chrono::milliseconds kPingInterval{1000};
 inline constexpr std::chrono::milliseconds kKeyframeRequestInterval{
     1000};  // at most one request in this time
+
+inline constexpr size_t kMaxSendQueueMessages = 1024;
+inline constexpr size_t kMaxSendQueueBytes = 1u << 20;
+
+/// Messages that wait to be sent to the server, in order. Any thread adds, the network thread removes.
+class Outbox {
+ public:
+  /// Adds a message. LimitExceeded if the box is full (the message is dropped), Unavailable once it is
+  /// closed.
+  Status push(std::vector<std::byte> message);
+  /// Returns the oldest message, which stays until pop(); empty if there is none.
+  std::span<const std::byte> front() const;
+  void pop();
+  /// Closes the box: nothing can be added any more.
+  void close();
+
+  size_t message_count() const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::deque<std::vector<std::byte>> messages_;
+  size_t bytes_ = 0;
+  bool is_closed_ = false;
+};
 
 struct ConnectionCounters {
   uint64_t received_bytes = 0;  // payload of WebSocket messages

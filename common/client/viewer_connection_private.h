@@ -18,7 +18,6 @@
 #include <thread>
 #include <vector>
 
-#include "common/client/outbox.h"
 #include "common/client/viewer_client.h"
 #include "common/net/net_stream_private.h"
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <utility>
 
+#include "common/groom/stated_groom.h"
 #include "common/groom/text_scan.h"
 
 namespace strandcast {
@@ -122,15 +122,38 @@ Result<AbcCurves> AbcCurvesReader::read(uint64_t sample, uint64_t strand_limit, 
   curves.points.resize(points.count());
   if (!curves.is_double && !curves.points.empty())
     std::memcpy(curves.points.data(), points.bytes.data(), points.bytes.size());
-  for (size_t i = 0; i < curves.points.size(); ++i) {
-    glm::vec3& point = curves.points[i];
-    if (curves.is_double)
-      for (uint32_t axis = 0; axis < 3; ++axis)
-        point[static_cast<int>(axis)] = static_cast<float>(points.number(i, axis));
-    if (!std::isfinite(point.x) || !std::isfinite(point.y) || !std::isfinite(point.z))
-      return make_error(ErrorCode::BadInput, "point {} is ({}, {}, {})", i, point.x, point.y, point.z);
+  for (size_t i = 0; curves.is_double && i < curves.points.size(); ++i) {
+    for (uint32_t axis = 0; axis < 3; ++axis)
+      curves.points[i][static_cast<int>(axis)] = static_cast<float>(points.number(i, axis));
   }
   return curves;
+}
+
+Result<std::vector<std::string>> AbcCurvesReader::texts(std::string_view name, uint64_t sample) const {
+  const AbcProperty* property = find_abc_property(free_, name);
+  std::vector<AbcProperty> parts;
+  std::optional<AbcSample> indices;
+  if (property != nullptr && property->kind == AbcPropertyKind::Compound) {
+    ASSIGN_OR_RETURN(parts, archive_->properties(*property));
+    property = find_abc_property(parts, ".vals");
+    const AbcProperty* const places = find_abc_property(parts, ".indices");
+    if (places == nullptr || !is_whole_number(places->pod)) return std::vector<std::string>();
+    ASSIGN_OR_RETURN(indices, archive_->sample(*places, sample, kMaxStrandCount));
+  }
+  if (property == nullptr || property->pod != AbcPod::String || property->sample_count == 0)
+    return std::vector<std::string>();
+  ASSIGN_OR_RETURN(const AbcSample read, archive_->sample(*property, sample, kMaxStrandCount));
+  std::vector<std::string> values = read.texts();
+  for (std::string& value : values) value = one_line(value, kMaxGroupNameChars);
+  if (!indices) return values;
+  std::vector<std::string> texts;
+  for (size_t i = 0; i < indices->count(); ++i) {
+    const double index = indices->number(i);
+    if (!(index >= 0.0 && index < static_cast<double>(values.size())))
+      return make_error(ErrorCode::BadInput, "'{}' has indices beyond its {} texts", name, values.size());
+    texts.push_back(values[static_cast<size_t>(index)]);
+  }
+  return texts;
 }
 
 Result<std::optional<AbcParam>> AbcCurvesReader::param(std::string_view name, uint64_t sample) const {

@@ -52,11 +52,13 @@ class AbcCurvesReader {
 
   uint64_t sample_count() const { return points_.sample_count; }
   double time_s(uint64_t sample) const { return archive_->time_s(points_, sample); }
-  /// Reads strands; none if there is no sample. BadInput for counts that do not fit, unknown kinds and points
-  /// that are not finite. LimitExceeded for more than these strands or vertices.
+  /// Reads strands; none if there is no sample. BadInput for counts that do not fit and unknown kinds; points
+  /// may be no numbers. LimitExceeded for more than these strands or vertices.
   Result<AbcCurves> read(uint64_t sample, uint64_t strand_limit, uint64_t vertex_limit) const;
   /// Reads a parameter of the schema ("width") or a free one ("groom_guide"); empty if there is none.
   Result<std::optional<AbcParam>> param(std::string_view name, uint64_t sample) const;
+  /// Reads texts, one for each strand or one for all; none if there are none.
+  Result<std::vector<std::string>> texts(std::string_view name, uint64_t sample) const;
   /// Returns the free parameters.
   const std::vector<AbcProperty>& free_params() const { return free_; }
 

@@ -12,6 +12,7 @@
 #include "common/groom/abc_tree.h"
 #include "common/groom/curve_basis.h"
 #include "common/groom/text_scan.h"
+#include "common/groom/usable_strands.h"
 
 namespace strandcast {
 namespace {
@@ -156,14 +157,19 @@ class AbcLoading {
       tally_.time_s = reader.time_s(0);
     }
     ASSIGN_OR_RETURN(const glm::dmat4 world, tree.world_from_node(archive_, node, reader.time_s(0)));
-    labels_.object_name.push_back(tree.nodes()[node].object.name);
-    return add_strands(reader, curves, world);
+    return add_strands(reader, curves, world, tree.nodes()[node].object.name);
   }
 
-  Status add_strands(const AbcCurvesReader& reader, const AbcCurves& curves, const glm::dmat4& world) {
+  /// `own_name` names strands whose group has no name.
+  Status add_strands(const AbcCurvesReader& reader, const AbcCurves& curves, const glm::dmat4& world,
+                     const std::string& own_name) {
     ASSIGN_OR_RETURN(const auto guide, strand_param(reader, curves, "groom_guide"));
     ASSIGN_OR_RETURN(const auto group, strand_param(reader, curves, "groom_group_id"));
     ASSIGN_OR_RETURN(const auto id, strand_param(reader, curves, "groom_id"));
+    ASSIGN_OR_RETURN(const auto group_name, reader.texts("groom_group_name", 0));
+    const StrandNames names(group_name, curves.vertex_counts.size(), own_name);
+    const auto first_object = static_cast<uint32_t>(labels_.object_name.size());
+    labels_.object_name.insert(labels_.object_name.end(), names.name.begin(), names.name.end());
     ASSIGN_OR_RETURN(const auto uv, root_uv(reader, curves));
     ASSIGN_OR_RETURN(const auto width, width_of(reader, curves));
     RETURN_IF_ERROR(count_widths(reader, width));
@@ -186,13 +192,8 @@ class AbcLoading {
       if (count > kMaxSourceVertexCount)
         return make_error(ErrorCode::LimitExceeded, "strand {} has {} vertices, at most {} are allowed",
                           strand, count, kMaxSourceVertexCount);
-      for (const glm::vec3& point : *points) {
-        const glm::vec3 placed(world * glm::dvec4(point, 1.0));
-        if (!std::isfinite(placed.x + placed.y + placed.z))
-          return make_error(ErrorCode::BadInput, "strand {} has a point that is not finite in the file",
-                            strand);
-        groom_.rest_position_m.push_back(placed);
-      }
+      for (const glm::vec3& point : *points)
+        groom_.rest_position_m.emplace_back(world * glm::dvec4(point, 1.0));
       groom_.offset.push_back(static_cast<uint32_t>(groom_.rest_position_m.size()));
       const auto value_of = [&](const std::optional<StrandParam>& param, uint32_t axis) {
         const auto element = element_of(param->scope, curves, strand, begin);
@@ -204,7 +205,7 @@ class AbcLoading {
       if (std::isfinite(group_id) && tally_.groups.size() < kMostGroups) tally_.groups.insert(group_id);
       labels_.group.push_back(whole_number(group_id));
       labels_.id.push_back(id ? whole_number(value_of(id, 0)) : 0);
-      labels_.object.push_back(static_cast<uint32_t>(labels_.object_name.size() - 1));
+      labels_.object.push_back(first_object + names.of_strand[strand]);
       for (size_t i = 0; i < count; ++i) {
         const auto element = width ? element_of(width->scope, curves, strand, begin + i) : std::nullopt;
         labels_.width.push_back(element ? static_cast<float>(scale * width->param.number(*element)) : NAN);
@@ -319,26 +320,8 @@ class AbcLoading {
     tally_.guides = static_cast<size_t>(std::count(is_guide_.begin(), is_guide_.end(), uint8_t{1}));
     are_all_guides_ = tally_.guides == is_guide_.size();
     if (tally_.guides == 0 || are_all_guides_) return;
-    Groom hair;
-    StrandLabels labels;
-    labels.object_name = std::move(labels_.object_name);
-    hair.offset.push_back(0);
-    for (uint32_t strand = 0; strand < groom_.strand_count(); ++strand) {
-      if (is_guide_[strand] != 0) continue;
-      const auto points = groom_.rest_position_m.begin();
-      hair.rest_position_m.insert(hair.rest_position_m.end(), points + groom_.offset[strand],
-                                  points + groom_.offset[strand + 1]);
-      hair.offset.push_back(static_cast<uint32_t>(hair.rest_position_m.size()));
-      hair.root_uv.push_back(groom_.root_uv[strand]);
-      labels.id.push_back(labels_.id[strand]);
-      labels.group.push_back(labels_.group[strand]);
-      labels.object.push_back(labels_.object[strand]);
-      const auto widths = labels_.width.begin();
-      labels.width.insert(labels.width.end(), widths + groom_.offset[strand],
-                          widths + groom_.offset[strand + 1]);
-    }
-    groom_ = std::move(hair);
-    labels_ = std::move(labels);
+    for (uint8_t& flag : is_guide_) flag = 1 - flag;
+    keep_strands(groom_, labels_, is_guide_);
   }
 
   std::vector<std::string> notes() const {
@@ -400,7 +383,7 @@ Result<StatedGroom> load(Result<AbcContainer> container) {
   ASSIGN_OR_RETURN(const AbcArchive archive, AbcArchive::read(std::move(*container)));
   AbcLoading loading(archive);
   RETURN_IF_ERROR(loading.run());
-  return loading.finish();
+  return with_usable_strands(loading.finish());
 }
 
 }  // namespace

@@ -145,7 +145,12 @@ class CurveMotionReading {
       ASSIGN_OR_RETURN(const glm::dmat4 world, tree_.world_from_node(archive_, curves.node, time_s));
       size_t point = 0;
       for (const uint32_t count : now.vertex_counts) {
-        if (count > 0) roots.emplace_back(world * glm::dvec4(glm::dvec3(now.points[point]), 1.0));
+        if (count > 0) {
+          const glm::dvec3& root = roots.emplace_back(world * glm::dvec4(glm::dvec3(now.points[point]), 1.0));
+          if (!std::isfinite(root.x + root.y + root.z))
+            return make_error(ErrorCode::BadInput, "at {:.6g} s the root of strand {} is at ({}, {}, {})",
+                              time_s, roots.size() - 1, root.x, root.y, root.z);
+        }
         point += count;
       }
     }

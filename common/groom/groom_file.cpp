@@ -12,6 +12,7 @@
 #include "common/groom/ply_loader.h"
 #include "common/groom/resample.h"
 #include "common/groom/tfx_loader.h"
+#include "common/groom/usable_strands.h"
 #include "common/groom/usd_loader.h"
 
 namespace strandcast {
@@ -65,7 +66,10 @@ Error call_text(const std::filesystem::path& path, Error error) {
 }
 
 Result<StatedGroom> unstated(const std::filesystem::path& path, Result<Groom> groom) {
-  if (groom) return StatedGroom{.groom = std::move(groom).value()};
+  if (groom) {
+    auto usable = with_usable_strands({.groom = std::move(groom).value()});
+    return usable ? usable : call_text(path, at(path.string(), usable.error()));
+  }
   return groom.error().code == ErrorCode::NotFound ? groom.error() : call_text(path, groom.error());
 }
 

@@ -1,7 +1,5 @@
 #include "common/groom/hair_loader.h"
 
-#include <algorithm>
-#include <cmath>
 #include <string>
 
 #include "common/base/file.h"
@@ -105,11 +103,6 @@ Result<Groom> read_hair(const ByteView& file) {
     for (int axis = 0; axis < 3; ++axis) {
       point[axis] =
           file.get<float>(points_at + i * kPointBytes + static_cast<uint64_t>(axis) * sizeof(float));
-      if (std::isfinite(point[axis])) continue;
-      const auto next = std::upper_bound(groom.offset.begin(), groom.offset.end(), i);
-      const auto strand = static_cast<size_t>(next - groom.offset.begin()) - 1;
-      return make_error(ErrorCode::BadInput, "strand {} vertex {} has the coordinate {}", strand,
-                        i - groom.offset[strand], point[axis]);
     }
   }
   return with_pinning(std::move(groom), Pinning::Root);

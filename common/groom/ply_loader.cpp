@@ -1,13 +1,13 @@
 #include "common/groom/ply_loader.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 #include <utility>
 
 #include "common/base/file.h"
 #include "common/groom/ply_table.h"
 #include "common/groom/text_scan.h"
+#include "common/groom/usable_strands.h"
 
 namespace strandcast {
 namespace {
@@ -41,11 +41,7 @@ Status read_points(PlyRows& rows, const PlyElement& element, PlyRowsRead& read) 
   for (uint64_t row = 0; row < element.row_count; ++row) {
     RETURN_IF_ERROR(rows.read(element, row));
     glm::vec3 point;
-    for (int i = 0; i < 3; ++i) {
-      point[i] = static_cast<float>(rows.value(axis[static_cast<size_t>(i)]));
-      if (!std::isfinite(point[i]))
-        return make_error(ErrorCode::BadInput, "vertex {} has the coordinate {}", row, point[i]);
-    }
+    for (int i = 0; i < 3; ++i) point[i] = static_cast<float>(rows.value(axis[static_cast<size_t>(i)]));
     read.points.push_back(point);
   }
   return {};
@@ -336,7 +332,7 @@ Result<StatedGroom> read_ply(std::span<const std::byte> file, uint32_t strand_ve
   ASSIGN_OR_RETURN(stated.groom,
                    strands_of(std::move(read), strand_vertex_count, said.strand_vertex_count, stated.notes));
   stated.groom = with_pinning(std::move(stated.groom), Pinning::Root);
-  return stated;
+  return with_usable_strands(std::move(stated));
 }
 
 Result<StatedGroom> load_ply(const std::filesystem::path& path, uint32_t strand_vertex_count) {

@@ -11,6 +11,8 @@
 
 namespace strandcast {
 
+inline constexpr size_t kMaxGroupNameChars = 80;  // that are kept of what a file says
+
 /// What files say of strands besides their shape, in their order; a list is empty where they do not say it.
 struct StrandLabels {
   std::vector<int32_t> id;               // (strand_count)
@@ -18,6 +20,15 @@ struct StrandLabels {
   std::vector<uint32_t> object;          // (strand_count) the curves that it belongs to, in object_name
   std::vector<std::string> object_name;  // of them
   std::vector<float> width;              // (vertex total) diameter; file units, metres once placed
+};
+
+/// Names of strands, each name once.
+struct StrandNames {
+  /// `texts`: one for all strands or one each; with another number of them all strands have the `fallback`.
+  StrandNames(const std::vector<std::string>& texts, size_t strand_count, const std::string& fallback);
+
+  std::vector<std::string> name;
+  std::vector<uint32_t> of_strand;  // in `name`
 };
 
 /// Adds a list of further strands or vertices to that of the `count` before: kept where all have it.

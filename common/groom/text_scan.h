@@ -8,9 +8,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "common/base/result.h"
 #include "common/base/text.h"
@@ -63,9 +65,12 @@ class TextScan {
   uint32_t line_ = 0;
 };
 
-/// Parses the whole word as a number; empty if it is none or does not fit. Accepts infinities and NaN.
+/// Parses the whole word as a number; empty if it is none or does not fit. Accepts infinities and NaN, also
+/// as some C libraries write them ("-1.#IND").
 template <class T>
 std::optional<T> parse_number(std::string_view word) {
+  if constexpr (std::is_floating_point_v<T>)
+    if (word.find("1.#") <= 1) return std::numeric_limits<T>::quiet_NaN();
   if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
   T value{};
   const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), value);

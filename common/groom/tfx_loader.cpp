@@ -148,17 +148,14 @@ Result<float> read_float(const ByteView& file, uint64_t offset, uint64_t item, u
                     item / items_per_strand, item % items_per_strand, offset, what, value);
 }
 
-Status read_positions(const ByteView& file, const TfxHeader& header, Groom& groom) {
+void read_positions(const ByteView& file, const TfxHeader& header, Groom& groom) {
   groom.rest_position_m.resize(header.vertex_total());
   for (uint64_t i = 0; i < header.vertex_total(); ++i) {
     const uint64_t offset = header.positions().offset + i * header.position_bytes;
     for (int axis = 0; axis < 3; ++axis) {
-      ASSIGN_OR_RETURN(groom.rest_position_m[i][axis],
-                       read_float(file, offset + static_cast<uint64_t>(axis) * kFloatBytes, i,
-                                  header.vertex_count, "coordinate"));
+      groom.rest_position_m[i][axis] = file.get<float>(offset + static_cast<uint64_t>(axis) * kFloatBytes);
     }
   }
-  return {};
 }
 
 /// Pin flags of version 4: the fourth float is an inverse mass, 0 = pinned.
@@ -205,7 +202,7 @@ Result<Groom> read_tfx_binary(const ByteView& file) {
   for (uint32_t strand = 0; strand <= header.strand_count; ++strand) {
     groom.offset[strand] = strand * header.vertex_count;
   }
-  RETURN_IF_ERROR(read_positions(file, header, groom));
+  read_positions(file, header, groom);
   RETURN_IF_ERROR(read_root_uv(file, header, groom));
   if (header.has_pin_flags) {
     RETURN_IF_ERROR(read_pins(file, header, groom));

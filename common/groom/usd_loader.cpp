@@ -7,6 +7,7 @@
 
 #include "common/groom/curve_basis.h"
 #include "common/groom/text_scan.h"
+#include "common/groom/usable_strands.h"
 #include "common/groom/usd_stage.h"
 #include "common/groom/usdc_coding.h"
 
@@ -19,10 +20,11 @@ constexpr std::string_view kZipMagic = "PK\x03\x04";
 struct Tally {
   size_t curves_prims = 0;
   size_t left_out_prims = 0;
-  size_t cubic_strands = 0, short_strands = 0;
+  size_t cubic_strands = 0;
   std::string basis;
   std::optional<double> time_code;
   float least_width = 0.0f, most_width = 0.0f;
+  std::vector<uint8_t> is_guide;  // of each strand
 };
 
 struct CurveKind {
@@ -55,38 +57,13 @@ Result<CurveKind> kind_of(const UsdCurves& curves) {
   return kind;
 }
 
-/// Leaves out what has no segment, and says of how many curves.
-UsdCurves without_short(UsdCurves curves, Tally& tally) {
-  const size_t strands = curves.vertex_counts.size(), points = curves.points.size();
-  const auto is_short = [](uint32_t count) { return count < kMinVertexCount; };
-  const auto total = std::accumulate(curves.vertex_counts.begin(), curves.vertex_counts.end(), uint64_t{0});
-  if (std::none_of(curves.vertex_counts.begin(), curves.vertex_counts.end(), is_short) || total != points)
-    return curves;
-  // Of each list, the elements of the strands that stay: of one a strand, of one a point, or of two a strand.
-  const auto keep = [&](auto& list, size_t per_strand, bool is_of_points) {
-    if (list.size() != (is_of_points ? points : per_strand * strands)) return;
-    size_t from = 0, to = 0;
-    for (const uint32_t count : curves.vertex_counts)
-      for (size_t i = 0, end = is_of_points ? count : per_strand; i < end; ++i, ++from)
-        if (!is_short(count)) list[to++] = list[from];
-    list.resize(to);
-  };
-  keep(curves.widths, 1, curves.widths.size() == points);
-  keep(curves.points, 1, true);
-  keep(curves.ids, 1, false);
-  keep(curves.groups, 1, false);
-  keep(curves.root_uv, 2, false);
-  tally.short_strands += std::erase_if(curves.vertex_counts, is_short);
-  return curves;
-}
-
 Status check_counts(const UsdCurves& curves) {
   uint64_t total = 0;
   for (size_t curve = 0; curve < curves.vertex_counts.size(); ++curve) {
     const uint32_t count = curves.vertex_counts[curve];
-    if (count < kMinVertexCount || count > kMaxSourceVertexCount)
-      return make_error(ErrorCode::BadInput, "curve {} has {} vertices, allowed are {} to {}", curve, count,
-                        kMinVertexCount, kMaxSourceVertexCount);
+    if (count > kMaxSourceVertexCount)
+      return make_error(ErrorCode::LimitExceeded, "curve {} has {} vertices, at most {} are allowed", curve,
+                        count, kMaxSourceVertexCount);
     total += count;
   }
   if (total != curves.points.size())
@@ -97,8 +74,20 @@ Status check_counts(const UsdCurves& curves) {
 
 constexpr double kMostLabel = std::numeric_limits<int32_t>::max();  // of an id or a group
 
-/// Labels of these strands; lists that fit nothing are left out. `scale`: of widths.
-StrandLabels labels_of(const UsdCurves& curves, double scale) {
+/// Names of the strands' groups; none where the file has none that fit.
+std::vector<std::string> group_names_of(const UsdCurves& curves) {
+  if (curves.group_name_indices.empty()) return curves.group_names;
+  std::vector<std::string> names;
+  for (const double index : curves.group_name_indices) {
+    if (!(index >= 0.0 && index < static_cast<double>(curves.group_names.size()))) return {};
+    names.push_back(curves.group_names[static_cast<size_t>(index)]);
+  }
+  return names;
+}
+
+/// Labels of these strands; lists that fit nothing are left out. `scale`: of widths. `own_name`: of strands
+/// whose group has no name.
+StrandLabels labels_of(const UsdCurves& curves, double scale, const std::string& own_name) {
   const size_t strands = curves.vertex_counts.size();
   StrandLabels labels;
   const auto whole_numbers = [strands](const std::vector<double>& from) {
@@ -110,6 +99,9 @@ StrandLabels labels_of(const UsdCurves& curves, double scale) {
   };
   labels.id = whole_numbers(curves.ids);
   labels.group = whole_numbers(curves.groups);
+  StrandNames names(group_names_of(curves), strands, own_name);
+  labels.object = std::move(names.of_strand);
+  labels.object_name = std::move(names.name);
   const size_t widths = curves.widths.size();
   const bool is_fit = (widths == 1 || widths == strands || widths == curves.points.size()) &&
                       std::all_of(curves.widths.begin(), curves.widths.end(),
@@ -123,7 +115,7 @@ StrandLabels labels_of(const UsdCurves& curves, double scale) {
 }
 
 Status add_curves(const UsdStage& stage, size_t prim, Groom& groom, StrandLabels& labels, Tally& tally) {
-  const UsdCurves curves = without_short(*stage.prim[prim].curves, tally);
+  const UsdCurves& curves = *stage.prim[prim].curves;
   RETURN_IF_ERROR(check_counts(curves));
   if (groom.strand_count() + curves.vertex_counts.size() > kMaxStrandCount ||
       groom.rest_position_m.size() + curves.points.size() > kMaxGroomVertices)
@@ -137,7 +129,7 @@ Status add_curves(const UsdStage& stage, size_t prim, Groom& groom, StrandLabels
     const auto control = points.subspan(first, curves.vertex_counts[curve]);
     first += control.size();
     std::vector<glm::vec3> strand(control.begin(), control.end());
-    if (!kind.is_linear) {
+    if (!kind.is_linear && control.size() >= kMinVertexCount) {
       auto on_curve = points_on_curve(control, kind.basis, kind.ends);
       if (!on_curve) return at(fmt::format("curve {}", curve), on_curve.error());
       strand = std::move(on_curve).value();
@@ -145,17 +137,14 @@ Status add_curves(const UsdStage& stage, size_t prim, Groom& groom, StrandLabels
       tally.basis = curves.basis;
     }
     for (const glm::vec3& point : strand) {
-      const glm::vec3 placed(world * glm::dvec4(point, 1.0));
-      if (!std::isfinite(placed.x + placed.y + placed.z))
-        return make_error(ErrorCode::BadInput, "curve {} has a point that is not finite in the file", curve);
-      groom.rest_position_m.push_back(placed);
+      groom.rest_position_m.emplace_back(world * glm::dvec4(point, 1.0));
     }
     groom.offset.push_back(static_cast<uint32_t>(groom.rest_position_m.size()));
   }
   const size_t strands = curves.vertex_counts.size();
-  join_labels(labels, groom.strand_count() - strands,
-              named(labels_of(curves, std::cbrt(std::abs(glm::determinant(glm::dmat3(world))))), strands,
-                    stage.prim[prim].name));
+  join_labels(
+      labels, groom.strand_count() - strands,
+      labels_of(curves, std::cbrt(std::abs(glm::determinant(glm::dmat3(world)))), stage.prim[prim].name));
   std::vector<glm::vec2> uv;
   const auto is_finite_number = [](auto value) { return std::isfinite(value); };
   const bool has_uv = curves.root_uv.size() == 2 * strands &&
@@ -163,6 +152,12 @@ Status add_curves(const UsdStage& stage, size_t prim, Groom& groom, StrandLabels
   for (size_t i = 0; has_uv && i < strands; ++i)
     uv.emplace_back(curves.root_uv[2 * i], curves.root_uv[2 * i + 1]);
   join_list(groom.root_uv, groom.strand_count() - strands, uv);
+  const auto is_guide = [&](size_t strand) {
+    const std::vector<double>& told = curves.guides;
+    const bool fits = told.size() == strands || told.size() == 1;
+    return curves.purpose == "guide" || (fits && told[told.size() == 1 ? 0 : strand] > 0.0);
+  };
+  for (size_t strand = 0; strand < strands; ++strand) tally.is_guide.push_back(is_guide(strand) ? 1 : 0);
   ++tally.curves_prims;
   if (curves.time_code) tally.time_code = curves.time_code;
   for (const float width : curves.widths) {
@@ -199,9 +194,6 @@ std::vector<std::string> notes_of(const UsdStage& stage, const Tally& tally) {
   if (tally.left_out_prims > 0)
     notes.push_back(fmt::format("{} BasisCurves are left out: inactive, invisible, a class or an override",
                                 tally.left_out_prims));
-  if (tally.short_strands > 0)
-    notes.push_back(
-        fmt::format("{} curves of fewer than {} points are left out", tally.short_strands, kMinVertexCount));
   if (stage.reference_count > 0)
     notes.push_back(fmt::format("{} references, layers or variants are not followed", stage.reference_count));
   if (stage.other_curve_count > 0)
@@ -273,6 +265,19 @@ Result<UsdStage> read_stage(const std::shared_ptr<GroomSource>& source) {
   return read_usda_stage({text.data(), text.size()});
 }
 
+/// Guides that drive other strands are no hair; alone they are.
+void leave_out_guides(StatedGroom& stated, Tally& tally) {
+  const auto guides = std::count(tally.is_guide.begin(), tally.is_guide.end(), uint8_t{1});
+  if (guides == 0) return;
+  if (static_cast<size_t>(guides) == tally.is_guide.size()) {
+    stated.notes.emplace_back("all strands are guides: they are taken as hair");
+    return;
+  }
+  for (uint8_t& flag : tally.is_guide) flag = 1 - flag;
+  keep_strands(stated.groom, stated.labels, tally.is_guide);
+  stated.notes.push_back(fmt::format("{} guides are left out", guides));
+}
+
 Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source) {
   ASSIGN_OR_RETURN(const UsdStage stage, read_stage(source));
   StatedGroom stated;
@@ -288,18 +293,15 @@ Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source) {
     if (!added) return at(fmt::format("prim {}", strandcast::quoted(stage.prim[prim].name)), added.error());
   }
   if (stated.groom.strand_count() == 0)
-    return make_error(ErrorCode::BadInput, "there are no BasisCurves to read{}{}",
-                      tally.short_strands > 0
-                          ? fmt::format("; {} curves have 1 vertices or none", tally.short_strands)
-                          : std::string(),
-                      where_else(stage));
+    return make_error(ErrorCode::BadInput, "there are no BasisCurves to read{}", where_else(stage));
   if (stage.meters_per_unit) stated.unit_m = static_cast<float>(*stage.meters_per_unit);
   stated.is_z_up = stage.is_z_up;
   stated.unit_reason = "its metersPerUnit says so";
   stated.up_axis_reason = "its upAxis says so";
   stated.notes = notes_of(stage, tally);
+  leave_out_guides(stated, tally);
   stated.groom = with_pinning(std::move(stated.groom), Pinning::Root);
-  return stated;
+  return with_usable_strands(std::move(stated));
 }
 
 }  // namespace

@@ -22,17 +22,20 @@ Status set_meters_per_unit(UsdStage& stage, double value) {
 }
 
 std::string* find_curves_word(UsdCurves& curves, std::string_view property) {
-  return property == "type"    ? &curves.type
-         : property == "basis" ? &curves.basis
-         : property == "wrap"  ? &curves.wrap
-                               : nullptr;
+  return property == "type"      ? &curves.type
+         : property == "basis"   ? &curves.basis
+         : property == "wrap"    ? &curves.wrap
+         : property == "purpose" ? &curves.purpose
+                                 : nullptr;
 }
 
 std::vector<double>* find_curves_numbers(UsdCurves& curves, std::string_view property) {
-  return property == "primvars:groom_id"         ? &curves.ids
-         : property == "primvars:groom_group_id" ? &curves.groups
-         : property == "primvars:groom_root_uv"  ? &curves.root_uv
-                                                 : nullptr;
+  return property == "primvars:groom_guide"                ? &curves.guides
+         : property == "primvars:groom_id"                 ? &curves.ids
+         : property == "primvars:groom_group_id"           ? &curves.groups
+         : property == "primvars:groom_root_uv"            ? &curves.root_uv
+         : property == "primvars:groom_group_name:indices" ? &curves.group_name_indices
+                                                           : nullptr;
 }
 
 Status set_xform_op(UsdPrim& prim, std::string_view name, std::vector<double> value, bool is_sample) {

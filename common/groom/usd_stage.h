@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "common/groom/groom_source.h"
+#include "common/groom/stated_groom.h"
 
 namespace strandcast {
 
@@ -21,15 +22,21 @@ inline constexpr size_t kMaxUsdXformOps = 32;  // of one prim
 inline constexpr size_t kMaxUsdDepth = 64;     // of brackets, and of prims in each other
 inline constexpr size_t kMaxUsdNameChars = 80, kMaxUsdWordChars = 40;  // that are kept of what a file says
 
+inline constexpr std::string_view kUsdGroupName = "primvars:groom_group_name";
+
 /// A BasisCurves prim as the file states it.
 struct UsdCurves {
   std::vector<glm::vec3> points;
   std::vector<uint32_t> vertex_counts;
   std::vector<float> widths;
-  std::vector<double> ids, groups, root_uv;  // primvars of Unreal's groom conventions; empty: there are none
-  std::string type = "cubic";                // USD's own defaults
+  std::vector<double> guides, ids, groups,
+      root_uv;                             // primvars of Unreal's groom conventions; empty: there are none
+  std::vector<std::string> group_names;    // likewise; one for each strand or for all, or by indices
+  std::vector<double> group_name_indices;  // empty: there are none
+  std::string type = "cubic";              // USD's own defaults
   std::string basis = "bezier";
   std::string wrap = "nonperiodic";
+  std::string purpose = "default";
   std::optional<double> time_code;  // of the points; empty: they have none
 };
 

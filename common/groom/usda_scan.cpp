@@ -165,8 +165,6 @@ Result<std::vector<glm::vec3>> UsdaScan::points(size_t limit) {
       if (axis > 0) RETURN_IF_ERROR(expect(','));
       ASSIGN_OR_RETURN(const double value, number());
       point[axis] = static_cast<float>(value);
-      if (!std::isfinite(point[axis]))
-        return error(ErrorCode::BadInput, "a point has the coordinate {}", value);
     }
     RETURN_IF_ERROR(expect(')'));
     return point;

@@ -204,6 +204,18 @@ class StageReader {
       ASSIGN_OR_RETURN(*numbers, scan_.numbers(2 * size_t{kMaxGroomVertices}));
       return {};
     }
+    if (name == kUsdGroupName) {
+      std::vector<std::string_view> texts(1);
+      if (scan_.peek() == '[') {
+        ASSIGN_OR_RETURN(texts, scan_.strings(kMaxStrandCount));
+      } else {
+        ASSIGN_OR_RETURN(texts.front(), scan_.string());
+      }
+      curves.group_names.clear();
+      for (const std::string_view text : texts)
+        curves.group_names.push_back(one_line(text, kMaxGroupNameChars));
+      return {};
+    }
     std::string* const word = find_curves_word(curves, name);
     if (word == nullptr) return scan_.skip_value();
     ASSIGN_OR_RETURN(const std::string_view value, scan_.string());

@@ -336,12 +336,20 @@ Result<UsdcArchive::Span> UsdcArchive::array_span(UsdcValue value, size_t limit)
 }
 
 Result<std::vector<int32_t>> UsdcArchive::texts(UsdcValue value, size_t limit) const {
-  const bool is_list = value.type() == UsdcType::TokenVector ||
-                       (value.type() == UsdcType::Token && value.is(UsdcValue::kArray));
+  const bool is_list =
+      value.type() == UsdcType::TokenVector ||
+      ((value.type() == UsdcType::Token || value.type() == UsdcType::String) && value.is(UsdcValue::kArray));
   if (!is_list && value.type() != UsdcType::ValueBlock) return wrong_type(value, "lists of tokens");
   ASSIGN_OR_RETURN(const Span span, array_span(value, limit));
   ASSIGN_OR_RETURN(auto indices, source_->array<int32_t>(span.offset, span.count));
-  for (const int32_t index : indices) RETURN_IF_ERROR(check_token(index));
+  for (int32_t& index : indices) {
+    if (value.type() == UsdcType::String) {
+      if (index < 0 || static_cast<size_t>(index) >= strings_.size())
+        return make_error(ErrorCode::BadInput, "string {} of {}", index, strings_.size());
+      index = static_cast<int32_t>(strings_[static_cast<size_t>(index)]);
+    }
+    RETURN_IF_ERROR(check_token(index));
+  }
   return indices;
 }
 

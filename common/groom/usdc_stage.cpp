@@ -142,7 +142,7 @@ class CrateReader {
   static bool is_wanted(std::string_view name, UsdPrim& prim) {
     if (name == "visibility" || name.starts_with("xformOp")) return true;
     return prim.curves && (name == "points" || name == "curveVertexCounts" || name == "widths" ||
-                           find_curves_numbers(*prim.curves, name) != nullptr ||
+                           name == kUsdGroupName || find_curves_numbers(*prim.curves, name) != nullptr ||
                            find_curves_word(*prim.curves, name) != nullptr);
   }
 
@@ -184,10 +184,6 @@ class CrateReader {
   Status take_curves(std::string_view name, UsdcValue value, std::optional<double> time, UsdCurves& curves) {
     if (name == "points") {
       ASSIGN_OR_RETURN(curves.points, archive_.points(value, kMaxGroomVertices));
-      for (const glm::vec3& point : curves.points)
-        for (int axis = 0; axis < 3; ++axis)
-          if (!std::isfinite(point[axis]))
-            return make_error(ErrorCode::BadInput, "a point has the coordinate {}", point[axis]);
       curves.time_code = time;
       return {};
     }
@@ -206,7 +202,17 @@ class CrateReader {
       ASSIGN_OR_RETURN(*numbers, archive_.list(value, kMaxStrandCount));
       return {};
     }
+    if (name == kUsdGroupName && value.is(UsdcValue::kArray)) {
+      ASSIGN_OR_RETURN(const auto tokens, archive_.texts(value, kMaxStrandCount));
+      for (const int32_t token : tokens)
+        curves.group_names.push_back(one_line(archive_.token(token), kMaxGroupNameChars));
+      return {};
+    }
     ASSIGN_OR_RETURN(const auto text, archive_.text(value));
+    if (name == kUsdGroupName) {
+      curves.group_names = {one_line(text, kMaxGroupNameChars)};
+      return {};
+    }
     *find_curves_word(curves, name) = one_line(text, kMaxUsdWordChars);
     return {};
   }

@@ -7,8 +7,10 @@
 
 #include "common/base/check.h"
 #include "common/base/file.h"
+#include "common/base/mercy.h"
 #include "common/base/quantile.h"
 #include "common/motion/bvh_body.h"
+#include "common/motion/motion_glitches.h"
 #include "common/motion/text_cursor.h"
 
 namespace strandcast {
@@ -313,7 +315,8 @@ struct MotionHeader {
   double frame_s = 0.0;
 };
 
-Result<MotionHeader> parse_motion_header(TextCursor& cursor, uint32_t channel_count) {
+/// `stated_s`: of a frame, where the file does not say it; 0 = nobody states it.
+Result<MotionHeader> parse_motion_header(TextCursor& cursor, double stated_s) {
   MotionHeader header;
   if (!equals_ignoring_case(cursor.next_token(), "Frames:"))
     return cursor.fail(ErrorCode::BadInput, "expected \"Frames:\" after MOTION");
@@ -328,22 +331,18 @@ Result<MotionHeader> parse_motion_header(TextCursor& cursor, uint32_t channel_co
     return cursor.fail(ErrorCode::BadInput, "expected \"Frame Time:\" after Frames");
   const auto word = cursor.next_token();
   const auto frame_s = channel_value(word);
-  if (!frame_s || *frame_s < kMinFrameTimeS || *frame_s > kMaxFrameTimeS)
-    return cursor.fail(ErrorCode::BadInput, "frame time is \"{}\", it must be within {} .. {} s", shown(word),
-                       kMinFrameTimeS, kMaxFrameTimeS);
-  header.frame_s = *frame_s;
-  // Each value takes a digit and a separator: a file too short for its own frame count must not size a
-  // buffer.
-  if (cursor.remaining_bytes() + 1 < uint64_t{2} * channel_count * header.frame_count)
-    return cursor.fail(ErrorCode::BadInput, "{} frames of {} values cannot fit into the {} bytes that follow",
-                       header.frame_count, channel_count, cursor.remaining_bytes());
+  const bool is_fit = frame_s && *frame_s >= kMinFrameTimeS && *frame_s <= kMaxFrameTimeS;
+  if (!is_fit && stated_s == 0.0)
+    return cursor.fail(
+        ErrorCode::BadInput,
+        "frame time is \"{}\", it must be within {} .. {} s (--fps states the rate, --motion-fps "
+        "that of bake)",
+        shown(word), kMinFrameTimeS, kMaxFrameTimeS);
+  header.frame_s = is_fit ? *frame_s : stated_s;
   return header;
 }
 
-Status parse_row(TextCursor& cursor, uint32_t frame, std::span<double> row) {
-  auto line = cursor.next_line();
-  if (!line) return cursor.fail(ErrorCode::BadInput, "the file ends before frame {}", frame);
-  std::string_view rest = *line;
+Status parse_row(const TextCursor& cursor, std::string_view rest, size_t frame, std::span<double> row) {
   for (size_t i = 0; i < row.size(); ++i) {
     const auto word = take_token(rest);
     if (word.empty())
@@ -359,6 +358,69 @@ Status parse_row(TextCursor& cursor, uint32_t frame, std::span<double> row) {
     return cursor.fail(ErrorCode::BadInput, "frame {} has more values than the {} channels of the hierarchy",
                        frame, row.size());
   return {};
+}
+
+/// What the rows of a file say of the path to the head and of the body.
+struct Rows {
+  std::vector<uint8_t> is_good;        // of each; the pose of a bad one is none
+  std::vector<double> first;           // the first good one
+  std::array<double, 2> rest_share{};  // of the first two good ones
+  BadItems bad;
+};
+
+using JointPath = std::vector<const Joint*>;  // from the root
+
+/// Reads rows up to the end of the text, each one of `clip`.
+Result<Rows> read_rows(TextCursor& cursor, const Skeleton& skeleton, const JointPath& head,
+                       const std::vector<JointPath>& body, MotionClip& clip) {
+  Rows rows;
+  std::vector<double> row(skeleton.channel_count);
+  size_t good_count = 0;
+  while (const auto line = cursor.next_line()) {
+    const size_t frame = rows.is_good.size();
+    if (frame == kMaxBvhFrames)
+      return cursor.fail(ErrorCode::LimitExceeded, "more than {} frames", kMaxBvhFrames);
+    const Status read = parse_row(cursor, *line, frame, row);
+    rows.is_good.push_back(read ? 1 : 0);
+    if (!read) {
+      rows.bad.add(read.error());
+      clip.world_from_head.emplace_back();
+      clip.joint_m.resize(clip.joint_m.size() + body.size());
+      continue;
+    }
+    if (good_count == 0) rows.first = row;
+    if (good_count < rows.rest_share.size()) rows.rest_share[good_count] = share_at_rest(skeleton, row);
+    ++good_count;
+    clip.world_from_head.push_back(evaluate(head, row));
+    const Pose& at_frame = clip.world_from_head.back();
+    for (const JointPath& joint : body)
+      clip.joint_m.push_back(glm::conjugate(at_frame.rotation) *
+                             (evaluate(joint, row).position_m - at_frame.position_m));
+  }
+  if (rows.is_good.empty()) return cursor.fail(ErrorCode::BadInput, "the file ends before its first frame");
+  RETURN_IF_ERROR(rows.bad.judge(rows.is_good.size(), "frames"));
+  return rows;
+}
+
+/// Puts between good frames what lies between them; bad ones at the beginning and at the end go.
+void bridge(MotionClip& clip, const std::vector<uint8_t>& is_good) {
+  const size_t joint_count = clip.joint_name.size();
+  const auto first = static_cast<size_t>(std::find(is_good.begin(), is_good.end(), 1) - is_good.begin());
+  size_t good = first;
+  for (size_t i = first; i < is_good.size(); ++i) {
+    if (is_good[i] == 0) continue;
+    for (size_t k = good + 1; k < i; ++k) {
+      const double share = static_cast<double>(k - good) / static_cast<double>(i - good);
+      clip.world_from_head[k] = interpolate(clip.world_from_head[good], clip.world_from_head[i], share);
+      for (size_t joint = 0; joint < joint_count; ++joint)
+        clip.joint_m[k * joint_count + joint] =
+            glm::mix(clip.joint_m[good * joint_count + joint], clip.joint_m[i * joint_count + joint], share);
+    }
+    good = i;
+  }
+  clip.world_from_head.resize(good + 1);
+  clip.joint_m.resize((good + 1) * joint_count);
+  leave_out_first_frames(clip, static_cast<uint32_t>(first));
 }
 
 bool begins_with_t_pose(const std::vector<Pose>& poses, double rest_share_first, double rest_share_second) {
@@ -393,19 +455,12 @@ void to_head_space(std::vector<glm::dvec3>& places, double unit_m, bool is_z_up)
   for (glm::dvec3& place : places) place = upright * (place * unit_m);
 }
 
-void erase_first_frame(MotionClip& clip) {
-  clip.world_from_head.erase(clip.world_from_head.begin());
-  clip.joint_m.erase(clip.joint_m.begin(),
-                     clip.joint_m.begin() +
-                         static_cast<std::ptrdiff_t>(std::min(clip.joint_m.size(), clip.joint_name.size())));
-}
-
 /// Paths to the joints of the body that are known, and their names; NotFound for one that was asked for.
-Result<std::vector<std::vector<const Joint*>>> find_body(const Skeleton& skeleton, const BvhOptions& options,
-                                                         std::vector<std::string>& names) {
+Result<std::vector<JointPath>> find_body(const Skeleton& skeleton, const BvhOptions& options,
+                                         std::vector<std::string>& names) {
   std::vector<std::string> in_file;
   for (const Joint& joint : skeleton.joints) in_file.push_back(joint.name);
-  std::vector<std::vector<const Joint*>> paths;
+  std::vector<JointPath> paths;
   const auto add = [&](const std::string& name, size_t joint) {
     names.push_back(name);
     paths.push_back(path_to(skeleton, static_cast<uint32_t>(joint)));
@@ -437,42 +492,33 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   const auto head = find_head(skeleton, options.head_joint);
   if (!head) return at(place, head.error());
   const auto path = path_to(skeleton, *head);
-  ASSIGN_OR_RETURN(const MotionHeader header, parse_motion_header(cursor, skeleton.channel_count));
+  ASSIGN_OR_RETURN(const MotionHeader header, parse_motion_header(cursor, options.frame_s));
   if (skeleton.channel_count == 0) return cursor.fail(ErrorCode::BadInput, "the hierarchy has no channels");
 
   static_cast<void>(cursor.rest_of_line());
   MotionClip clip;
-  std::vector<std::vector<const Joint*>> body;
+  std::vector<JointPath> body;
   if (options.has_body || !options.body_joints.empty()) {
     auto found = find_body(skeleton, options, clip.joint_name);
     if (!found) return at(place, found.error());
     body = std::move(found).value();
   }
   clip.frame_s = header.frame_s;
-  clip.world_from_head.reserve(header.frame_count);
-  std::vector<double> row(skeleton.channel_count), first_row;
-  std::array<double, 2> rest_share{};
-  for (uint32_t frame = 0; frame < header.frame_count; ++frame) {
-    RETURN_IF_ERROR(parse_row(cursor, frame, row));
-    if (frame == 0) first_row = row;
-    if (frame < rest_share.size()) rest_share[frame] = share_at_rest(skeleton, row);
-    clip.world_from_head.push_back(evaluate(path, row));
-    const Pose& at_frame = clip.world_from_head.back();
-    for (const auto& joint : body)
-      clip.joint_m.push_back(glm::conjugate(at_frame.rotation) *
-                             (evaluate(joint, row).position_m - at_frame.position_m));
-  }
-  if (cursor.next_line())
-    return cursor.fail(ErrorCode::BadInput, "more lines follow after the {} frames announced",
-                       header.frame_count);
+  ASSIGN_OR_RETURN(const Rows rows, read_rows(cursor, skeleton, path, body, clip));
+  bridge(clip, rows.is_good);
+  if (rows.bad.count() > 0)
+    clip.repairs.push_back(rows.bad.sentence(rows.is_good.size(), "frames", "and are bridged or left out"));
+  if (rows.is_good.size() != header.frame_count)
+    clip.repairs.push_back(
+        fmt::format("{} frames are announced, {} are there", header.frame_count, rows.is_good.size()));
 
   if (options.skip_first_frame_if_t_pose &&
-      begins_with_t_pose(clip.world_from_head, rest_share[0], rest_share[1]))
-    erase_first_frame(clip);
+      begins_with_t_pose(clip.world_from_head, rows.rest_share[0], rows.rest_share[1]))
+    leave_out_first_frames(clip, 1);
   const bool is_z_up = options.is_z_up.value_or(guess_z_up(path));
   if (is_z_up && !options.is_z_up)
     clip.up_reason = "+Z is taken as up: there the head is above the hips in the rest pose";
-  const double height = body_height(skeleton, is_z_up, first_row);
+  const double height = body_height(skeleton, is_z_up, rows.first);
   const bool is_guessed = options.unit_m == 0.0;
   if (is_guessed && !(height > 0.0))
     return at(place, make_error(ErrorCode::BadInput,

@@ -44,6 +44,7 @@ inline constexpr double kUpClearly = 2.0;
 struct BvhOptions {
   double unit_m =
       0.0;  // metres per file unit; 0 = guessed: the one of kClipUnits that kAssumedBodyHeightM suggests
+  double frame_s = 0.0;  // of a frame, where the file does not say it; 0 = refused then
   std::optional<bool>
       is_z_up{};             // else +Y is up; empty = guessed: +Z where the head is above the hips at rest
   std::string head_joint{};  // empty: "Head" or "head", with or without a prefix ending in ':' or '_'
@@ -57,7 +58,9 @@ struct BvhOptions {
 /// Loads world poses of the head joint, one per frame. Rotations are applied in the order of CHANNELS; a
 /// position channel of any joint replaces that axis of its OFFSET. The rest pose (all rotations zero) is
 /// assumed to look along +Z if +Y is up, and along -Y if +Z is up, as in all known files. It becomes the
-/// identity: +Z forward, +Y up. BadInput and LimitExceeded name file and line; NotFound lists the joints.
+/// identity: +Z forward, +Y up.
+/// Frames that cannot be read are bridged, and there are as many as there are rows; MotionClip's repairs say
+/// so. BadInput and LimitExceeded name file and line; NotFound lists the joints.
 Result<MotionClip> load_bvh(const std::filesystem::path& path, const BvhOptions& options);
 
 /// Parses BVH text like load_bvh(); `place` names it in errors.

@@ -108,6 +108,18 @@ std::vector<std::byte> osc_message(std::string_view address, std::string_view na
   return packet.bytes();
 }
 
+std::vector<std::byte> osc_bundle(const std::vector<std::vector<std::byte>>& messages) {
+  constexpr uint64_t kImmediately = 1;
+  Packet bundle;
+  bundle.put_text("#bundle");
+  bundle.put(kImmediately, std::endian::big);
+  for (const auto& message : messages) {
+    bundle.put(static_cast<uint32_t>(message.size()), std::endian::big);
+    bundle.append(message);
+  }
+  return bundle.bytes();
+}
+
 std::vector<std::byte> encode_vmc(const MocapMoment& moment) {
   constexpr double kHeadAboveRootM = 0.25;  // a bone at 0 would be one whose place is not told
   const glm::dvec3& p = moment.world_from_head.position_m;
@@ -119,15 +131,17 @@ std::vector<std::byte> encode_vmc(const MocapMoment& moment) {
   if (moment.wind_mps)
     messages.push_back(
         osc_message("/strandcast/wind", "", {moment.wind_mps->x, moment.wind_mps->y, moment.wind_mps->z}));
-  constexpr uint64_t kImmediately = 1;
-  Packet bundle;
-  bundle.put_text("#bundle");
-  bundle.put(kImmediately, std::endian::big);
-  for (const auto& message : messages) {
-    bundle.put(static_cast<uint32_t>(message.size()), std::endian::big);
-    bundle.append(message);
-  }
-  return bundle.bytes();
+  return osc_bundle(messages);
+}
+
+// ---- VRChat: OSC; Unity's axes, and its angles about z, x and y in this order
+
+std::vector<std::byte> encode_vrchat(const MocapMoment& moment) {
+  const glm::dvec3& p = moment.world_from_head.position_m;
+  const HeadAngles angles = angles_of(moment.world_from_head.rotation);
+  return osc_bundle({osc_message("/tracking/trackers/head/position", "", {-p.x, p.y, p.z}),
+                     osc_message("/tracking/trackers/head/rotation", "",
+                                 {angles.down_deg, -angles.left_deg, -angles.tilt_right_deg})});
 }
 
 // ---- OpenTrackIO: a camera; +Z up, it looks along +Y, and turns right-handed about +Z, +X and +Y
@@ -160,6 +174,7 @@ constexpr MocapEncoding kEncodings[] = {
     {"vmc", 39539, encode_vmc},
     {"opentrack", 4242, encode_opentrack},
     {"freed", 40000, encode_freed, true},
+    {"vrchat", 9000, encode_vrchat},
     {"opentrackio", kOpenTrackIoPort,
      [](const MocapMoment& moment) { return encode_track(moment, TrackEncoding::Json); }, true},
     {"opentrackio-cbor", kOpenTrackIoPort,

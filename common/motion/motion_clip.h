@@ -18,10 +18,11 @@ struct MotionClip {
   // Joints of the body, by the names that body_desc.h gives them or those of the file; none where not asked
   // for.
   std::vector<std::string> joint_name;
-  std::vector<glm::dvec3> joint_m;  // (frames x joints) head space
-  double file_unit_m = 1.0;         // metres per unit of the file it came from
-  std::string unit_reason;          // why this unit, when nobody stated it; else empty
-  std::string up_reason;            // likewise why not +Y, of a file with another up axis
+  std::vector<glm::dvec3> joint_m;   // (frames x joints) head space
+  double file_unit_m = 1.0;          // metres per unit of the file it came from
+  std::string unit_reason;           // why this unit, when nobody stated it; else empty
+  std::vector<std::string> repairs;  // what a file needed to be read, a sentence for each kind
+  std::string up_reason;             // likewise why not +Y, of a file with another up axis
 
   /// Returns the time of the last pose, s; 0 for an empty clip.
   double duration_s() const;

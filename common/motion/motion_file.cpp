@@ -30,6 +30,7 @@ Result<MotionFile> load_motion_file(const std::filesystem::path& path, const Mot
   bvh.unit_m = options.unit_m;
   if (!options.up.empty()) bvh.is_z_up = options.up == "z";
   bvh.head_joint = options.joint;
+  if (options.fps > 0.0) bvh.frame_s = 1.0 / options.fps;
   bvh.has_body = options.has_body;
   bvh.body_joints = options.body_joints;
   bvh.skip_first_frame_if_t_pose = false;  // judged below, with all other first frames
@@ -38,6 +39,7 @@ Result<MotionFile> load_motion_file(const std::filesystem::path& path, const Mot
   const auto note = [&](const std::string& sentence) {
     file.notes.push_back(fmt::format("{}: {}", path.string(), sentence));
   };
+  for (const std::string& repair : file.clip.repairs) note(repair);
   if (!file.clip.up_reason.empty()) note(file.clip.up_reason + " (--up states another)");
   if (!file.clip.unit_reason.empty()) note(file.clip.unit_reason + " (--unit states another)");
   const FirstFrames first = find_first_frames(file.clip);

@@ -16,6 +16,7 @@ struct MotionFileOptions {
   double unit_m = 0.0;                        // --unit; 0 = guessed
   std::string up;                             // --up: y or z; empty = guessed
   std::string joint;                          // --joint; empty = found by name
+  double fps = 0.0;                           // --fps, --motion-fps: of a file that states none; 0 = refused
   bool has_body = false;                      // joints of the body too, as far as their names are known
   std::vector<std::string> body_joints = {};  // --body-joint: these besides
   bool is_filtering_glitches = false;         // --filter-glitches

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/base/file.h"
+#include "common/base/mercy.h"
 #include "common/base/quantile.h"
 #include "common/base/units.h"
 #include "common/motion/text_cursor.h"
@@ -160,21 +161,19 @@ Result<Row> parse_row(const TextCursor& cursor, const Columns& columns, std::str
 struct Readings {
   std::vector<Row> rows;
   uint64_t decimal_commas = 0;
-  uint64_t unreadable = 0;
-  uint64_t backward = 0;  // their time lies before that of an earlier row
-  uint64_t repeated = 0;  // the same as the row before
-  uint64_t spread = 0;    // other values at the time of the row before
+  uint64_t row_count = 0;  // of the file
+  uint64_t backward = 0;   // their time lies before that of an earlier row
+  uint64_t repeated = 0;   // the same as the row before
+  uint64_t spread = 0;     // other values at the time of the row before
   uint64_t gaps = 0;
   double longest_gap_s = 0.0;
-  std::optional<Error> first_problem;
+  BadItems bad;  // unreadable and backward ones
 
-  uint64_t left_out() const { return unreadable + backward; }
   void add(const TextCursor& cursor, const Row& row) {
     if (!rows.empty() && row.time_s < rows.back().time_s) {
       ++backward;
-      if (!first_problem)
-        first_problem = cursor.fail(ErrorCode::BadInput, "time goes back from {} s to {} s",
-                                    rows.back().time_s, row.time_s);
+      bad.add(cursor.fail(ErrorCode::BadInput, "time goes back from {} s to {} s", rows.back().time_s,
+                          row.time_s));
       return;
     }
     const bool is_same_time = !rows.empty() && row.time_s == rows.back().time_s;
@@ -220,10 +219,10 @@ std::vector<std::string> repairs_of(const Readings& readings, const Dialect& dia
     repairs.push_back(
         fmt::format("values are separated by {}", dialect.separator == ';' ? "semicolons" : "tabs"));
   say(readings.decimal_commas, "numbers with a decimal comma");
-  if (readings.left_out() > 0)
-    repairs.push_back(fmt::format("{} rows left out: {} could not be read, {} go back in time; the first: {}",
-                                  readings.left_out(), readings.unreadable, readings.backward,
-                                  readings.first_problem->to_string()));
+  if (readings.bad.count() > 0)
+    repairs.push_back(readings.bad.sentence(
+        readings.row_count, "rows",
+        fmt::format("and are left out ({} go back in time)", readings.backward).c_str()));
   say(readings.repeated, "rows left out because they repeat the one before");
   say(readings.spread, "rows with the time of the one before, spread evenly up to the next time");
   if (readings.gaps > 0)
@@ -257,16 +256,14 @@ Result<WindSeries> parse_wind_csv(const std::string& text, const std::string& pl
     if (readings.rows.size() >= kMaxWindRows)
       return cursor.fail(ErrorCode::LimitExceeded, "more than {} rows", kMaxWindRows);
     const auto row = parse_row(cursor, *columns, *line, readings.decimal_commas);
-    if (row) {
+    ++readings.row_count;
+    if (row)
       readings.add(cursor, *row);
-      continue;
-    }
-    ++readings.unreadable;
-    if (!readings.first_problem) readings.first_problem = row.error();
+    else
+      readings.bad.add(row.error());
   }
   if (!columns) return cursor.fail(ErrorCode::BadInput, "the file has no header row");
-  // A file most of which cannot be used is not what its reader takes it for.
-  if (readings.left_out() >= std::max<uint64_t>(readings.rows.size(), 1)) return *readings.first_problem;
+  RETURN_IF_ERROR(readings.bad.judge(readings.row_count, "rows"));
   if (readings.rows.empty()) return cursor.fail(ErrorCode::BadInput, "the file has a header but no rows");
   const double usual_s = usual_step_s(readings.rows);
   count_gaps(readings, usual_s);

@@ -24,7 +24,8 @@ inline constexpr double kMaxWindSpeedMps = 150.0;
 /// the east, to the north, up). The latter become world x = u, y = w, z = -v.
 /// Repairs: rows that cannot be read (NaN, empty, beyond kMaxWindSpeedMps), that go back in time or that
 /// repeat are dropped. Rows that share a time are spread evenly up to the next one; WindSeries::sample()
-/// bridges gaps. Each kind of repair is reported in a sentence with its count.
+/// bridges gaps. Each kind of repair is reported in a sentence with its count. A file more than a tenth of
+/// whose rows cannot be used is refused.
 Result<WindSeries> load_wind_csv(const std::filesystem::path& path);
 
 /// Parses CSV text like load_wind_csv(); `place` names it in errors.

@@ -6,8 +6,6 @@
 #include <array>
 #include <cmath>
 
-#include "common/plot/html_text.h"
-
 namespace strandcast {
 namespace {
 
@@ -273,6 +271,32 @@ std::string make_svg_plot(const PlotDesc& desc) {
   for (size_t i = 0; i < desc.series.size(); ++i)
     svg += series_svg(desc.series[i], style_of(desc.series[i], i), x, y);
   return svg + legend_svg(desc, x.end_px + 16.0) + "</svg>\n";
+}
+
+std::string html_escaped(std::string_view text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      case '\'':
+        escaped += "&#39;";
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return escaped;
 }
 
 }  // namespace strandcast

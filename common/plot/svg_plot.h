@@ -5,6 +5,7 @@
 
 #include <limits>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace strandcast {
@@ -63,5 +64,8 @@ const char* plot_color(size_t style);
 
 /// Returns the positions of axis labels, ascending, within [minimum, maximum].
 std::vector<double> plot_ticks(PlotScale scale, double minimum, double maximum);
+
+/// Replaces the five characters that have a meaning in HTML, SVG and XML with entities.
+std::string html_escaped(std::string_view text);
 
 }  // namespace strandcast

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/wire/record_batch.h"
+#include "common/wire/recording_messages.h"
 
 namespace strandcast {
 

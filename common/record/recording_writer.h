@@ -11,7 +11,6 @@
 #include "common/record/recording_layout.h"
 #include "common/strands/frame_header.h"
 #include "common/strands/zstd_block.h"
-#include "common/wire/record_batch.h"
 #include "common/wire/recording_messages.h"
 
 namespace strandcast {

@@ -76,6 +76,8 @@ class StrandReplay {
 
   /// Returns the stream of the newest decoded state; each stream numbers its frames itself.
   uint16_t stream_id() const { return stream_id_; }
+  /// Returns the number of the newest frame in its stream. A state that is encoded twice has two.
+  uint32_t sequence() const { return last_sequence_; }
   const ReplayStats& stats() const { return stats_; }
   const StageTimer& decode_timer() const { return decode_timer_; }
   /// Times from the arrival of a motion sample at the server to the decoded state that contains it, ms.

@@ -9,7 +9,6 @@
 #include "server/app/server_passes.h"
 #include "server/encode/picture_encoder.h"
 #include "server/encode/picture_painter.h"
-#include "server/encode/picture_passes.h"
 #include "server/encode/strand_encode_worker.h"
 #include "server/sim/executor/executor.h"
 #include "server/sim/followed_solver.h"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/base/profile.h"
 #include "common/base/units.h"
 #include "server/net/metrics.h"
 
@@ -81,11 +80,6 @@ std::string FrameStages::metrics() const {
          format_histogram("state_to_frame_ms",
                           "From a state that was published to its first encoded frame of strands.",
                           state_to_frame_);
-}
-
-void StageSink::put(std::shared_ptr<const Snapshot> state) {
-  stages_.note_state(*state, now_ns());
-  next_.put(std::move(state));
 }
 
 }  // namespace strandcast

@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -17,7 +16,6 @@
 #include "common/base/result.h"
 #include "common/strands/snapshot.h"
 #include "common/wire/messages.h"
-#include "server/stream/state_source.h"
 
 namespace strandcast {
 
@@ -71,22 +69,6 @@ class FrameStages {
   Histogram state_to_frame_;
   std::ofstream trace_;
   uint64_t trace_lines_ = 0;
-};
-
-/// Passes a source's states on to the hub, and notes when each came by.
-class StageSink : public StateSink {
- public:
-  StageSink(StateSink& next, FrameStages& stages) : next_(next), stages_(stages) {}
-  void put(std::shared_ptr<const Snapshot> state) override;
-  void change_stream(const StreamDesc& stream) override { next_.change_stream(stream); }
-  void change_look(const LookChange& look) override { next_.change_look(look); }
-  void change_shape(std::shared_ptr<const SceneAsset> asset) override {
-    next_.change_shape(std::move(asset));
-  }
-
- private:
-  StateSink& next_;
-  FrameStages& stages_;
 };
 
 }  // namespace strandcast

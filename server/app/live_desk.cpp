@@ -258,6 +258,14 @@ void LiveDesk::pass_on(const Input& input, int64_t now_ns) {
     target.inputs->push(input.id, samples, now_ns);
     if (target.listener.on_wind) target.listener.on_wind(input.id, samples, now_ns);
   }
+  if (due.recording && &first_of(input.socket) == input.source.get()) {
+    if (target.listener.on_record)
+      target.listener.on_record(*due.recording);
+    else
+      write(lines_, name_of(input),
+            {true, fmt::format("{}: a sender wants to record: that needs --record-dir", name_of(input))},
+            now_ns);
+  }
   if (due.has_ended) target.inputs->remove_source(input.id);
   for (LiveNote& note : input.source->take_notes()) {
     if (!target.head.empty()) note.text = fmt::format("{}: {}", target.head, note.text);

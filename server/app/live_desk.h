@@ -14,8 +14,8 @@
 #include "common/wire/messages.h"
 #include "server/input/input_hub.h"
 #include "server/input/live/live_source.h"
+#include "server/net/address_guard.h"
 #include "server/net/live_receiver.h"
-#include "server/net/log_budget.h"
 
 namespace strandcast {
 
@@ -35,6 +35,8 @@ class LiveDesk : public LiveHandler {
   struct Listener {
     std::function<void(uint64_t source_id, const MotionSamples&, int64_t arrival_ns)> on_motion;
     std::function<void(uint64_t source_id, const WindSamples&, int64_t arrival_ns)> on_wind;
+    /// A sender's wish, once where several heads hear it; empty: nothing can be recorded.
+    std::function<void(const RecordCommand&)> on_record;
   };
 
   /// The live inputs of one head, and the receivers of their data.

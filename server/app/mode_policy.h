@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "common/wire/messages.h"
+#include "server/encode/frame_worker.h"
+#include "server/net/net_handler.h"
 
 namespace strandcast {
 
@@ -50,6 +52,28 @@ struct ModeFacts {
   double capacity_bytes_per_s = 0.0;
   double round_trip_ms = 0.0;
 };
+
+/// Where those come from.
+struct ModeSources {
+  const std::vector<StrandClass>& strand_classes;
+  const LinkState& link;
+  ViewerReport report;
+  FrameCounters pictures;
+  std::string paint_trouble;      // why no pictures can be drawn; empty = they can
+  bool is_software = false;       // the server draws on processor cores
+  RenderSize picture_size;        // of this viewer
+  size_t view_count = 1;          // that the server would draw, this viewer's included
+  double picture_rate_hz = 15.0;  // at most
+};
+
+/// Guesses used before the first picture: time to draw it per pixel, and its bytes, both measured with the
+/// built-in scene.
+inline constexpr double kGuessedSoftwareMsPerPixel = 60.0 / (640.0 * 360.0);
+inline constexpr double kGuessedHardwareMs = 10.0;
+inline constexpr double kGuessedBytesPerPixel = 0.15;
+
+/// Gathers the facts, with guesses for what nobody has measured yet.
+ModeFacts gather_mode_facts(const ModeSources& sources);
 
 /// Prediction of what a person would see in one mode.
 struct ModePrediction {

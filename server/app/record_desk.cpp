@@ -101,8 +101,12 @@ Result<std::string> recording_file_name(const std::string& name) {
 
 std::string recording_name(const RecordCommand& command) {
   if (!command.name.empty() || (command.slate.empty() && command.take == 0)) return command.name;
-  if (command.take == 0) return command.slate;
-  return fmt::format("{}{}T{:02}", command.slate, command.slate.empty() ? "" : "-", command.take);
+  const std::string take = command.take == 0 ? "" : fmt::format("T{:02}", command.take);
+  std::string name = command.slate + (command.slate.empty() || take.empty() ? "" : "-") + take;
+  if (recording_file_name(name)) return name;
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return !is_letter_or_digit(c) && c != '-'; }, '_');
+  return is_letter_or_digit(name.front()) ? name : "slate" + name;
 }
 
 std::string recording_file_name(const std::string& scene, int64_t unix_time_s) {
@@ -248,18 +252,19 @@ Status RecordDesk::check_room() const {
 }
 
 /// Of a file that is not there.
-Result<std::filesystem::path> RecordDesk::choose_path(const std::string& name) const {
+Result<std::filesystem::path> RecordDesk::choose_path(const RecordCommand& command) const {
   const auto is_there = [](const std::filesystem::path& path) {
     std::error_code failure;
     return std::filesystem::symlink_status(path, failure).type() != std::filesystem::file_type::not_found;
   };
-  if (!name.empty()) {
+  std::filesystem::path own = folder_->path / recording_file_name(stream_->scene_name, unix_time_s());
+  if (const std::string name = recording_name(command); !name.empty()) {
     ASSIGN_OR_RETURN(const std::string file, recording_file_name(name));
-    const std::filesystem::path path = with_file_ending(folder_->path / file, folder_->file_ending);
-    if (!is_there(path)) return path;
-    return make_error(ErrorCode::BadInput, "{} is there already: name another one.", path.string());
+    own = with_file_ending(folder_->path / file, folder_->file_ending);
   }
-  const std::filesystem::path own = folder_->path / recording_file_name(stream_->scene_name, unix_time_s());
+  if (!command.name.empty() && is_there(own))
+    return make_error(ErrorCode::BadInput, "{} is there already: name another one.", own.string());
+  // A take is not lost because its name is taken.
   std::filesystem::path path = own;
   for (int number = 2; is_there(path) && number <= kMaxAlike; ++number)
     path.replace_filename(fmt::format("{}-{}{}", own.stem().string(), number, kEnding));
@@ -267,9 +272,9 @@ Result<std::filesystem::path> RecordDesk::choose_path(const std::string& name) c
 }
 
 /// A file that is there by then; all heads together keep the limits of the folder.
-Result<std::unique_ptr<Recorder>> RecordDesk::make_recorder(const std::string& name) const {
+Result<std::unique_ptr<Recorder>> RecordDesk::make_recorder(const RecordCommand& command) const {
   const std::lock_guard lock(*folder_->beginning);
-  ASSIGN_OR_RETURN(const std::filesystem::path path, choose_path(name));
+  ASSIGN_OR_RETURN(const std::filesystem::path path, choose_path(command));
   RETURN_IF_ERROR(check_room());
   return Recorder::make({path, IfPresent::Refuse});
 }
@@ -307,7 +312,7 @@ Result<std::string> RecordDesk::start_recording(const RecordCommand& command) {
                         present->path().filename().string());
     }
   }
-  ASSIGN_OR_RETURN(std::shared_ptr<Recorder> take, make_recorder(recording_name(command)));
+  ASSIGN_OR_RETURN(std::shared_ptr<Recorder> take, make_recorder(command));
   RETURN_IF_ERROR(take->attach(stream_->hub));
   std::unique_ptr<StepTap> both;
   if (whole_ != nullptr) both = std::make_unique<TapPair>(*whole_, *take);

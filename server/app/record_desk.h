@@ -105,8 +105,8 @@ class RecordDesk {
   void answer(const Order& order);
   Notice carry_out(const RecordCommand& command);
   Result<std::string> start_recording(const RecordCommand& command);
-  Result<std::filesystem::path> choose_path(const std::string& name) const;
-  Result<std::unique_ptr<Recorder>> make_recorder(const std::string& name) const;
+  Result<std::filesystem::path> choose_path(const RecordCommand& command) const;
+  Result<std::unique_ptr<Recorder>> make_recorder(const RecordCommand& command) const;
   Status check_room() const;
   Result<uint64_t> change_tap(StepTap* tap, std::function<void()> at_change = {});
   std::string reason_to_end(const Recorder& recorder) const;

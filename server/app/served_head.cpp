@@ -13,7 +13,7 @@
 #include "server/app/codec_choice.h"
 #include "server/app/server_passes.h"
 #include "server/app/viewer_codec.h"
-#include "server/encode/picture_passes.h"
+#include "server/encode/picture_painter.h"
 
 namespace strandcast {
 namespace {
@@ -66,17 +66,19 @@ Status ServedHead::load(OtherHeads others) {
   ASSIGN_OR_RETURN(asset_frame_, make_asset_frame(*asset));
   painting_ = {config_.renderer, config_.gl_device, config_.shader_folder};
   const PainterConfig painter{painting_, asset, scene.look};
-  ASSIGN_OR_RETURN(hub_, StreamHub::make({scene.stream,
-                                          codecs_.size() > 1 ? codecs_.back().name : std::string(),
-                                          scene.step_rate_hz,
-                                          make_scene_view(scene, scene_picture_size(scene), 0),
-                                          asset,
-                                          make_painter(painter, std::move(others)),
-                                          {scene.look, scene.camera},
-                                          &shared_,
-                                          [this](const auto& other, const LookDesc& look) {
-                                            return config_.make_painter({painting_, other, look});
-                                          }}));
+  ASSIGN_OR_RETURN(
+      hub_, StreamHub::make({scene.stream,
+                             codecs_.size() > 1 ? codecs_.back().name : std::string(),
+                             scene.step_rate_hz,
+                             make_scene_view(scene, scene_picture_size(scene), 0),
+                             asset,
+                             make_painter(painter, std::move(others)),
+                             {scene.look, scene.camera},
+                             &shared_,
+                             [this](const auto& other, const LookDesc& look) {
+                               return config_.make_painter({painting_, other, look});
+                             },
+                             [this](const SnapshotInfo& state) { stages_.note_state(state, now_ns()); }}));
   is_drawn_by_processors_ = config_.is_drawn_by_processors(painter.device);
   ASSIGN_OR_RETURN(idle_picture_passes_,
                    plan_picture_passes(*asset, scene.look, likely_renderer(config_.renderer, scene.look), 0));
@@ -151,8 +153,7 @@ Status ServedHead::start(NetServer& net) {
                                       [this] { return desk_->asset(); }, config_.scene.name}));
   stages_.set_source_times([this](int64_t arrival_ns) { return inputs_.source_time_ns(arrival_ns); });
   if (!config_.trace_path.empty()) RETURN_IF_ERROR(stages_.open_trace(config_.trace_path));
-  stage_sink_.emplace(*hub_, stages_);
-  RETURN_IF_ERROR(source_->start(*stage_sink_, config_.scene.stream));
+  RETURN_IF_ERROR(source_->start(*hub_, config_.scene.stream));
   if (records_ != nullptr) records_->begin();
   hub_->set_picture_budget(is_drawn_by_processors_ ? kSoftwareBudget : kHardwareBudget);
   if (!sender_->is_empty()) {

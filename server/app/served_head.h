@@ -95,7 +95,6 @@ class ServedHead {
   SharedSlot shared_;  // outlives who uses it
   std::unique_ptr<HeadSender> sender_;
   std::unique_ptr<StreamHub> hub_;
-  std::optional<StageSink> stage_sink_;
   std::unique_ptr<StateSource> source_;
   std::unique_ptr<SessionDesk> desk_;
 

@@ -81,6 +81,7 @@ class Server::State {
 
  private:
   Status open_live();
+  void record(RecordDesk& own, const RecordCommand& command) const;
   Status listen();
   void run_status();
   std::vector<PaintedHead> other_heads(size_t own) const;
@@ -128,6 +129,20 @@ std::vector<PaintedHead> Server::State::other_heads(size_t own) const {
   return others;
 }
 
+/// Of all heads, where there are several. Nobody waits for the answer, so the log has it.
+void Server::State::record(RecordDesk& own, const RecordCommand& command) const {
+  const auto reply = [](const Notice& said) {
+    if (said.is_error)
+      log_warn("record", "{}", said.text);
+    else
+      log_info("record", "{}", said.text);
+  };
+  if (records_ != nullptr)
+    records_->obey(command, reply);
+  else
+    own.obey(command, reply);
+}
+
 /// The sockets of live motion capture, where any is asked for.
 Status Server::State::open_live() {
   std::vector<LiveDesk::Target> targets;
@@ -135,6 +150,10 @@ Status Server::State::open_live() {
   for (const auto& head : heads_) {
     targets.push_back(head->live_target());
     if (heads_.size() > 1) targets.back().head = head->name();
+    if (RecordDesk* const own = head->records(); own != nullptr)
+      targets.back().listener.on_record = [this, own](const RecordCommand& command) {
+        record(*own, command);
+      };
     is_wanted = is_wanted || !targets.back().live.empty();
   }
   if (!is_wanted) return {};

@@ -5,7 +5,7 @@
 
 #include "common/groom/head_spheres.h"
 #include "server/app/viewers.h"
-#include "server/encode/picture_passes.h"
+#include "server/encode/picture_painter.h"
 #include "server/encode/strand_encode_worker.h"
 
 namespace strandcast {

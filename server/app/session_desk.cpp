@@ -9,7 +9,6 @@
 #include "common/base/version.h"
 #include "common/log/log.h"
 #include "common/scene/scene_file.h"
-#include "server/app/mode_facts.h"
 
 namespace strandcast {
 namespace {

@@ -23,7 +23,6 @@
 #include "common/strands/strand_codec.h"
 #include "server/encode/picture_encoder.h"
 #include "server/encode/picture_painter.h"
-#include "server/encode/picture_passes.h"
 #include "server/encode/picture_turns.h"
 #include "server/encode/picture_views.h"
 

@@ -1,6 +1,8 @@
-// PicturePainter: turns a decoded snapshot into pixels. Made, used and destroyed on the frame thread.
+// PicturePainter: turns a decoded snapshot into pixels. Made, used and destroyed on the frame thread, whose
+// passes are here, too.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <string>
@@ -9,6 +11,7 @@
 #include "common/base/result.h"
 #include "common/gl/pass_list.h"
 #include "common/pictures/image_codec.h"
+#include "common/pictures/picture.h"
 #include "common/render/render_device.h"
 #include "common/scene/scene_desc.h"
 #include "common/strands/scene_asset.h"
@@ -46,5 +49,19 @@ gl::PassReport read_back_report(const StageTimer& timer);
 
 /// Returns a maker of painters with a device of their own (common/render/render_device.h).
 MakePicturePainter device_picture_painter(PainterConfig config);
+
+/// Timers of the frame thread's own work; the painter has its own.
+struct PictureTimers {
+  StageTimer decode;                                       // strand frames
+  std::array<StageTimer, kPictureCodecs.size()> encode{};  // by codec
+};
+
+/// Returns the passes; `painted` are those of the painter. Codecs that are not in `wanted` do not run.
+gl::PassReports picture_passes(const PictureTimers& timers, const gl::PassReports& painted,
+                               PictureCodecs wanted);
+
+/// Returns the passes before there is a frame thread. BadInput for an asset that cannot be drawn.
+Result<gl::PassReports> plan_picture_passes(const SceneAsset& asset, const LookDesc& look, RendererKind kind,
+                                            PictureCodecs wanted);
 
 }  // namespace strandcast

@@ -13,7 +13,6 @@
 #include "common/base/histogram.h"
 #include "common/log/log.h"
 #include "server/net/address_guard.h"
-#include "server/net/log_budget.h"
 #include "server/net/net_server.h"
 #include "server/net/refusal_private.h"
 #include "server/net/send_queue.h"

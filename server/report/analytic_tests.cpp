@@ -7,9 +7,7 @@
 #include <functional>
 #include <numbers>
 
-#include "server/report/curl_test.h"
 #include "server/report/exact_solutions.h"
-#include "server/report/paper_chain.h"
 #include "server/report/swing_fit.h"
 
 namespace strandcast {

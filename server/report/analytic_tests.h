@@ -42,4 +42,28 @@ const std::vector<AnalyticTest>& analytic_tests();
 /// Returns whether the row has what the test needs: constants of hair, parameters for a chain, or twist.
 bool has_physics(const SolverRow& row, const AnalyticTest& test);
 
+// T12: a curl as a spring. A helix of hair hangs under its own weight. With a small pitch its extension is
+// all twist. A section that bears the weight w (L - s) at the arm R is twisted by w (L - s) R / GJ per
+// length. So the end sinks by w R^2 L^2 / (2 GJ), which is m g / 2 k with the spring's k = G r^4 / (4 N R^3).
+
+// Segments of a thirteenth of a turn; with fewer vertices it is no helix.
+inline constexpr uint32_t kCurlVertices = 64;
+
+/// Returns whether the row has a twist parameter.
+bool has_twist(const SolverRow& row);
+
+/// Measures the error of the extension. A few percent are the formula's own, because the last turn's weight
+/// acts off the axis.
+AnalyticResult run_curl(const Workbench& workbench, const RunSetting& setting);
+
+// T18: the set-up with which Mueller et al. (Fast Simulation of Inextensible Hair and Fur, 2012) compare
+// models: 30 particles 2 cm apart, steps of 10 ms, gravity 10 m/s^2. Here the chain is released from
+// horizontal and compared with one solved in small steps in double precision.
+
+inline constexpr uint32_t kPaperChainVertices = 30;
+inline constexpr double kPaperChainRateHz = 100.0;
+
+/// Measures the error: RMS distance of the particles from the exact ones, relative to the length.
+AnalyticResult run_paper_chain(const Workbench& workbench, const RunSetting& setting);
+
 }  // namespace strandcast

@@ -6,9 +6,9 @@
 #include <memory>
 
 #include "common/scene/scene_file.h"
-#include "server/report/coherence_page.h"
+#include "server/report/coherence_study.h"
 #include "server/report/report_commands.h"
-#include "server/report/report_folder.h"
+#include "server/report/report_files.h"
 #include "server/report/report_options.h"
 
 namespace strandcast {

@@ -1,13 +1,12 @@
-#include "server/report/coherence_page.h"
+#include "server/report/coherence_study.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "common/plot/svg_plot.h"
-#include "server/report/csv_file.h"
+#include "server/report/hair_reality.h"
 #include "server/report/html_page.h"
-#include "server/report/reality_page.h"
-#include "server/report/report_folder.h"
+#include "server/report/report_files.h"
 #include "server/report/svg_bars.h"
 
 namespace strandcast {

@@ -1,13 +1,12 @@
-#include "server/report/collision_page.h"
+#include "server/report/collision_study.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "common/plot/svg_plot.h"
-#include "server/report/csv_file.h"
 #include "server/report/html_page.h"
-#include "server/report/report_folder.h"
+#include "server/report/report_files.h"
 
 namespace strandcast {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/report/curl_test.h"
+#include "server/report/analytic_tests.h"
 
 #include <algorithm>
 #include <cmath>

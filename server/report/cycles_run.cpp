@@ -12,7 +12,7 @@
 #include <sstream>
 
 #include "common/base/file.h"
-#include "server/report/report_folder.h"
+#include "server/report/report_files.h"
 
 namespace strandcast {
 namespace {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/report/hanging_hair.h"
+#include "server/report/html_page.h"
 #include "server/report/ponytail.h"
 #include "server/sim/executor/executor.h"
 
@@ -79,5 +80,11 @@ struct HangingHair {
 /// Returns the mean angle between straight down and the direction from root to tip, towards the wind, after
 /// settling.
 Result<double> lean_rad(const HangingHair& hair, Executor& executor);
+
+// The part of strandcast-report coherence that compares hair in air with known results. Pure functions.
+
+/// Returns the tables as text for a terminal.
+std::string reality_text(const HairReality& reality);
+void add_reality(HtmlPage& page, const HairReality& reality);
 
 }  // namespace strandcast

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "common/plot/html_text.h"
+#include "common/plot/svg_plot.h"
 
 namespace strandcast {
 

@@ -1,4 +1,4 @@
-#include "server/report/paper_chain.h"
+#include "server/report/analytic_tests.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "common/plot/svg_plot.h"
-#include "server/report/csv_file.h"
 #include "server/report/html_page.h"
 #include "server/report/pictures_study.h"
+#include "server/report/report_files.h"
 
 namespace strandcast {
 namespace {

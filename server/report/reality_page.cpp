@@ -1,4 +1,4 @@
-#include "server/report/reality_page.h"
+#include "server/report/hair_reality.h"
 
 #include <fmt/format.h>
 

@@ -10,8 +10,8 @@
 #include "common/render/tiles/tile_renderer.h"
 #include "common/scene/shadow_methods.h"
 #include "common/scene/strand_methods.h"
-#include "server/report/csv_file.h"
 #include "server/report/process_time.h"
+#include "server/report/report_files.h"
 #include "server/scene/scene_content.h"
 
 namespace strandcast {

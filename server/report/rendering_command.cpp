@@ -7,7 +7,7 @@
 #include "common/scene/scene_file.h"
 #include "server/report/rendering.h"
 #include "server/report/report_commands.h"
-#include "server/report/report_folder.h"
+#include "server/report/report_files.h"
 #include "server/report/report_options.h"
 
 namespace strandcast {

@@ -7,9 +7,8 @@
 #include "common/base/command_line_error.h"
 #include "common/gl/egl_context.h"
 #include "common/scene/scene_file.h"
-#include "server/report/csv_file.h"
 #include "server/report/report_commands.h"
-#include "server/report/report_folder.h"
+#include "server/report/report_files.h"
 #include "server/report/report_options.h"
 #include "server/report/scalp.h"
 

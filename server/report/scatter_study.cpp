@@ -1,4 +1,4 @@
-#include "server/report/scatter_study.h"
+#include "server/report/volume_study.h"
 
 #include <algorithm>
 #include <cmath>

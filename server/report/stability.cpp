@@ -6,9 +6,8 @@
 #include <memory>
 
 #include "common/log/progress.h"
-#include "server/report/csv_file.h"
 #include "server/report/report_commands.h"
-#include "server/report/report_folder.h"
+#include "server/report/report_files.h"
 #include "server/report/report_options.h"
 
 namespace strandcast {

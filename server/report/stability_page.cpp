@@ -4,8 +4,8 @@
 #include <cmath>
 #include <map>
 
-#include "server/report/csv_file.h"
 #include "server/report/html_page.h"
+#include "server/report/report_files.h"
 #include "server/report/stability.h"
 
 namespace strandcast {

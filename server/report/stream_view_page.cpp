@@ -7,7 +7,7 @@
 
 #include "common/base/units.h"
 #include "common/plot/svg_plot.h"
-#include "server/report/csv_file.h"
+#include "server/report/report_files.h"
 
 namespace strandcast {
 namespace {

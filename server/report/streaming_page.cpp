@@ -10,13 +10,11 @@
 
 #include "common/base/units.h"
 #include "common/plot/svg_plot.h"
-#include "server/report/csv_file.h"
 #include "server/report/html_page.h"
 #include "server/report/peers/peer_codecs.h"
-#include "server/report/report_folder.h"
+#include "server/report/report_files.h"
 #include "server/report/stream_view_page.h"
 #include "server/report/streaming_goals.h"
-#include "server/report/streaming_tables.h"
 #include "server/report/svg_bars.h"
 
 namespace strandcast {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 
+#include "server/report/html_page.h"
 #include "server/report/streaming.h"
 
 namespace strandcast {
@@ -22,5 +23,16 @@ std::string streaming_summary(const StreamingReport& report);
 
 /// Writes everything into the folder.
 Status save_streaming(const StreamingReport& report, const std::filesystem::path& folder);
+
+/// Returns Mbit/s and milliseconds of both sides, at the goals' bound, of each of our codecs and of the best
+/// peers. For the built-in scene and the largest number of vertices, in the first recording of each class.
+HtmlTable needs_table(const StreamingReport& report);
+/// Returns the conclusion in words: the codec with the fewest bits.
+std::string needs_text(const StreamingReport& report);
+/// Returns bits per vertex by bound, of every clip, part, strand model, codec of ours and wind, at the first
+/// size.
+HtmlTable case_table(const StreamingReport& report);
+/// Returns which clips were available.
+std::string clips_text(const StreamingReport& report);
 
 }  // namespace strandcast

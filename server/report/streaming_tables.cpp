@@ -1,4 +1,4 @@
-#include "server/report/streaming_tables.h"
+#include "server/report/streaming_page.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

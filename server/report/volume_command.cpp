@@ -7,9 +7,9 @@
 
 #include "common/scene/scene_file.h"
 #include "server/report/report_commands.h"
-#include "server/report/report_folder.h"
+#include "server/report/report_files.h"
 #include "server/report/report_options.h"
-#include "server/report/volume_page.h"
+#include "server/report/volume_study.h"
 
 namespace strandcast {
 namespace {

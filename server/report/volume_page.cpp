@@ -1,4 +1,4 @@
-#include "server/report/volume_page.h"
+#include "server/report/volume_study.h"
 
 #include <fmt/format.h>
 
@@ -6,9 +6,8 @@
 #include <map>
 
 #include "common/plot/svg_plot.h"
-#include "server/report/csv_file.h"
 #include "server/report/html_page.h"
-#include "server/report/report_folder.h"
+#include "server/report/report_files.h"
 
 namespace strandcast {
 namespace {

@@ -14,7 +14,6 @@
 #include "common/math/point_tree.h"
 #include "server/report/crowded_hair.h"
 #include "server/report/process_time.h"
-#include "server/report/scatter_study.h"
 
 namespace strandcast {
 namespace {

@@ -3,12 +3,14 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "common/scene/scene_desc.h"
 #include "server/sim/executor/executor.h"
+#include "server/sim/strand_layout.h"
 
 namespace strandcast {
 
@@ -92,5 +94,40 @@ using VolumeProgress = std::function<void(const std::string&)>;
 /// Runs the study. BadInput for an invalid scene, or for more guides than hairs.
 Result<VolumeStudy> run_volume_study(const VolumeStudyDesc& desc, Executor& executor,
                                      const std::string& gl_device, const VolumeProgress& progress);
+
+// Compares the methods of summing strands into a volume: the host's, those of OpenGL that the simulation may
+// use, and those of Woodhouse 2017 (4.2.4). All compute the same volume of the same hair unsmoothed, and
+// are compared with a sum in double precision.
+
+struct ScatterStudyDesc {
+  const StrandLayout& layout;
+  const std::vector<glm::vec3>& position_m;    // (vertex_count x strand_count) head space
+  const std::vector<glm::vec3>& velocity_mps;  // relative to the head
+  uint32_t resolution = 64;
+  std::string gl_device;  // as EglContext::make
+  uint32_t rounds = 5;
+};
+
+/// Fills this part of the study; without OpenGL only the host's method is measured. Changes the current
+/// context.
+Status study_scatters(const ScatterStudyDesc& desc, VolumeStudy& study);
+
+// Files of strandcast-report volume: CSV tables, plots and one page. Pure functions of a VolumeStudy, except
+// saving.
+
+inline constexpr const char* kVolumePage = "volume.html";
+
+/// Returns a recommendation in some sentences.
+std::string volume_summary(const VolumeStudy& study);
+
+std::string volume_error_csv(const VolumeStudy& study);
+std::string volume_scatter_csv(const VolumeStudy& study);
+std::string volume_outcome_csv(const VolumeStudy& study);
+/// Returns a plot of density error against the time of a step, with a line per number of smoothings and
+/// choice of hairs.
+std::string volume_plot(const VolumeStudy& study);
+std::string volume_page(const VolumeStudy& study);
+
+Status save_volume_study(const VolumeStudy& study, const std::filesystem::path& folder);
 
 }  // namespace strandcast

@@ -5,7 +5,7 @@
 
 #include "common/base/command_line_error.h"
 #include "server/report/report_commands.h"
-#include "server/report/report_folder.h"
+#include "server/report/report_files.h"
 #include "server/report/report_options.h"
 #include "server/report/work_precision_page.h"
 

@@ -9,10 +9,9 @@
 
 #include "common/base/units.h"
 #include "common/plot/svg_plot.h"
-#include "server/report/csv_file.h"
 #include "server/report/exact_solutions.h"
 #include "server/report/html_page.h"
-#include "server/report/report_folder.h"
+#include "server/report/report_files.h"
 #include "server/report/work_precision_devices.h"
 
 namespace strandcast {

@@ -40,6 +40,11 @@ const std::vector<std::string>& live_fields() {
   return kFields;
 }
 
+bool names_look(const std::string& assignment) {
+  const std::string path = assignment.substr(0, assignment.find_first_of("=. "));
+  return path == "look" || path == "camera";
+}
+
 bool is_shaped_otherwise(const SceneDesc& a, const SceneDesc& b) {
   return a.hair.length != b.hair.length || a.hair.curl != b.hair.curl;
 }

@@ -12,12 +12,18 @@
 
 namespace strandcast {
 
+/// Largest number of characters of an assignment in its answer.
+inline constexpr size_t kMaxToldChars = 200;
+
 /// Returns the fields that SetParameter may assign, whole or in part.
 const std::vector<std::string>& live_fields();
 
 /// Returns the scene after one assignment to a live field, with solver name and parameters checked.
 /// Parameters that a newly chosen solver does not have are removed. Errors list the known names.
 Result<SceneDesc> change_scene(const SceneDesc& scene, const std::string& assignment);
+
+/// Returns whether an assignment names nothing but the look or the camera.
+bool names_look(const std::string& assignment);
 
 /// Returns whether the rest shapes differ: another length or curl of the same groom.
 bool is_shaped_otherwise(const SceneDesc& a, const SceneDesc& b);

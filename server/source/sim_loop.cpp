@@ -25,6 +25,10 @@ constexpr int64_t kStatsNs = 250'000'000;  // when steps take long
 
 }  // namespace
 
+std::string full_queue_text() {
+  return fmt::format("{} commands are waiting already: try again later.", kMaxPendingJobs);
+}
+
 Result<std::unique_ptr<SimLoop>> SimLoop::start(SimLoopConfig config, InputHub& hub, StateSink& sink) {
   std::unique_ptr<SimLoop> loop(new SimLoop(std::move(config), hub, sink));
   auto ready = std::make_shared<std::promise<Status>>();
@@ -87,7 +91,6 @@ Status SimLoop::begin() {
   ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(stream.codec, stream.bound_m));
   publisher_.emplace(config_.content->groom, quantum_m);
   stream_ = stream;
-  look_ = wanted_look();
   const Groom& groom = config_.content->groom;
   const StageSizes sizes{groom.strand_count(), groom.uniform_vertex_count(), config_.scene.substeps,
                          static_cast<uint32_t>(config_.content->colliders.size()),
@@ -99,10 +102,8 @@ Status SimLoop::begin() {
   clock_.emplace(1.0 / config_.scene.step_rate_hz, now_ns());
   if (config_.is_lockstep) clock_->pause();
   input_clock_.emplace(1.0 / config_.scene.step_rate_hz);
-  {
-    const std::lock_guard lock(mutex_);
-    scene_ = config_.scene;
-  }
+  is_tapped_ = config_.tap != nullptr;
+  if (config_.on_scene) config_.on_scene(config_.scene, {});
   update_stats();
   return {};
 }
@@ -115,7 +116,6 @@ void SimLoop::loop() {
     if (is_stopping_) return;
     for (const Job& job : jobs) carry_out_in_turn(job);
     follow_stream_settings();
-    follow_look();
     follow_detail();
     if (is_asleep()) {
       sleep_through();
@@ -150,7 +150,6 @@ void SimLoop::follow_script() {
     } else {
       begin_stream();
     }
-    follow_look();
   }
 }
 
@@ -168,7 +167,6 @@ std::deque<SimLoop::Job> SimLoop::wait_for_jobs() {
   if (is_asleep()) wake_ns = now_ns() + kAsleepNs;
   const auto wake_by = [&](int64_t time_ns) { wake_ns = std::min(wake_ns.value_or(time_ns), time_ns); };
   if (has_other_stream()) wake_by(stream_changed_ns_ + kStreamChangeNs);
-  if (has_other_look()) wake_by(look_changed_ns_ + kLookChangeNs);
   if (now_ns() < jobs_rest_ns_) wake_by(jobs_rest_ns_);
   if (wake_ns) {
     const std::chrono::steady_clock::time_point wake{std::chrono::nanoseconds(*wake_ns)};
@@ -331,7 +329,7 @@ void SimLoop::push(Job job) {
   if (!is_full)
     changed_.notify_all();
   else if (job.reply)
-    job.reply({true, fmt::format("{} commands are waiting already: try again later.", kMaxPendingJobs)});
+    job.reply({true, full_queue_text()});
 }
 
 void SimLoop::post(const ControlCommand& command, Reply reply, const std::string& who) {
@@ -358,6 +356,17 @@ void SimLoop::set_tap(StepTap* tap, StateSource::OnTapped on_tapped) {
   push({TapChange{tap, std::move(on_tapped)}, {}, {}});
 }
 
+bool SimLoop::note(const SetParameter& parameter, const Notice& answer, const std::string& who) {
+  if (!is_tapped_) return true;
+  {
+    const std::lock_guard lock(mutex_);
+    if (jobs_.size() >= kMaxPendingJobs) return false;
+    jobs_.push_back({Noted{parameter, answer}, {}, who});
+  }
+  changed_.notify_all();
+  return true;
+}
+
 /// The server time that the end of a step stands for; on demand it is the simulated one.
 int64_t SimLoop::next_step_ns(int64_t time_ns) const {
   if (!config_.is_lockstep) return time_ns;
@@ -376,11 +385,6 @@ SimStats SimLoop::stats() const {
   stats.built_ns = is_preparing_ ? now_ns() : built_ns_.load();
   if (const int64_t begin_ns = turn_begin_ns_; begin_ns != 0) stats.busy_ns = now_ns() - begin_ns;
   return stats;
-}
-
-SceneDesc SimLoop::scene() const {
-  const std::lock_guard lock(mutex_);
-  return scene_;
 }
 
 std::optional<Error> SimLoop::failure() const {

@@ -44,6 +44,11 @@ namespace strandcast {
 /// Observer of every published state, for tests and recordings. Must return quickly.
 using SnapshotObserver = std::function<void(const std::shared_ptr<const Snapshot>&)>;
 
+/// Receives the scene as it runs, on the simulation thread: after the start with no assignment, then after
+/// each change with its assignment and before its answer. Its look and camera are the loop's, which may be
+/// old.
+using OnScene = std::function<void(const SceneDesc&, const std::string& assignment)>;
+
 /// Longest time that the steps of one command may take; for more steps a client sends another command.
 inline constexpr int64_t kLongestStepsNs = 60'000'000'000;
 
@@ -57,6 +62,7 @@ struct SimLoopConfig {
   StepScript* script = nullptr;
   bool is_lockstep = false;      // simulated time goes on by commands only
   SharedSlot* shared = nullptr;  // strands that viewers have; may be null
+  OnScene on_scene = {};         // may be empty
   int64_t longest_steps_ns = kLongestStepsNs;
 };
 
@@ -64,13 +70,13 @@ struct SimLoopConfig {
 /// Sessions take turns. If it is reached, the session with most commands gives up one for a session with
 /// fewer.
 inline constexpr size_t kMaxPendingJobs = 32;
+/// Returns the answer to a command that finds no place.
+std::string full_queue_text();
 /// Largest share of the time that commands may take, so that many changes of solver do not stop the hair.
 inline constexpr double kJobShare = 0.25;
 /// Shortest time between two changes of the stream's coding, since each costs every viewer a keyframe. The
 /// newest settings are used.
 inline constexpr int64_t kStreamChangeNs = 500'000'000;
-/// Shortest time between two reports of a new look; only the newest is reported.
-inline constexpr int64_t kLookChangeNs = 100'000'000;
 /// Interval at which the loop wakes to report its state while nobody reads and hair only follows the head.
 inline constexpr int64_t kAsleepNs = 500'000'000;
 /// Number of steps over which the head's velocity is averaged when hair wakes up, since input samples arrive
@@ -101,9 +107,10 @@ class SimLoop {
   /// Does what StateSource::set_tap() does; `tap` must exist until the loop ends or on_tapped is called for
   /// the next tap.
   void set_tap(StepTap* tap, StateSource::OnTapped on_tapped);
+  /// Tells the tap, if there is one, between two steps of a change that nothing simulated follows. False if
+  /// kMaxPendingJobs already wait.
+  bool note(const SetParameter& parameter, const Notice& answer, const std::string& who);
   SimStats stats() const;
-  /// Returns the scene as it runs.
-  SceneDesc scene() const;
   /// Returns the asset of strands whose shape has changed since the start; null if it has not.
   std::shared_ptr<const SceneAsset> asset() const;
   /// Ends the thread after the current substep or command. Call it from one thread only.
@@ -117,8 +124,12 @@ class SimLoop {
     StateSource::OnTapped on_tapped;
   };
   struct Leaving {};  // who asked is gone
+  struct Noted {      // carried out elsewhere
+    SetParameter parameter;
+    Notice answer;
+  };
   struct Job {
-    std::variant<ControlCommand, SetParameter, SourceDemand, TapChange, Leaving> what;
+    std::variant<ControlCommand, SetParameter, SourceDemand, TapChange, Leaving, Noted> what;
     Reply reply;
     std::string who = {};                              // asked for it
     bool is_prepared = false;                          // what takes long of it is done
@@ -157,14 +168,12 @@ class SimLoop {
   void follow_stream_settings();
   void begin_stream();
   bool has_other_stream() const { return config_.scene.stream != stream_; }
-  void follow_look();
-  LookChange wanted_look() const { return {config_.scene.look, config_.scene.camera}; }
-  bool has_other_look() const { return wanted_look() != look_; }
   Status rebuild_solver(const SceneDesc& scene, const SceneFeatures& features);
   Status settle_quality();
   Result<double> time_step_ms();
   void apply_demand(const SourceDemand& demand);
   void apply_tap(const TapChange& change);
+  void tell_tap(const Noted& noted, const std::string& who);
   void apply_facts(const RuntimeFacts& facts);
   bool is_recorded() const { return config_.tap != nullptr || config_.script != nullptr; }
   bool is_watched() const { return SourceDemand{facts_, has_state_readers_, hair_px_}.is_watched(); }
@@ -235,8 +244,6 @@ class SimLoop {
   int64_t stats_ns_ = 0;           // when they were made
   StreamDesc stream_;              // as it is published; the scene's is what it is to be
   int64_t stream_changed_ns_ = 0;  // 0 = never
-  LookChange look_;                // as readers know it
-  int64_t look_changed_ns_ = 0;    // 0 = never
   int64_t head_seen_ns_ = 0;       // when hair that is carried went along with it last
   int64_t jobs_rest_ns_ = 0;       // no command is carried out before
   Reply steps_reply_;              // of the steps under way; who asked for them waits till they are done
@@ -244,6 +251,7 @@ class SimLoop {
   uint64_t steps_begin_tick_ = 0;
   uint32_t counted_steps_ = 0;                     // as they were asked for
   std::shared_ptr<const Snapshot> counted_state_;  // published last while steps are counted
+  std::atomic<bool> is_tapped_{false};
   std::atomic<int64_t> last_step_ns_{0};
   std::atomic<int64_t> built_ns_{0};       // the newest solver, but for the first
   std::atomic<int64_t> turn_begin_ns_{0};  // of the loop; 0 = it waits for what comes next
@@ -257,7 +265,6 @@ class SimLoop {
   bool is_preparing_ = false;  // no command is carried out before the one that is being prepared
   std::atomic<bool> is_stopping_{false};
   SimStats stats_;
-  SceneDesc scene_;  // as it runs
   std::shared_ptr<const SceneAsset> asset_;
   std::optional<Error> failure_;
 

@@ -19,7 +19,6 @@
 namespace strandcast {
 namespace {
 
-constexpr size_t kMaxToldChars = 200;  // of an assignment, in its answer
 // A scene's quality is full where a step takes this share of its time at most; so many are timed.
 constexpr double kFullShare = 0.5;
 constexpr int kTimedSteps = 9;
@@ -50,6 +49,7 @@ Status prepare_guides(const SceneDesc& scene, const Groom& groom, const glm::dve
 void SimLoop::carry_out(const Job& job) {
   if (const auto* demand = std::get_if<SourceDemand>(&job.what)) return apply_demand(*demand);
   if (const auto* tap = std::get_if<TapChange>(&job.what)) return apply_tap(*tap);
+  if (const auto* noted = std::get_if<Noted>(&job.what)) return tell_tap(*noted, job.who);
   if (std::holds_alternative<Leaving>(job.what)) {
     if (is_counting() && job.who == steps_who_) break_steps("the session that asked for them has ended");
     return;
@@ -123,10 +123,7 @@ Notice SimLoop::change(const std::string& assignment, std::shared_ptr<const Scen
   const std::string what = excerpt(assignment, kMaxToldChars);
   const std::string left_out = left_out_note(config_.scene, *scene);
   config_.scene = *scene;
-  {
-    const std::lock_guard lock(mutex_);
-    scene_ = *scene;
-  }
+  if (config_.on_scene) config_.on_scene(config_.scene, assignment);
   builder_->change(stepped_scene(*scene, features), colliders_of(*scene, config_.content->head_colliders));
   detail_.change(scene->detail);
   if (has_other_shape) {
@@ -140,10 +137,6 @@ Notice SimLoop::change(const std::string& assignment, std::shared_ptr<const Scen
     publish();
   }
   follow_stream_settings();
-  follow_look();
-  if (has_other_look())
-    return {false,
-            fmt::format("{} soon: the look changes at most every {} ms.", what, kLookChangeNs / 1'000'000)};
   if (has_other_stream())
     return {false, fmt::format("{} soon: the stream changes at most every {} ms.", what,
                                kStreamChangeNs / 1'000'000)};
@@ -198,16 +191,6 @@ void SimLoop::begin_stream() {
   publisher_->set_quantum_m(*quantum_m);
   sink_.change_stream(stream_);
   publish();
-}
-
-/// Nothing is simulated or encoded otherwise: who draws is told. Of many changes in a short time only the
-/// last ever is.
-void SimLoop::follow_look() {
-  const int64_t time_ns = now_ns();
-  if (!has_other_look() || (look_changed_ns_ != 0 && time_ns - look_changed_ns_ < kLookChangeNs)) return;
-  look_ = wanted_look();
-  look_changed_ns_ = time_ns;
-  sink_.change_look(look_);
 }
 
 /// Builds the scene's solver; strands keep their state.
@@ -320,9 +303,16 @@ void SimLoop::apply_demand(const SourceDemand& demand) {
 /// Between two steps, and never between a change and its answer.
 void SimLoop::apply_tap(const TapChange& change) {
   config_.tap = change.tap;
+  is_tapped_ = config_.tap != nullptr;
   // What stands still is there once more, for whoever begins with it.
   if (config_.tap != nullptr && clock_->is_paused()) publish();
   change.on_tapped(tick_);
+}
+
+void SimLoop::tell_tap(const Noted& noted, const std::string& who) {
+  if (config_.tap == nullptr) return;
+  config_.tap->on_change({tick_, noted.parameter, who});
+  config_.tap->on_answer(noted.answer);
 }
 
 void SimLoop::apply_facts(const RuntimeFacts& facts) {

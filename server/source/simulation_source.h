@@ -1,4 +1,5 @@
-// The simulation as a source of states: loads the scene, then steps it on its own thread (SimLoop).
+// The simulation as a source of states: loads the scene and owns it while it runs. Looks go from here to the
+// sink; what the simulation needs is posted to its thread (SimLoop).
 #pragma once
 
 #include <filesystem>
@@ -10,6 +11,9 @@
 #include "server/stream/state_source.h"
 
 namespace strandcast {
+
+/// Shortest time between two reports of a new look; only the newest is reported.
+inline constexpr int64_t kLookChangeNs = 100'000'000;
 
 struct SimulationConfig {
   SceneDesc scene;

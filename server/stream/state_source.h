@@ -86,7 +86,7 @@ class StateSource {
   /// Stops the source; after the return nothing is put any more.
   virtual void stop() = 0;
 
-  // From any thread; return at once and do not call the sink.
+  // From any thread; return at once. Only post() may call the sink, with a new look.
   virtual void set_demand(const SourceDemand& demand) = 0;
   // `who` asked for it, for people who look at a recording.
   virtual void post(const ControlCommand& command, Reply reply, const std::string& who) = 0;

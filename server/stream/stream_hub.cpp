@@ -221,6 +221,7 @@ StrandEncodeConfig StreamHub::encode_config(uint16_t stream_id) const {
 }
 
 void StreamHub::put(std::shared_ptr<const Snapshot> state) {
+  if (config_.on_state) config_.on_state(*state);
   give([](const Entry& entry) { return entry.demand.has_states; },
        [&](StreamReader& reader) { reader.on_state(state); });
   slot_.put(std::move(state));

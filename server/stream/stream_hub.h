@@ -34,6 +34,7 @@ struct StreamHubConfig {
   /// Makes a new `make_painter` after a change of rest shape; empty if the shape never changes.
   std::function<MakePicturePainter(const std::shared_ptr<const SceneAsset>&, const LookDesc&)> painter_of =
       {};
+  std::function<void(const SnapshotInfo&)> on_state = {};  // hears of each before any reader; may be empty
 };
 
 class StreamHub : public StateSink, public DemandDesk {

@@ -7,10 +7,15 @@
 #include "common/groom/groom.h"
 #include "common/groom/groom_file.h"
 #include "common/groom/resample.h"
+#include "common/groom/usable_strands.h"
 
 namespace strandcast {
 
-inline void check_loaded_groom(const Groom& groom) {
+inline void check_loaded_groom(const Groom& read) {
+  // Readers of formats that state nothing leave this to their caller; a second time nothing is found.
+  const auto usable = with_usable_strands({.groom = read});
+  if (!usable) return;
+  const Groom& groom = usable->groom;
   CHECK(groom.strand_count() >= 1 && groom.strand_count() <= kMaxStrandCount);
   CHECK(groom.offset.front() == 0 && groom.offset.back() == groom.rest_position_m.size());
   CHECK(groom.pinned.size() == groom.rest_position_m.size());

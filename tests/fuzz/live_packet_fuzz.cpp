@@ -7,7 +7,8 @@
 namespace strandcast::live_packet_fuzz {
 namespace {
 
-constexpr const char* kProtocols[] = {"opentrack", "freed", "natnet", "vrpn", "livelinkface", "opentrackio"};
+constexpr const char* kProtocols[] = {"opentrack",    "freed",       "natnet", "vrpn",
+                                      "livelinkface", "opentrackio", "mvn"};
 constexpr const char* kVersions[] = {"", "3.0", "4.0", "4.1", "2.5", "2.9"};
 
 /// A stream says the same however it is cut, unless a piece was refused.
@@ -48,7 +49,8 @@ extern "C" int FUZZ_ENTRY(live_packet)(const uint8_t* data, size_t size) {
   config.protocol = kProtocols[input.take<uint8_t>() % std::size(kProtocols)];
   const auto settings = input.take<uint8_t>();
   for (const LiveProtocol& protocol : live_protocols())
-    if (protocol.name == config.protocol) config.axis_order = protocol.axis_orders[settings & 1];
+    if (protocol.name == config.protocol && !protocol.axis_orders.empty())
+      config.axis_order = protocol.axis_orders[settings & 1];
   config.protocol_version = kVersions[(settings >> 1) % std::size(kVersions)];
   LiveParserPair parsers(config);
   while (!input.is_empty()) {

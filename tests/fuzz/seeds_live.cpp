@@ -84,7 +84,7 @@ void add_live_osc(const SeedFolder& seeds) {
 
 /// The other live protocols: right packets, cut ones, wrong checksums, counts beyond all bounds.
 void add_live_packets(const SeedFolder& seeds) {
-  enum Protocol : uint8_t { kOpentrack, kFreed, kNatnet, kVrpn, kFace, kTrack };
+  enum Protocol : uint8_t { kOpentrack, kFreed, kNatnet, kVrpn, kFace, kTrack, kMvn };
   const auto add = [&](Protocol protocol, uint8_t settings, const std::string& name,
                        std::initializer_list<Bytes> packets) {
     seeds.add("live_packet", name,
@@ -127,6 +127,8 @@ void add_live_packets(const SeedFolder& seeds) {
   add(kFace, 0, "face", {face, cut(face, 245), cut(face, 1), with(face, 0, 7), with(face, 1, 0xff)});
   add(kFace, 1, "face_sized",
       {test::PacketWriter(std::endian::big).put(static_cast<uint32_t>(face.size())).append(face).bytes()});
+  const Bytes body = test::mvn({});
+  add(kMvn, 0, "mvn", {body, cut(body, 1), with(body, 5, '1'), with(body, 11, 0xff), with(body, 24, 0xff)});
   const std::string track =
       R"({"sourceNumber":1,"timing":{"sequenceNumber":2,"sampleRate":{"num":60,"denom":1}},"transforms":[)"
       R"({"translation":{"x":1,"y":2,"z":3},"rotation":{"pan":1,"tilt":2,"roll":3},"scale":{"x":1,"y":1,"z":1}}]})";

@@ -13,7 +13,6 @@
 #include "common/strands/strand_codec.h"
 #include "common/wire/messages.h"
 #include "server/encode/frame_worker.h"
-#include "server/encode/picture_passes.h"
 #include "tests/support/eventually.h"
 #include "tests/support/gl_fixture.h"
 #include "tests/support/sample_messages.h"

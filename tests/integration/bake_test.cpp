@@ -68,6 +68,12 @@ class Bake : public testing::Test {
   static glm::dvec2 uv_of(int strand) { return {0.04 * strand, 1.0 - 0.03 * strand}; }
   static double width_of(int strand, int k) { return 0.003 + 1e-4 * strand - 4e-4 * k; }
   std::string path(const char* name) const { return (folder_.path() / name).string(); }
+  size_t entries(const std::string& begin) const {
+    size_t count = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
+      count += entry.path().filename().string().starts_with(begin) ? 1 : 0;
+    return count;
+  }
   std::string said() const { return *load_text(path("said"), 1 << 20); }
   std::vector<std::string> words(std::vector<std::string> more) const {
     std::vector<std::string> all = {"bake",         path("hair.usda"), "--set",
@@ -265,12 +271,6 @@ TEST_F(Bake, AStopEndsTheServerAndLeavesTheOldFile) {
   test::ChildProcess bake(STRANDCAST_CTL_PROGRAM,
                           words({path("out.abc"), "--motion", "builtin", "--seconds", "3600"}), path("said"));
   ASSERT_TRUE(eventually([&] { return std::filesystem::exists(path("said")) && !said().empty(); }));
-  const auto entries = [&](const std::string& begin) {
-    size_t count = 0;
-    for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
-      count += entry.path().filename().string().starts_with(begin) ? 1 : 0;
-    return count;
-  };
   EXPECT_EQ(entries("strandcast-"), 1u);
   EXPECT_EQ(entries("out.abc"), 2u) << "the old one, and the new one under another name";
   bake.send_signal(SIGINT);
@@ -279,6 +279,30 @@ TEST_F(Bake, AStopEndsTheServerAndLeavesTheOldFile) {
   EXPECT_EQ(entries("strandcast-"), 0u);
   EXPECT_EQ(entries("out.abc"), 1u);
   EXPECT_EQ(*load_text(path("out.abc"), 1 << 20), old);
+}
+
+// Nobody is left to end the server: the kernel does.
+TEST_F(Bake, TheServerEndsWithWhoeverIsKilled) {
+  ASSERT_EQ(setenv("TMPDIR", folder_.path().c_str(), 1), 0);
+  for (const int signal : {SIGKILL, SIGTERM}) {
+    test::ChildProcess bake(STRANDCAST_CTL_PROGRAM,
+                            words({path("out.abc"), "--motion", "builtin", "--seconds", "3600"}),
+                            path("said"));
+    pid_t server = 0;
+    ASSERT_TRUE(eventually([&] {
+      std::ifstream children(fmt::format("/proc/{0}/task/{0}/children", bake.id()));
+      return (children >> server) && !said().empty();
+    }));
+    bake.send_signal(signal);
+    bake.wait();
+    EXPECT_TRUE(eventually([&] {
+      // Nobody may wait for it here: what is dead but not waited for is as good as gone.
+      std::ifstream file(fmt::format("/proc/{}/stat", server));
+      std::string state;
+      return !std::getline(file, state) || state.find(") Z ") != std::string::npos;
+    })) << "after signal "
+        << signal;
+  }
 }
 
 }  // namespace

@@ -8,8 +8,8 @@
 #include <thread>
 
 #include "client/app/ctl_commands.h"
-#include "client/app/headless_view.h"
 #include "client/app/stream_check.h"
+#include "client/app/views.h"
 #include "common/pictures/image_codec.h"
 #include "common/pictures/video_codec.h"
 #include "tests/support/client_config.h"

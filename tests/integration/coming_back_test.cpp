@@ -8,13 +8,13 @@
 #include <thread>
 
 #include "client/app/ctl_commands.h"
-#include "client/app/headless_view.h"
 #include "client/app/latency_command.h"
 #include "client/app/live_connection.h"
 #include "client/app/live_states.h"
 #include "client/app/parameter_command.h"
 #include "client/app/steady_client.h"
 #include "client/app/view_report.h"
+#include "client/app/views.h"
 #include "common/strands/strand_codec.h"
 #include "server/relay/relay.h"
 #include "tests/support/client_config.h"

@@ -12,9 +12,9 @@
 #include <utility>
 
 #include "client/app/feed.h"
-#include "client/app/headless_view.h"
 #include "client/app/look_form.h"
 #include "client/app/stream_check.h"
+#include "client/app/views.h"
 #include "common/base/file.h"
 #include "common/motion/motion_clip.h"
 #include "common/render/render_device.h"

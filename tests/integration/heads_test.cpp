@@ -5,7 +5,7 @@
 #include <map>
 #include <mutex>
 
-#include "client/app/headless_view.h"
+#include "client/app/views.h"
 #include "common/base/file.h"
 #include "common/pictures/image_codec.h"
 #include "common/record/recording_check.h"

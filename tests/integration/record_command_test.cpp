@@ -11,8 +11,10 @@
 #include "common/record/recording_reader.h"
 #include "common/record/strand_frames.h"
 #include "server/record/replay.h"
+#include "tests/support/live_packets.h"
 #include "tests/support/server_fixture.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/udp_socket.h"
 
 namespace strandcast::record_command_test {
 namespace {
@@ -264,6 +266,27 @@ TEST_F(RecordCommands, AnswerWhyNot) {
   EXPECT_FALSE(begun.is_error) << begun.text;
   EXPECT_THAT(begun.text, testing::ContainsRegex("/default-[0-9]{8}T[0-9]{6}Z\\.mcap"));
   EXPECT_FALSE(stop_recording().is_error);
+}
+
+TEST_F(RecordCommands, ASenderOfMotionBeginsAndEndsTakes) {
+  ServerConfig on_stage = config();
+  const uint16_t port = test::free_udp_port();
+  on_stage.scene.live = {LiveDesc{.protocol = "vmc", .port = port}};
+  if (!start(on_stage)) return;
+  test::UdpSocket desk;
+  const auto is_recorded = [&] { return server_->counters().record.has_value(); };
+  const std::vector<test::OscValue> slate = {std::string("12A/x"), int32_t{3}};
+  for (const char* const name : {"12A_x-T03.mcap", "12A_x-T03-2.mcap"}) {
+    desk.send(test::osc("/strandcast/record/start", slate), port);
+    ASSERT_TRUE(eventually(is_recorded)) << name;
+    record_states(3);
+    desk.send(test::osc("/strandcast/record/stop", {}), port);
+    ASSERT_TRUE(eventually([&] { return !is_recorded(); }));
+    const auto reader = RecordingReader::open(file(name));
+    ASSERT_TRUE(reader) << reader.error().to_string();
+    EXPECT_EQ((*reader)->start().slate, "12A/x");
+    EXPECT_EQ((*reader)->start().take, 3u);
+  }
 }
 
 TEST_F(RecordCommands, AreOfThoseWhoControl) {

@@ -44,6 +44,8 @@ class RecordedRun : public test::ServerFixture {
     EXPECT_EQ(change("substeps=2"), kDoneExit);
     EXPECT_EQ(change("stream.bound_m=0.0002"), kDoneExit);
     EXPECT_EQ(change("wind.mean_mps.x=400000"), kRefusedExit);
+    EXPECT_EQ(change("look.hair_color=red"), kDoneExit);
+    EXPECT_EQ(change("look.exposure=bright"), kRefusedExit);
     EXPECT_EQ(change("hair.wind=2.5"), kDoneExit);
     EXPECT_EQ(change("hair.stiffness=0.5"), kDoneExit);
     EXPECT_EQ(change("hair.stiffness=nan"), kRefusedExit);
@@ -203,7 +205,8 @@ TEST_F(RecordedRun, SaysWhoChangedWhatAndWhatCameIn) {
                       (change->answer.is_error ? ": refused" : ""));
   }
   EXPECT_EQ(changes, (std::vector<std::string>{"substeps=2", "stream.bound_m=0.0002",
-                                               "wind.mean_mps.x=400000: refused", "hair.wind=2.5",
+                                               "wind.mean_mps.x=400000: refused", "look.hair_color=red",
+                                               "look.exposure=bright: refused", "hair.wind=2.5",
                                                "hair.stiffness=0.5", "hair.stiffness=nan: refused", "command",
                                                "command", "command", "command", "solver.name=pbd"}));
   EXPECT_GT(motion, 10u);

@@ -297,7 +297,7 @@ TEST(HeadSends, AreOneSentenceWhereTheyAreWrong) {
 }
 
 TEST(MocapPackets, SayWhatTheirParsersRead) {
-  for (const char* name : {"vmc", "opentrack", "freed", "opentrackio"}) {
+  for (const char* name : {"vmc", "opentrack", "freed", "vrchat", "opentrackio"}) {
     SCOPED_TRACE(name);
     const auto encoding = find_mocap_encoding(name);
     ASSERT_TRUE(encoding);

@@ -14,7 +14,7 @@
 #include "common/strands/scene_asset.h"
 #include "common/strands/shared_strands.h"
 #include "common/strands/strand_codec.h"
-#include "server/source/sim_loop.h"
+#include "server/source/simulation_source.h"
 #include "tests/support/server_fixture.h"
 
 namespace strandcast::sim_loop_test {
@@ -126,9 +126,11 @@ TEST(SimLoopQuality, AutoIsFullWhereStepsAreQuickAndElseFast) {
     SimLoopConfig config;
     config.scene = with_overrides(test::small_scene(400, 16), overrides).value();
     config.is_lockstep = is_lockstep;
+    SceneDesc started;
+    config.on_scene = [&](const SceneDesc& scene, const std::string&) { started = scene; };
     const Loop loop(std::move(config));
     EXPECT_TRUE(loop) << loop.trouble();
-    return loop ? loop->scene() : SceneDesc();
+    return started;
   };
   const SceneDesc quick = running({"quality=auto", "step_rate_hz=10"}, false);
   EXPECT_EQ(quick.solver.name, "direct_rod");
@@ -162,36 +164,107 @@ TEST(SimLoopJobs, AFloodOfChangesOfTheStreamIsPublishedTwiceASecondAndTheLastOne
   EXPECT_LE(loop.streams().size(), static_cast<size_t>((now_ns() - begin_ns) / kStreamChangeNs) + 1);
 }
 
-TEST(SimLoopJobs, AFloodOfLooksIsToldTenTimesASecondAndTheLastOneCounts) {
-  SimLoopConfig config;
+/// A simulation of a small scene without a network; null after a skip or a failure.
+class Simulation {
+ public:
+  explicit Simulation(SimulationConfig config) {
+    const StreamDesc stream = config.scene.stream;
+    auto made = make_simulation(std::move(config), hub_);
+    Status status = made.ok() ? (*made)->start(sink_, stream) : Status(made.error());
+    if (status.ok())
+      source_ = std::move(*made);
+    else
+      error_ = status.error();
+  }
+  explicit operator bool() const { return source_ != nullptr; }
+  StateSource* operator->() const { return source_.get(); }
+  std::string trouble() const { return error_.to_string(); }
+  LoopSink& sink() { return sink_; }
+  Notice ask(const std::string& assignment) const {
+    auto answer = std::make_shared<std::promise<Notice>>();
+    source_->post(SetParameter{assignment}, [answer](Notice notice) { answer->set_value(std::move(notice)); },
+                  {});
+    return answer->get_future().get();
+  }
+
+ private:
+  InputHub hub_;
+  LoopSink sink_;
+  Error error_;
+  std::unique_ptr<StateSource> source_;
+};
+
+TEST(LiveLooks, AFloodIsToldTenTimesASecondAndTheLastOneCounts) {
+  SimulationConfig config;
   config.scene = test::small_scene(kStrands, kVertices);
   const LookDesc first = config.scene.look;
-  const Loop loop(std::move(config));
-  if (!loop && test::lacks_gl(loop.trouble())) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
-  ASSERT_TRUE(loop) << loop.trouble();
-  EXPECT_TRUE(loop.looks().empty()) << "nothing has changed";
+  Simulation simulation(std::move(config));
+  if (!simulation && test::lacks_gl(simulation.trouble()))
+    GTEST_SKIP() << "needs OpenGL 4.5: " << simulation.trouble();
+  ASSERT_TRUE(simulation) << simulation.trouble();
+  EXPECT_TRUE(simulation.sink().looks().empty()) << "nothing has changed";
   const int64_t begin_ns = now_ns();
   constexpr int kChanges = 300;
   for (int i = 1; i <= kChanges; ++i)
-    ASSERT_FALSE(loop.ask(fmt::format("look.ambient={}", 1e-3 * i)).is_error);
+    ASSERT_FALSE(simulation.ask(fmt::format("look.ambient={}", 1e-3 * i)).is_error);
   const auto is_told = [&](auto&& is_it) {
     return eventually([&] {
-      const auto looks = loop.looks();
+      const auto looks = simulation.sink().looks();
       return !looks.empty() && is_it(looks.back());
     });
   };
   ASSERT_TRUE(is_told([](const LookChange& look) { return look.look.ambient == 0.3f; }));
-  EXPECT_LE(loop.looks().size(), static_cast<size_t>((now_ns() - begin_ns) / kLookChangeNs) + 1);
+  EXPECT_LE(simulation.sink().looks().size(), static_cast<size_t>((now_ns() - begin_ns) / kLookChangeNs) + 1);
   LookDesc expected = first;
   expected.ambient = 0.3f;
-  EXPECT_EQ(loop.looks().back().look, expected) << "all else stays";
-  EXPECT_EQ(loop->scene().look, expected);
+  EXPECT_EQ(simulation.sink().looks().back().look, expected) << "all else stays";
+  EXPECT_EQ(simulation->scene()->look, expected);
   // While nothing is simulated, too, with what came too soon after the one before.
-  loop->post(ControlCommand{Command::Pause}, {});
+  simulation->post(ControlCommand{Command::Pause}, {}, {});
   for (const char* color : {"red", "black", "grey"})
-    ASSERT_FALSE(loop.ask(fmt::format("look.hair_color={}", color)).is_error);
+    ASSERT_FALSE(simulation.ask(fmt::format("look.hair_color={}", color)).is_error);
   ASSERT_TRUE(is_told([](const LookChange& look) { return look.look.hair_color == "grey"; }));
-  EXPECT_TRUE(loop.streams().empty()) << "the stream does not change with it";
+  EXPECT_TRUE(simulation.sink().streams().empty()) << "the stream does not change with it";
+}
+
+TEST(LiveLooks, NeedNoTurnOfTheSimulation) {
+  std::promise<void> held, go;
+  auto let_go = go.get_future().share();
+  std::atomic<int> published = 0;
+  SimulationConfig config;
+  config.scene = test::small_scene(kStrands, kVertices);
+  config.on_publish = [&](const std::shared_ptr<const Snapshot>&) {
+    if (++published != 2) return;
+    held.set_value();
+    let_go.wait();
+  };
+  Simulation simulation(std::move(config));
+  if (!simulation && test::lacks_gl(simulation.trouble()))
+    GTEST_SKIP() << "needs OpenGL 4.5: " << simulation.trouble();
+  ASSERT_TRUE(simulation) << simulation.trouble();
+  held.get_future().wait();  // the simulation's thread stands still
+  std::promise<Notice> answered;
+  auto answer = answered.get_future();
+  simulation->post(SetParameter{"look.hair_color=red"},
+                   [&](Notice notice) { answered.set_value(std::move(notice)); }, {});
+  const bool is_answered = answer.wait_for(std::chrono::seconds(5)) == std::future_status::ready;
+  EXPECT_TRUE(is_answered);
+  EXPECT_EQ(simulation.sink().looks().size(), 1u);
+  EXPECT_EQ(simulation->scene()->look.hair_color, "red");
+  // What moves hair waits for its turn, and takes no other look back.
+  simulation->post(SetParameter{"look.shading.wetness=0.5"}, {}, {});
+  simulation->post(SetParameter{"look.shading.wetness=0"}, {}, {});
+  simulation->post(SetParameter{"look.ambient=0.125"}, {}, {});
+  EXPECT_NE(simulation->scene()->look.ambient, 0.125f) << "it came after one that waits";
+  go.set_value();
+  EXPECT_FALSE(simulation.ask("look.exposure=1.25").is_error);
+  const LookDesc look = simulation->scene()->look;
+  EXPECT_EQ(look.hair_color, "red");
+  EXPECT_EQ(look.shading.wetness, 0.0f) << "the newer one counts";
+  EXPECT_EQ(look.ambient, 0.125f);
+  EXPECT_EQ(look.exposure, 1.25f);
+  EXPECT_TRUE(simulation.ask("look.exposure=bright").is_error);
+  EXPECT_EQ(simulation->scene()->look, look);
 }
 
 TEST(SimLoopJobs, NewSolversLeaveTimeForStepsBetweenThem) {

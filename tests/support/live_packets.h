@@ -136,6 +136,36 @@ inline PacketBytes freed(const FreedPacket& packet) {
   return writer.put(static_cast<uint8_t>(sum & 0xFF)).bytes();
 }
 
+/// Trackers of VRChat: where and how the head is, in Unity's axes, m and degrees.
+inline PacketBytes vrchat(const Triple& position_m, const Triple& turn_deg,
+                          const std::string& name = "head") {
+  const auto three = [&](const char* kind, const Triple& value) {
+    return osc("/tracking/trackers/" + name + "/" + kind, {value[0], value[1], value[2]});
+  };
+  return osc_bundle({three("position", position_m), three("rotation", turn_deg)});
+}
+
+struct MvnPacketSegment {
+  uint32_t number = 1;
+  Triple position{};
+  std::array<float, 4> rotation = {1, 0, 0, 0};  // w, x, y, z
+};
+struct MvnPacket {
+  uint32_t sample = 1, time_ms = 0;
+  uint8_t character = 0;
+  std::vector<MvnPacketSegment> segments = {{1, {0, 0, 95}}, {7, {0, 0, 160}}};
+  std::string kind = "02";
+};
+inline PacketBytes mvn(const MvnPacket& packet) {
+  PacketWriter writer(std::endian::big);
+  writer.text("MXTP" + packet.kind).put(packet.sample).put(uint8_t{0x80});
+  writer.put(static_cast<uint8_t>(packet.segments.size())).put(packet.time_ms).put(packet.character);
+  writer.put(std::array<uint8_t, 5>{23, 0, 0, 0, 0}).put(static_cast<uint16_t>(32 * packet.segments.size()));
+  for (const MvnPacketSegment& segment : packet.segments)
+    writer.put(segment.number).put(segment.position).put(segment.rotation);
+  return writer.bytes();
+}
+
 struct TrackPacketFields {
   uint8_t encoding = 1;  // JSON
   uint16_t sequence = 0;

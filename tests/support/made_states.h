@@ -69,10 +69,15 @@ class MadeStates : public ExportSource {
     return std::shared_ptr<const Snapshot>();
   }
   std::vector<std::string> remarks() const override { return {"the source says so"}; }
+  Result<std::optional<int64_t>> skip_to(double) override {
+    return counted_ ? std::optional(states_.front()->sim_time_ns) : std::nullopt;
+  }
+  std::optional<CountedState> counted() const override { return counted_; }
   const TimecodeTrack& timecodes() const override { return timecodes_; }
 
   ExportScene scene_;
   TimecodeTrack timecodes_;
+  std::optional<CountedState> counted_;  // as of a running server
   std::vector<std::shared_ptr<const Snapshot>> states_;
   std::optional<Error> end_;
   size_t stop_at_ = ~size_t{0};  // whoever exports is stopped with this state

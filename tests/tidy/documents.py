@@ -27,7 +27,7 @@ MAX_INVARIANTS = 25
 # What commands name besides our own programs and scripts.
 OTHER_PROGRAMS = {"apt", "cd", "chmod", "cmake", "cpack", "ctest", "export", "npm", "openssl", "podman", "systemctl"}
 SCRIPTS = ["deploy/run.sh", "deploy/fleet/strandcast-fleet", "deploy/fleet/strandcast-grid", "tests/nightly.sh"]
-PROGRAMS = ["server", "view", "ctl", "report", "load", "chaos"]
+PROGRAMS = ["server", "view", "ctl", "report", "load", "chaos", "vopr"]
 # Options in prose that are others' or a bench's own.
 OTHER_OPTIONS = {"--help", "--install", "--prefix", "--match", "--relays", "--cpus-per-task", "--gres"}
 COMMAND_DOCUMENTS = ["README.md", "CONTRIBUTING.md", "SECURITY.md", "docs/*/*.md", "examples/README.md"]

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "server/report/analytic_tests.h"
-#include "server/report/curl_test.h"
 
 namespace strandcast::analytic_tests_test {
 namespace {

@@ -1,6 +1,7 @@
 // The numbers in the documents are those that tests hold (tests/support/claims.h) or that the code has, and
 // docs/internals/figures.md has no other measured number. README.md has none at all.
 #include "tests/support/claims.h"
+#include "common/base/mercy.h"
 #include "common/base/units.h"
 
 #include <regex>
@@ -14,7 +15,7 @@
 #include "server/net/send_gate.h"
 #include "server/report/streaming.h"
 #include "server/report/work_precision.h"
-#include "server/source/sim_loop.h"
+#include "server/source/simulation_source.h"
 
 namespace strandcast::claims_test {
 namespace {
@@ -100,6 +101,8 @@ std::vector<std::string> built_claims() {
       fmt::format("worth {:g} times as much as strands, for {:g} s", kFramesGain, kWishNs / kNsPerS),
       fmt::format("({:g} times while the time of a server without a GPU is only guessed)",
                   kGuessedFramesGain),
+      fmt::format("within {:g} mm of what was simulated", 1e3 * scene_fields::kStreamBound.minimum),
+      fmt::format("more than a {} of it is broken", kMostBadShare == 10 ? "tenth" : "share"),
       fmt::format("no change follows another within {:g} s", kFirstDwellNs / kNsPerS),
   };
 }

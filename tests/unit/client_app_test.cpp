@@ -3,7 +3,6 @@
 #include <csignal>
 
 #include "client/app/clip_store.h"
-#include "client/app/line_budget.h"
 #include "client/app/mode_control.h"
 #include "client/app/notice_list.h"
 #include "client/app/stop_signal.h"

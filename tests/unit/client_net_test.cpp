@@ -8,8 +8,8 @@
 #include "common/base/file.h"
 #include "common/client/address.h"
 #include "common/client/mailbox.h"
-#include "common/client/outbox.h"
 #include "common/client/reconnect_policy.h"
+#include "common/client/viewer_client.h"
 #include "common/wire/close_code.h"
 #include "common/wire/messages.h"
 

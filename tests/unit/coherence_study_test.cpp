@@ -9,7 +9,6 @@
 #include <glm/trigonometric.hpp>
 
 #include "common/scene/scene_file.h"
-#include "server/report/coherence_page.h"
 #include "server/report/crowded_hair.h"
 
 namespace strandcast::coherence_study_test {

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "common/scene/scene_file.h"
-#include "server/report/collision_page.h"
 #include "server/report/contact_depth.h"
 
 namespace strandcast::collision_study_test {

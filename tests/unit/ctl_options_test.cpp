@@ -140,6 +140,7 @@ const OptionRow kCommandRows[] = {
     {"--at", {"2"}, {{"exported.at_s", "2"}}, kOut, "export"},
     {"--motion", {"a.bvh"}, {{"bake.feed.motion", "a.bvh"}}, kOut, "bake"},
     {"--wind", {"a.csv"}, {{"bake.feed.wind", "a.csv"}}, kOut, "bake"},
+    {"--motion-fps", {"29.97"}, {{"bake.feed.fps", "29.97"}}, kOut, "bake"},
     {"--motion-unit", {"0.5"}, {{"bake.feed.motion_file.unit_m", "0.5"}}, kOut, "bake"},
     {"--motion-up", {"z"}, {{"bake.feed.motion_file.up", "z"}}, kOut, "bake"},
     {"--joint", {"Skull"}, {{"bake.feed.motion_file.joint", "Skull"}}, kOut, "bake"},

@@ -283,6 +283,40 @@ TEST(Export, FilesBeginAtTheirFrameOfTimecode) {
   }
 }
 
+// Its states are not known beforehand: one of them says what it counts.
+TEST(Export, AnExportOfARunningServerBeginsAtAFrameOfItsTimecode) {
+  const TemporaryFolder folder;
+  ExportOptions options;
+  options.path = folder.path() / "hair.csv";
+  options.is_quiet = true;
+  const FrameRate rate{24000, 1001};
+  const Timecode first = advanced(*parse_timecode("01:02:03:04", rate), 0.25);
+  const auto run = [&](const char* from, const char* to) {
+    options.from_timecode = from;
+    options.to_timecode = to;
+    MadeStates states(61);
+    states.counted_ = {3 * kStepNs, advanced(first, 3e-9 * static_cast<double>(kStepNs) * rate.hz())};
+    return export_strands(states, options, kNeverStopped);
+  };
+  const auto whole = run("", "");
+  ASSERT_TRUE(whole) << whole.error().to_string();
+  EXPECT_EQ(whole->first_timecode, "01:02:03:05") << "the first whole frame";
+  EXPECT_NEAR(whole->first_s, 0.75 / rate.hz(), 1e-8);
+  EXPECT_EQ(whole->frame_count, 24u) << "as of a recording of the same states";
+  EXPECT_EQ(rows_of(options.path)[0][0] + 1, (3600 + 2 * 60 + 3) * 24 + 5)
+      << "the rest shape stands before it";
+  const auto range = run("01:02:03:10", "01:02:03:15");
+  ASSERT_TRUE(range) << range.error().to_string();
+  EXPECT_EQ(range->frame_count, 6u);
+  EXPECT_NEAR(range->first_s, 5.75 / rate.hz(), 1e-8);
+  EXPECT_THAT(run("01:02:03:03", "").error().message, HasSubstr("it is 01:02:03:04 already"));
+  EXPECT_THAT(run("01:02:03:10", "01:02:03:09").error().message, HasSubstr("before the beginning"));
+  options.to_s = 0.5;  // of seconds, the usual wish
+  EXPECT_EQ(run("", "")->frame_count, 12u) << "0.5 s have 11.99 frames; 0.75 of one is waited for";
+  options.has_fps = true;
+  EXPECT_EQ(run("", "")->first_timecode, "") << "30 frames a second are not those that are counted";
+}
+
 TEST(Export, ARangeOfTimecodeIsKept) {
   const TemporaryFolder folder;
   ExportOptions options;
@@ -608,6 +642,9 @@ TEST(Export, WhatTheHairsFileSaysComesBackInItsOrder) {
       const uint32_t place = place_in_file(strand);
       EXPECT_EQ(placed->labels.id[place], origin->id[strand]);
       EXPECT_EQ(placed->labels.group[place], origin->group[strand]);
+      EXPECT_EQ(placed->labels.object_name[placed->labels.object[place]],
+                origin->object_name[origin->object[strand]])
+          << extension;
       EXPECT_LT(glm::distance(placed->groom.root_uv[place], origin->root_uv[strand]), 1e-5f);
       for (uint32_t vertex = 0; vertex < kVertices; ++vertex) {
         EXPECT_NEAR(placed->labels.width[place * kVertices + vertex], width_m_of(strand, vertex), 1e-9f);

@@ -374,7 +374,8 @@ TEST_F(AbcTest, WhatIsWrongIsNamedWithItsObject) {
                 c.counts = {3, 1};
               }),
               HasSubstr("nVertices need 4 points, there are 5"));
-  EXPECT_THAT(made([](MadeCurves& c) { c.points[2].y = NAN; }), HasSubstr("point 2 is"));
+  EXPECT_THAT(made([](MadeCurves& c) { c.points[2].y = NAN; }),
+              HasSubstr("strand 0 vertex 2 has the coordinates"));
   EXPECT_THAT(made([](MadeCurves& c) { c.kinds[0] = 9; }), HasSubstr("curve type 9"));
   EXPECT_THAT(made([](MadeCurves& c) { c.kinds[2] = 77; }), HasSubstr("curve basis 77"));
   EXPECT_THAT(made([](MadeCurves& c) { c.kinds[1] = 1; }), HasSubstr("closed"));

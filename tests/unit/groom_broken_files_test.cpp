@@ -19,6 +19,7 @@ namespace {
 using test::ByteFile;
 using test::shared_data;
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::HasSubstr;
 
 constexpr size_t kSmallAllocations = 64 << 10;  // messages, streams, paths
@@ -173,8 +174,9 @@ TEST(BrokenTfx, NonFiniteValuesNameStrandAndVertex) {
   const TemporaryFolder folder;
   for (const float value : {kNan, HUGE_VALF, -HUGE_VALF}) {
     ByteFile broken = small_v4();
-    EXPECT_THAT(refusal(folder, broken.patch(160 + 6 * 16 + 4, value), "broken.tfx"),
-                HasSubstr(fmt::format("strand 1 vertex 2 (byte 260) has the coordinate {}", value)));
+    EXPECT_THAT(
+        refusal(folder, broken.patch(160 + 6 * 16 + 4, value), "broken.tfx"),
+        HasSubstr(fmt::format("strand 1 vertex 2 has the coordinates 1, {} and 0.5; 1 of 2 strands", value)));
     broken = small_v4();
     EXPECT_THAT(refusal(folder, broken.patch(160 + 6 * 16 + 12, value), "broken.tfx"),
                 HasSubstr(fmt::format("has the inverse mass {}", value)));
@@ -277,6 +279,100 @@ TEST(GroomBrokenFiles, TextUnderTheWrongNameIsCalledText) {
               HasSubstr("Git LFS"));
   EXPECT_THAT(refusal(folder, small_v4(), "d.hair"), HasSubstr("does not begin with 'HAIR'"))
       << "this is no text";
+}
+
+/// Strands of three points; the second point of some is no number, and others show nothing.
+struct SomeHair {
+  static constexpr uint32_t kStrands = 40, kPoints = 3;
+  std::vector<glm::vec3> points;
+
+  SomeHair(std::initializer_list<uint32_t> broken, std::initializer_list<uint32_t> empty) {
+    for (uint32_t strand = 0; strand < kStrands; ++strand)
+      for (uint32_t i = 0; i < kPoints; ++i)
+        points.emplace_back(0.1f * static_cast<float>(strand), -0.5f * static_cast<float>(i), 0.25f);
+    for (const uint32_t strand : broken) points[kPoints * strand + 1].y = kNan;
+    for (const uint32_t strand : empty)
+      for (uint32_t i = 0; i < kPoints; ++i) points[kPoints * strand + i] = points[kPoints * strand];
+  }
+  std::string lines(const char* before) const {
+    std::string text;
+    for (size_t i = 0; i < points.size(); ++i)
+      text += (i % kPoints == 0 ? before : std::string()) +
+              fmt::format("{} {} {}\n", points[i].x, points[i].y, points[i].z);
+    return text;
+  }
+  std::string tfx_text() const {
+    std::string text = fmt::format("version 2.0\nnumStrands {}\nis sorted\n", kStrands);
+    for (uint32_t strand = 0; strand < kStrands; ++strand) {
+      text += fmt::format("strand {} numVerts {} texcoord 0 0\n", strand, kPoints);
+      for (uint32_t i = 0; i < kPoints; ++i) {
+        const glm::vec3& p = points[kPoints * strand + i];
+        text += fmt::format("{} {} {}\n", p.x, std::isnan(p.y) ? "-1.#IND" : fmt::format("{}", p.y), p.z);
+      }
+    }
+    return text;
+  }
+  std::string tfx() const {
+    ByteFile file;
+    file.add(4.0f).add(kStrands).add(kPoints).add(160u).zeros(144);
+    for (const glm::vec3& p : points) file.add(p.x).add(p.y).add(p.z).add(1.0f);
+    return file.text();
+  }
+  std::string hair() const {
+    ByteFile file;
+    file.add('H').add('A').add('I').add('R').add(kStrands).add(kStrands * kPoints).add(2u).add(kPoints - 1);
+    file.zeros(128 - file.bytes.size());
+    for (const glm::vec3& p : points) file.add(p.x).add(p.y).add(p.z);
+    return file.text();
+  }
+  std::string ply() const {
+    std::string text = fmt::format(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
+        "element strand {}\nproperty uchar nsegs\nend_header\n",
+        points.size(), kStrands);
+    text += lines("");
+    for (uint32_t strand = 0; strand < kStrands; ++strand) text += "2\n";
+    return text;
+  }
+  std::string usda() const {
+    std::string text = "#usda 1.0\ndef BasisCurves \"Hair\"\n{\nuniform token type = \"linear\"\n", counts;
+    for (uint32_t strand = 0; strand < kStrands; ++strand) counts += fmt::format("{}, ", kPoints);
+    text += "int[] curveVertexCounts = [" + counts + "]\npoint3f[] points = [";
+    for (const glm::vec3& p : points) text += fmt::format("({}, {}, {}), ", p.x, p.y, p.z);
+    return text + "]\n}\n";
+  }
+};
+
+// One rule for all formats.
+TEST(BrokenStrands, ATenthMayBeBrokenAndIsLeftOutAndCounted) {
+  const TemporaryFolder folder;
+  for (const auto& [name, text_of] : std::vector<std::pair<const char*, std::string (SomeHair::*)() const>>{
+           {"text.tfx", &SomeHair::tfx_text},
+           {"a.tfx", &SomeHair::tfx},
+           {"a.hair", &SomeHair::hair},
+           {"a.ply", &SomeHair::ply},
+           {"a.usda", &SomeHair::usda}}) {
+    GroomFileOptions options;
+    options.unit_m = 0.1f;
+    const auto loaded = [&](const SomeHair& hair) {
+      options.path = folder.write(name, (hair.*text_of)());
+      return load_placed_groom(options);
+    };
+    const auto most = loaded({{3, 4, 20, 39}, {0, 1, 2, 5, 6}});
+    ASSERT_TRUE(most) << name << most.error().to_string();
+    EXPECT_EQ(most->groom.strand_count(), 31u) << name;
+    const SomeHair good({}, {});
+    EXPECT_EQ(most->groom.rest_position_m[SomeHair::kPoints], 0.1f * good.points[8 * SomeHair::kPoints])
+        << name;
+    EXPECT_THAT(most->notes,
+                Contains(HasSubstr("4 of 40 strands cannot be used, and are left out; the first: strand 3 "
+                                   "vertex 1 has the coordinates ")));
+    EXPECT_THAT(most->notes, Contains(HasSubstr("5 strands of fewer than 2 points or no length")));
+    const auto more = loaded({{3, 4, 20, 38, 39}, {}});
+    ASSERT_FALSE(more) << name;
+    EXPECT_THAT(more.error().to_string(),
+                AllOf(HasSubstr(name), HasSubstr("5 of 40 strands cannot be used, a tenth at most")));
+  }
 }
 
 }  // namespace

@@ -278,7 +278,7 @@ TEST(Usdc, CurvesWithoutASegmentAreLeftOutAndCounted) {
   EXPECT_EQ(hair->groom.offset, (std::vector<uint32_t>{0, 2, 4}));
   EXPECT_EQ(hair->labels.id, (std::vector<int32_t>{1, 3}));
   EXPECT_EQ(hair->is_z_up, true) << "written small";
-  EXPECT_THAT(hair->notes, Contains(HasSubstr("1 curves of fewer than 2 points are left out")));
+  EXPECT_THAT(hair->notes, Contains(HasSubstr("1 strands of fewer than 2 points")));
 }
 
 TEST(Usdc, EveryVersionAndWayToPackNumbersReadsTheSame) {
@@ -381,7 +381,8 @@ TEST(Usdc, SmallValuesStandInThePlaceOfTheirOffset) {
 
 TEST(Usdc, WhatHasNoTimeGoesBeforeTheFirstOfTimeSamples) {
   MadeUsdc file;
-  const std::vector<glm::vec3> other(kPoints.size(), glm::vec3(7));
+  std::vector<glm::vec3> other = kPoints;
+  for (glm::vec3& point : other) point += glm::vec3(7);
   const uint64_t samples =
       file.samples({7.5, 8}, {file.array(24, 5, raw_bytes(kPoints)), MadeUsdc::rep(51, 0)});
   std::vector<MadeSpec> items = line_items(file);
@@ -503,11 +504,6 @@ TEST(Usdc, WhatIsWrongIsNamedWithItsPrim) {
               HasSubstr("prim 'Hair', points: a value of type 11 where points belong"));
   EXPECT_THAT(refused("points", [](MadeUsdc& own) { return own.array(24, 1ull << 30, "x"); }),
               HasSubstr("an array of 1073741824 values, at most 16000000"));
-  EXPECT_THAT(refused("points",
-                      [](MadeUsdc& own) {
-                        return own.array(24, 1, raw_bytes(std::vector<float>{0, 0, std::nanf("")}));
-                      }),
-              HasSubstr("a point has the coordinate nan"));
   EXPECT_THAT(refused("curveVertexCounts",
                       [](MadeUsdc& own) {
                         return own.ints({3, -2});

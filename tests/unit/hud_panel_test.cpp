@@ -4,7 +4,7 @@
 #include <imgui.h>
 
 #include "client/app/view_hud.h"
-#include "client/window/hud_panel.h"
+#include "client/window/hud.h"
 #include "common/base/units.h"
 
 namespace strandcast::hud_panel_test {

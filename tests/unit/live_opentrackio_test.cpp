@@ -118,12 +118,29 @@ TEST(OpenTrackIo, TellsWhoWhenAndWhatTheTrackerDoes) {
   EXPECT_THAT(parser->describe(), ElementsAre("source 3", HasSubstr("pan 0.000"), HasSubstr("x 0.0000"),
                                               "sample 7", "29.970 samples a second", "timecode 01:02:03:04",
                                               "records", "slate A101", "status good"));
-  EXPECT_THAT(parser->take_notes(), ElementsAre("the tracker records, slate A101"));
   // Without a time, the number over the rate: 7 x 1001 / 30000 s.
   EXPECT_EQ(only_pose(*parser, opentrackio(sample(head, timing + rest))).source_time_ns, 233'566'667);
-  EXPECT_THAT(parser->take_notes(), IsEmpty()) << "each is told once";
-  (void)only_pose(*parser, opentrackio(sample(head)));
-  EXPECT_THAT(parser->take_notes(), ElementsAre("the tracker has stopped recording"));
+}
+
+TEST(OpenTrackIo, AFlagThatChangesIsAWishToRecord) {
+  const auto parser = live_parser_of("opentrackio");
+  const std::string head = transform("{\"x\":0,\"y\":0,\"z\":0}", kAtRest);
+  const auto wish_of = [&](const std::string& tracker) {
+    const auto packet = parser->parse(opentrackio(sample(head, tracker)), 0);
+    EXPECT_TRUE(packet);
+    return packet ? packet->take : std::nullopt;
+  };
+  EXPECT_FALSE(wish_of(""));
+  EXPECT_FALSE(wish_of(",\"tracker\":{\"recording\":false}"));
+  const auto begun = wish_of(",\"tracker\":{\"recording\":true,\"slate\":\"A101\"}");
+  ASSERT_TRUE(begun);
+  EXPECT_TRUE(begun->is_wanted);
+  EXPECT_EQ(begun->slate, "A101");
+  EXPECT_FALSE(wish_of(",\"tracker\":{\"recording\":true,\"slate\":\"A101\"}")) << "each is told once";
+  EXPECT_FALSE(wish_of("")) << "a sample that does not say it changes nothing";
+  const auto ended = wish_of(",\"tracker\":{\"recording\":false}");
+  ASSERT_TRUE(ended);
+  EXPECT_FALSE(ended->is_wanted);
 }
 
 TEST(OpenTrackIo, TimecodesHaveARateOfTheirOwn) {

@@ -472,6 +472,8 @@ PacketBytes right_packet(const std::string& protocol, uint32_t number) {
   if (protocol == "vmc") return test::vmc_head({0, 1.6f, 0}, {0, 0, 0, 1}, static_cast<float>(t_s));
   if (protocol == "opentrack") return test::opentrack({0, 160, 0, 0, 0, 0});
   if (protocol == "freed") return test::freed(freed);
+  if (protocol == "vrchat") return test::vrchat({0, 1.6f, 0}, {0, 0, 0});
+  if (protocol == "mvn") return test::mvn({.sample = number, .time_ms = 10 * number});
   if (protocol == "livelinkface") return test::live_link_face(face);
   if (protocol.starts_with("opentrackio"))
     return test::opentrackio(fmt::format(
@@ -515,7 +517,7 @@ PacketBytes mutated(PacketBytes bytes, std::mt19937& random) {
 
 TEST(LiveSenders, AThousandDamagedPacketsCostNoStep) {
   for (const std::string name : {"vmc", "opentrack", "freed", "natnet", "natnet 2.7", "vrpn", "livelinkface",
-                                 "opentrackio", "opentrackio document"}) {
+                                 "vrchat", "mvn", "opentrackio", "opentrackio document"}) {
     SCOPED_TRACE(name);
     const std::string protocol = name.substr(0, name.find(' '));
     std::mt19937 random(45);

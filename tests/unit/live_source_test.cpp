@@ -358,5 +358,35 @@ TEST(LiveSource, JointsAreScaledWithTheHead) {
   }
 }
 
+TEST(LiveSource, WishesToRecordComeFromWhoeverMaySendAndOneByOne) {
+  const auto source = make({.protocol = "vmc"});
+  int64_t now_ns = kStart;
+  EXPECT_TRUE(source->take(kFirst, tracker("head", 1.0f), now_ns));
+  EXPECT_FALSE(source->advance(now_ns).recording);
+  // From another port than the performer's: a desk, not the performer.
+  const std::vector<test::OscValue> slate = {std::string("12A"), int32_t{3}};
+  EXPECT_TRUE(source->take(kSecond, test::osc("/strandcast/record/start", slate), now_ns));
+  EXPECT_TRUE(source->take(kSecond, test::osc("/strandcast/record/stop", {}), now_ns));
+  EXPECT_TRUE(source->take(kSecond, test::osc("/strandcast/record/start", {}), now_ns)) << "too many at once";
+  EXPECT_EQ(source->advance(now_ns).recording, (RecordCommand{true, {}, "12A", 3}));
+  EXPECT_FALSE(source->advance(now_ns + kRecordPauseNs - 1).recording);
+  EXPECT_TRUE(source->is_active());
+  EXPECT_EQ(source->advance(now_ns + kRecordPauseNs).recording, (RecordCommand{false, {}}));
+  now_ns += 10 * kRecordPauseNs;
+  EXPECT_FALSE(source->advance(now_ns).recording);
+  EXPECT_EQ(source->status(now_ns).over_rate, 1u);
+  EXPECT_EQ(source->status(now_ns).refused, 0u);
+  // Whatever a slate holds, and whatever is no wish.
+  const std::vector<test::OscValue> long_slate = {std::string(1'000, 'x') + "\n", int32_t{-7}};
+  EXPECT_TRUE(source->take(kSecond, test::osc("/strandcast/record/start", long_slate), now_ns));
+  EXPECT_EQ(source->advance(now_ns).recording,
+            (RecordCommand{true, {}, std::string(kMaxSlateChars, 'x'), 0}));
+  now_ns += 10 * kRecordPauseNs;
+  for (const auto& packet : {test::osc("/strandcast/record/pause", {}), test::osc("/strandcast/record/", {}),
+                             test::osc("/strandcast/record/start", {1.0f})})
+    (void)source->take(kFirst, packet, now_ns);
+  EXPECT_FALSE(source->advance(now_ns).recording);
+}
+
 }  // namespace
 }  // namespace strandcast::live_source_test

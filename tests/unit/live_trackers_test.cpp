@@ -240,5 +240,91 @@ TEST(LiveLinkFaceParser, TakesPacketsWithoutAFaceAndRefusesBrokenOnes) {
   EXPECT_FALSE(parser->parse(wrong, 0));
 }
 
+// VRChat's page: Unity's coordinates, +Y up, metres, Euler angles. Unity is left-handed with +X to the right;
+// it turns about +Z (counter-clockwise as seen from behind), then +X (nose down), then +Y (to the right).
+TEST(VrchatParser, TurnsAHeadAsUnityDoes) {
+  const auto parser = live_parser_of("vrchat");
+  const LivePose pose = only_pose(*parser, test::vrchat({0.3f, 1.6f, 0.5f}, {-15, 40, 25}));
+  EXPECT_EQ(pose.subject, "head");
+  EXPECT_TRUE(pose.has_position);
+  EXPECT_TRUE(test::is_near(pose.world_from_subject.position_m, {-0.3, 1.6, 0.5}));
+  expect_turned(pose, {-40 * kDegree, 15 * kDegree, -25 * kDegree});
+  EXPECT_EQ(only_pose(*parser, test::vrchat({0, 1, 0}, {0, 0, 0}, "8")).subject, "8");
+  EXPECT_FALSE(is_finite(only_pose(*parser, test::vrchat({0, 1, 0}, {0, 1e30f, 0})).world_from_subject));
+}
+
+TEST(VrchatParser, AFrameEndsWithItsLastKind) {
+  const auto parser = live_parser_of("vrchat");
+  const auto place = [](float y) { return test::osc("/tracking/trackers/head/position", {0.0f, y, 0.0f}); };
+  const auto turn = [](float y) { return test::osc("/tracking/trackers/head/rotation", {0.0f, y, 0.0f}); };
+  const auto count = [&](const PacketBytes& bytes) { return test::parsed(*parser, bytes).poses.size(); };
+  EXPECT_EQ(count(place(1)), 0u) << "its turn is to come";
+  EXPECT_EQ(count(turn(10)), 1u);
+  EXPECT_EQ(count(place(2)), 0u);
+  const LivePose lost = only_pose(*parser, place(3));
+  EXPECT_EQ(lost.world_from_subject.position_m.y, 2.0) << "a turn was lost";
+  EXPECT_EQ(only_pose(*parser, turn(30)).world_from_subject.position_m.y, 3.0) << "and that changes nothing";
+  // Who turns alone has one message a frame.
+  const auto turning = live_parser_of("vrchat");
+  for (const size_t poses : {0, 1, 1, 2})  // the one before; in the end this one too, from now on
+    EXPECT_EQ(test::parsed(*turning, turn(10)).poses.size(), poses);
+  const LivePose pose = only_pose(*turning, turn(90));
+  EXPECT_FALSE(pose.has_position);
+  EXPECT_TRUE(test::looks_along(pose, {-1, 0, 0}));
+  for (const PacketBytes& other :
+       {test::osc("/tracking/trackers/9/position", {0.0f, 0.0f, 0.0f}),
+        test::osc("/tracking/trackers/head/scale", {0.0f, 0.0f, 0.0f}),
+        test::osc("/tracking/trackers/head", {0.0f, 0.0f, 0.0f}),
+        test::osc("/tracking/trackers/head/position", {0.0f, 0.0f}), test::osc("/avatar/parameters/x", {1})})
+    EXPECT_EQ(test::parsed(*turning, other).poses.size(), 0u);
+  EXPECT_EQ(turning->ignored(), 5u);
+}
+
+// MVN's specification, revision N: big-endian, +Z up, right-handed, centimetres; all segments look along +X
+// in the T-pose, with their rotations the identity.
+TEST(MvnParser, TurnsAHeadAsTheSpecificationSays) {
+  const auto parser = live_parser_of("mvn");
+  const auto half = [](double degrees) { return 0.5 * degrees * kDegree; };
+  test::MvnPacket packet;
+  packet.sample = 7;
+  packet.time_ms = 1'500;
+  packet.character = 2;
+  const float c = static_cast<float>(std::cos(half(40))), s = static_cast<float>(std::sin(half(40)));
+  packet.segments = {
+      {1, {40, 10, 95}}, {6, {45, 10, 150}}, {7, {50, 10, 160}, {c, 0, 0, s}}, {13, {45, 28, 145}}};
+  const LivePose pose = only_pose(*parser, test::mvn(packet));
+  EXPECT_EQ(pose.subject, "2");
+  EXPECT_EQ(pose.frame, 7u);
+  EXPECT_EQ(pose.source_time_ns, 1'500'000'000);
+  EXPECT_TRUE(test::is_near(pose.world_from_subject.position_m, {0.1, 1.6, 0.5}));
+  expect_turned(pose, {40 * kDegree, 0, 0});
+  EXPECT_THAT(pose.joint_names, ElementsAre("neck", "left_shoulder"));
+  EXPECT_TRUE(test::is_near(pose.joint_m.back(), {0.28, 1.45, 0.45}));
+  // About +Y the nose goes down, about +X the crown to the right.
+  packet.segments[2].rotation = {c, 0, s, 0};
+  expect_turned(only_pose(*parser, test::mvn(packet)), {0, -40 * kDegree, 0});
+  packet.segments[2].rotation = {c, s, 0, 0};
+  expect_turned(only_pose(*parser, test::mvn(packet)), {0, 0, 40 * kDegree});
+  // Who sends metres has a torso of less than two.
+  const auto metres = live_parser_of("mvn");
+  packet.segments = {{1, {0.4f, 0.1f, 0.95f}}, {7, {0.5f, 0.1f, 1.6f}}};
+  EXPECT_TRUE(
+      test::is_near(only_pose(*metres, test::mvn(packet)).world_from_subject.position_m, {0.1, 1.6, 0.5}));
+  EXPECT_THAT(metres->take_notes(), ElementsAre(HasSubstr("taken as metres")));
+}
+
+TEST(MvnParser, TakesWholePacketsOnly) {
+  const auto parser = live_parser_of("mvn");
+  const PacketBytes packet = test::mvn({});
+  for (size_t size = 0; size < packet.size(); ++size)
+    EXPECT_FALSE(parser->parse(std::span(packet).first(size), 0)) << size;
+  EXPECT_FALSE(parser->parse(PacketBytes(packet.size() + 1), 0));
+  EXPECT_TRUE(test::parsed(*parser, test::mvn({.kind = "01"})).poses.empty());
+  EXPECT_TRUE(test::parsed(*parser, test::mvn({.kind = "25"})).poses.empty());
+  EXPECT_EQ(parser->ignored(), 2u);
+  EXPECT_THAT(parser->take_notes(), ElementsAre(HasSubstr("as quaternions")));
+  EXPECT_TRUE(test::parsed(*parser, test::mvn({.segments = {{1, {0, 0, 95}}}})).poses.empty()) << "no head";
+}
+
 }  // namespace
 }  // namespace strandcast::live_trackers_test

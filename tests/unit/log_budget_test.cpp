@@ -1,6 +1,6 @@
 // How much others may write into the log.
-#include "server/net/log_budget.h"
 #include "common/base/units.h"
+#include "server/net/address_guard.h"
 
 #include <gtest/gtest.h>
 

@@ -10,9 +10,9 @@
 #include <utility>
 
 #include "client/app/hair_sliders.h"
-#include "client/app/look_control.h"
 #include "client/app/save_scene.h"
-#include "client/window/form_panel.h"
+#include "client/window/form.h"
+#include "client/window/hud.h"
 #include "common/base/file.h"
 #include "common/base/units.h"
 #include "common/scene/scene_file.h"

@@ -6,7 +6,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/app/mode_facts.h"
 #include "server/net/flow_control.h"
 
 namespace strandcast::mode_policy_test {

@@ -5,7 +5,6 @@
 #include <cctype>
 
 #include "common/record/recording_layout.h"
-#include "common/wire/record_batch.h"
 #include "common/wire/recording_messages.h"
 #include "common/wire/session_path.h"
 #include "tests/support/sample_recording.h"

@@ -4,9 +4,8 @@
 
 #include "common/log/progress.h"
 #include "common/plot/svg_plot.h"
-#include "server/report/csv_file.h"
 #include "server/report/html_page.h"
-#include "server/report/report_folder.h"
+#include "server/report/report_files.h"
 #include "tests/support/temporary_folder.h"
 
 namespace strandcast::report_files_test {

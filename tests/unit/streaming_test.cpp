@@ -13,7 +13,6 @@
 #include "server/report/report_executor.h"
 #include "server/report/streaming_goals.h"
 #include "server/report/streaming_page.h"
-#include "server/report/streaming_tables.h"
 #include "server/report/svg_bars.h"
 #include "tests/support/claims.h"
 #include "tests/support/shared_data.h"

@@ -100,6 +100,8 @@ const PAGES = {
     document.body.style.background = \`url(\${behind.toDataURL()}) repeat-x\`;</script>`,
 };
 
+PAGES['/lines.html'] = () => PAGES['/hair.html']().replace('followsPose: true', "followsPose: true, style: 'lines'");
+
 let server;
 let browser;
 let site;
@@ -141,6 +143,20 @@ const tests = {
     }));
     console.log(`  ${alike.toFixed(2)} dB`);
     assert.ok(alike >= LEAST_DB, `${alike} dB`);
+  },
+  async 'lines show the same hair'() {
+    const bare = page.rgb.slice(0, 3);
+    const covered = ({ rgb }) => { // by anything but what is behind it: of each pixel
+      const all = new Uint8Array(rgb.length / 3);
+      for (let i = 0; i < all.length; ++i) all[i] = Math.abs(rgb[3 * i] - bare[0]) + Math.abs(rgb[3 * i + 1] - bare[1]) + Math.abs(rgb[3 * i + 2] - bare[2]) > 150 ? 1 : 0;
+      return all;
+    };
+    const lines = await shownBy(`${site.origin}/lines.html`, 'lines', picturesOf);
+    const [ribbon, line] = [covered(page), covered(lines)];
+    const both = ribbon.reduce((sum, is, i) => sum + (is & line[i]), 0);
+    const either = ribbon.reduce((sum, is, i) => sum + (is | line[i]), 0);
+    console.log(`  ${psnr(page, lines).toFixed(2)} dB, ${((100 * both) / either).toFixed(1)} % of the pixels in common`);
+    assert.ok(psnr(page, lines) >= LEAST_DB && both > 0.8 * either, `${both} of ${either} pixels`);
   },
   async 'a page, a worker and Node have the same state'() {
     const tab = await browser.open(`${site.origin}/states.html`, SIZE);

@@ -103,6 +103,20 @@ const all = {
     }
     for (const { tab } of [...tabs, { tab: other }]) await tab.close();
   },
+  async 'a tab that is hidden for a moment misses nothing'() {
+    const tab = await browser.open(`${server.url}#mode=strands`);
+    await tab.until((now) => now.states > 20, 'states');
+    const other = await browser.open('about:blank'); // which hides it
+    await sleep(500);
+    const { states } = await tab.state();
+    await sleep(1100);
+    assert.equal(await tab.evaluate('document.visibilityState'), 'hidden');
+    const after = (await tab.state()).states;
+    await tab.send('Page.bringToFront');
+    console.log(`  ${after - states} states came meanwhile`);
+    assert.ok(after > states + 8, `${after - states} states`);
+    for (const one of [tab, other]) await one.close();
+  },
   async 'what slept comes back at once'() {
     const mortal = await Server.start(program, SMALL);
     const tab = await browser.open(`${mortal.url}#mode=strands`);

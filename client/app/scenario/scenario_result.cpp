@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <map>
 
-#include "common/plot/html_text.h"
 #include "common/plot/svg_plot.h"
 
 namespace strandcast {

@@ -6,11 +6,11 @@
 #include <limits>
 #include <utility>
 
-#include "client/app/step_speed.h"
 #include "client/app/view_options.h"
 #include "common/base/check.h"
 #include "common/base/thread_name.h"
 #include "common/base/units.h"
+#include "common/kernels/step_speed.h"
 
 namespace strandcast {
 namespace {

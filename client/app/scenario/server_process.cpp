@@ -2,11 +2,12 @@
 
 #include <fcntl.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdlib.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <charconv>
 #include <chrono>
 #include <cstring>
@@ -31,6 +32,25 @@ constexpr int kRestarts = 20;               // the port may be taken for a momen
 constexpr milliseconds kRestartPause{100};
 constexpr uint64_t kMaxPortFileBytes = 64;
 constexpr size_t kMaxShownChars = 300;
+constexpr mode_t kOwnerOnly = 0600;
+
+struct ChildFiles {
+  int null = -1, output = -1;
+  int failed = -1;  // gets errno where the program does not start
+};
+
+/// In the child, where only async-signal-safe calls are allowed: becomes the program that `words` begin with.
+/// It is told to end when the thread that made it does, whatever ends that.
+[[noreturn]] void become(const std::vector<char*>& words, const ChildFiles& files) {
+  // A group of its own: Ctrl-C is for us, and we end it.
+  const bool is_ready = prctl(PR_SET_PDEATHSIG, SIGTERM) == 0 && setpgid(0, 0) == 0 &&
+                        dup2(files.null, STDIN_FILENO) >= 0 && dup2(files.null, STDOUT_FILENO) >= 0 &&
+                        dup2(files.output, STDERR_FILENO) >= 0;
+  if (is_ready) execve(words.front(), words.data(), environ);
+  const int failure = errno;
+  [[maybe_unused]] const ssize_t written = write(files.failed, &failure, sizeof failure);
+  _exit(EXIT_FAILURE);
+}
 
 }  // namespace
 
@@ -64,22 +84,22 @@ Status ServerProcess::spawn() {
   std::vector<char*> pointers;
   for (std::string& word : words) pointers.push_back(word.data());
   pointers.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  constexpr mode_t kOwnerOnly = 0600;  // new tokens are shown on the standard output
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log_file().c_str(), O_WRONLY | O_CREAT | O_APPEND,
-                                   kOwnerOnly);
-  // A group of its own: Ctrl-C is for us, and we end it.
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-  posix_spawnattr_setpgroup(&attributes, 0);
-  const int failure =
-      posix_spawn(&process_, config_.program.c_str(), &actions, &attributes, pointers.data(), environ);
-  posix_spawnattr_destroy(&attributes);
-  posix_spawn_file_actions_destroy(&actions);
+  const std::string log = log_file().string();
+  const int null = open("/dev/null", O_RDWR | O_CLOEXEC);
+  // New tokens are shown on the standard output.
+  const int output = open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, kOwnerOnly);
+  int failed[2] = {-1, -1};  // closed by a program that starts; else it gets why not
+  int failure = null < 0 || output < 0 || pipe2(failed, O_CLOEXEC) != 0 ? errno : 0;
+  if (failure == 0) {
+    process_ = fork();
+    if (process_ == 0) become(pointers, {null, output, failed[1]});
+    failure = process_ < 0 ? errno : 0;
+  }
+  if (failed[1] >= 0) close(failed[1]);
+  if (failure == 0 && read(failed[0], &failure, sizeof failure) == sizeof failure)
+    waitpid(process_, nullptr, 0);
+  for (const int descriptor : {null, output, failed[0]})
+    if (descriptor >= 0) close(descriptor);
   if (failure == 0) return {};
   process_ = -1;
   return make_error(ErrorCode::NotFound, "cannot start {}: {} (--server PATH names the program)",

@@ -1,5 +1,5 @@
 // ServerProcess: strandcast-server as a child process on a free port, with its own tokens and its output in a
-// file. It always ends with its owner. One thread.
+// file. It always ends with its owner, also where that is killed. One thread.
 #pragma once
 
 #include <sys/types.h>

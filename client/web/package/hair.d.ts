@@ -8,6 +8,8 @@ export interface HairOptions {
   head?: boolean;
   /** Moves and turns this object as the stream's head moves. Without, it stays where you put it, such as on an avatar's head. */
   followsPose?: boolean;
+  /** What segments are: ribbons as wide as hair, or lines of a pixel, for half of the corners. Ribbons by default. */
+  style?: 'ribbons' | 'lines';
   /** As for `connect`. */
   files?: string | URL;
 }

@@ -70,6 +70,7 @@ declare module 'three' {
     geometry: BufferGeometry;
     material: Material;
   }
+  export class LineSegments extends Mesh {}
   export class BufferAttribute {
     constructor(array: ArrayLike<number>, width: number);
     readonly array: ArrayLike<number>;

@@ -65,8 +65,8 @@ function geometryOf(index: Uint32Array | undefined): THREE.BufferGeometry {
   geometry.setIndex(new THREE.BufferAttribute(index ?? new Uint32Array([0, 1, 2]), 1));
   return geometry;
 }
-function meshOf(geometry: THREE.BufferGeometry, material: THREE.Material): THREE.Mesh {
-  const mesh = new THREE.Mesh(geometry, material);
+function meshOf(geometry: THREE.BufferGeometry, material: THREE.Material, isLines = false): THREE.Mesh {
+  const mesh = isLines ? new THREE.LineSegments(geometry, material) : new THREE.Mesh(geometry, material);
   mesh.frustumCulled = false;
   return mesh;
 }
@@ -77,11 +77,11 @@ export class StrandcastHair extends THREE.Object3D {
   private readonly uniforms = {
     u_frame: { value: undefined as Frame | undefined }, u_points: { value: null as THREE.Texture | null }, u_strands: { value: null as THREE.Texture | null },
     u_order: { value: null as THREE.Texture | null }, u_strand_of: { value: null as THREE.Texture | null }, u_least_m: { value: [0, 0, 0] }, u_step_m: { value: [0, 0, 0] },
-    u_key_depth: { value: null as THREE.Texture | null }, u_rim_depth: { value: null as THREE.Texture | null }, u_sky_depth: { value: null as THREE.Texture | null },
+    u_is_line: { value: false }, u_key_depth: { value: null as THREE.Texture | null }, u_rim_depth: { value: null as THREE.Texture | null }, u_sky_depth: { value: null as THREE.Texture | null },
   };
   private readonly blend = { transparent: true, depthTest: true, depthWrite: false, blending: THREE.CustomBlending, blendSrc: THREE.OneFactor,
     blendDst: THREE.OneMinusSrcAlphaFactor, blendSrcAlpha: THREE.OneFactor, blendDstAlpha: THREE.OneMinusSrcAlphaFactor, side: THREE.DoubleSide };
-  private readonly strands = meshOf(geometryOf(undefined), materialOf(hairVert, strandFrag, this.uniforms, this.blend));
+  private readonly strands: THREE.Mesh;
   private readonly skin = meshOf(geometryOf(undefined), materialOf(headVert, headFrag, this.uniforms, { side: THREE.DoubleSide, blending: THREE.NoBlending }));
   private readonly own = new THREE.Scene(); // of what goes into half floats
   private readonly target = new Target(1, 1, { type: THREE.HalfFloatType, minFilter: THREE.NearestFilter, magFilter: THREE.NearestFilter });
@@ -112,6 +112,8 @@ export class StrandcastHair extends THREE.Object3D {
     this.worker.onmessage = ({ data }: MessageEvent<FromPrepare>) => this.hear(data);
     Object.assign(this.target, { samples: SAMPLES });
     this.target.texture.generateMipmaps = false;
+    const isLine = (this.uniforms.u_is_line.value = options.style === 'lines');
+    this.strands = meshOf(geometryOf(undefined), materialOf(hairVert, strandFrag, this.uniforms, this.blend), isLine);
     this.own.add(this.skin, this.strands);
     this.skin.visible = options.head === true;
     this.over = meshOf(geometryOf(undefined), materialOf(resolveVert, overFrag,
@@ -182,6 +184,7 @@ export class StrandcastHair extends THREE.Object3D {
   private upload(made: Prepared): void {
     this.state = this.answered;
     const { uniforms } = this;
+    const isLine = uniforms.u_is_line.value;
     uniforms.u_frame.value = frameOf(made.block);
     if (made.points) {
       uniforms.u_points.value = this.renewed(uniforms.u_points.value, made.points.data, POINTS_PER_ROW);
@@ -204,9 +207,9 @@ export class StrandcastHair extends THREE.Object3D {
     uniforms.u_order.value = this.renewed(uniforms.u_order.value, made.order, POINTS_PER_ROW, 1);
     if (made.corners) {
       this.strands.geometry.dispose();
-      this.strands.geometry = geometryOf(made.corners);
+      this.strands.geometry = geometryOf(isLine ? made.corners.slice(0, made.corners.length / 3).map((_, i) => i) : made.corners);
     }
-    this.strands.geometry.setDrawRange(0, 6 * made.segmentCount);
+    this.strands.geometry.setDrawRange(0, (isLine ? 2 : 6) * made.segmentCount);
     if (made.head && this.skin.visible) {
       this.skin.geometry.dispose();
       const geometry = (this.skin.geometry = geometryOf(made.head.triangles));

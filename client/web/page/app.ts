@@ -20,6 +20,7 @@ const MOST_PICTURE_SIDE = 1280; // of pictures that the server draws for this wi
 const SAMPLES = 4;
 const FILLS_WITHIN = 0.05; // of a window's shape
 const WINDOW_MS = 150; // between two sizes that the server hears of
+const HIDDEN_MS = 2000; // so long a tab may be hidden before the server hears of it
 const QUIET_MS = 1500; // so long a picture may stand without a word about the connection
 
 // The token leaves the address before anything is asked for.
@@ -97,6 +98,7 @@ class Viewer {
   private lostAtMs = 0; // 0 while connected
   private readonly panel: Panel;
   private timeline?: Timeline; // of a recording in the page
+  private hiddenTimer = 0;
 
   constructor() {
     this.canDraw = typeof OffscreenCanvas !== 'undefined' && 'transferControlToOffscreen' in strands;
@@ -376,9 +378,12 @@ class Viewer {
   private tellVisible(): void {
     this.toDraw({ kind: 'visible', isVisible: this.shown !== Mode.frames && !document.hidden });
   }
+  /** Who looks at another tab for a moment comes back to a stream that went on. */
   private followVisibility(): void {
     this.tellVisible();
-    this.tellWindow();
+    clearTimeout(this.hiddenTimer);
+    if (document.hidden) this.hiddenTimer = window.setTimeout(() => this.tellWindow(), HIDDEN_MS);
+    else this.tellWindow();
     if (!document.hidden) this.toNet({ kind: 'wake' });
     this.tick();
   }

@@ -100,6 +100,12 @@ inline Pose pose_from_system(SystemUp up, const glm::dvec3& position_m, const gl
           glm::dquat(rotation.w, rotation.x, rotation.z, -rotation.y)};
 }
 
+/// Xsens MVN: right-handed, +Z up. A segment without rotation looks along +X, so +Y is to its left.
+inline Pose pose_from_mvn(const glm::dvec3& position_m, const glm::dquat& rotation) {
+  return {{position_m.y, position_m.z, position_m.x},
+          glm::dquat(rotation.w, rotation.y, rotation.z, rotation.x)};
+}
+
 /// Pose of a face as ARKit reports it: its axes are those of a head here, and the angles turn about them.
 inline Pose pose_from_face(double yaw_rad, double pitch_rad, double roll_rad) {
   return {glm::dvec3(0.0), rotation_of({yaw_rad, pitch_rad, roll_rad})};

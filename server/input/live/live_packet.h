@@ -26,8 +26,16 @@ struct LivePose {
   std::vector<glm::dvec3> joint_m;        // of each, in the world
 };
 
+/// A sender's wish that a recording begins or ends.
+struct LiveTake {
+  bool is_wanted = true;
+  std::string slate;  // as on the clapperboard; empty = none
+  uint32_t take = 0;  // of the slate; 0 = none
+};
+
 struct LivePacket {
   std::vector<LivePose> poses;
+  std::optional<LiveTake> take;
   std::optional<glm::dvec3> wind_mps;  // in the world
 };
 

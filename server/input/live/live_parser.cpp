@@ -40,6 +40,8 @@ std::span<const LiveProtocol> live_protocols() {
        0,
        {"pan-left", "pan-right"},
        kOpenTrackIoGroup},
+      {"vrchat", "VRChat's OSC trackers: head and 1 to 8", kUdp, 9000, 0, {}, ""},
+      {"mvn", "Xsens MVN's network streamer: segments as quaternions", kUdp, 9763, 0, {}, ""},
   };
   return kProtocols;
 }
@@ -57,6 +59,8 @@ Result<std::unique_ptr<LiveParser>> make_live_parser(const LiveParserConfig& con
   if (config.protocol == "freed") return make_freed_parser(order);
   if (config.protocol == "natnet") return make_natnet_parser(order, config.protocol_version);
   if (config.protocol == "vrpn") return make_vrpn_parser(order);
+  if (config.protocol == "vrchat") return make_vrchat_parser(config);
+  if (config.protocol == "mvn") return make_mvn_parser();
   if (config.protocol == "opentrackio") return make_opentrackio_parser(order);
   return make_live_link_face_parser(order);
 }

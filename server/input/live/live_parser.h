@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -52,6 +53,8 @@ class LiveParser {
   /// Parses a datagram or, over TCP, a chunk as read. An error is one sentence and leaves the parser
   /// unchanged; a TCP connection cannot be used after it. Unknown content is skipped and counted.
   virtual Result<LivePacket> parse(std::span<const std::byte> bytes, int64_t arrival_ns) = 0;
+  /// Returns the wish to record that a datagram is, from any sender; such a datagram needs no parse().
+  virtual std::optional<LiveTake> take_of(std::span<const std::byte>) const { return std::nullopt; }
   /// Returns bytes to send when a connection begins: VRPN's cookie, NatNet's request to be served; empty =
   /// nothing.
   virtual std::vector<std::byte> greeting() const { return {}; }

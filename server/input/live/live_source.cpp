@@ -122,7 +122,24 @@ bool LiveSource::take_allowance(size_t bytes, int64_t arrival_ns) {
   return true;
 }
 
+/// Names are checked where a file is made.
+void LiveSource::wish(const LiveTake& take) {
+  if (recordings_.size() == kMaxWaitingRecordings) {
+    ++counters_.over_rate;
+    return;
+  }
+  recordings_.push_back(
+      {take.is_wanted, {}, printable(take.slate, kMaxSlateChars), std::min(take.take, kMaxTake)});
+}
+
 Status LiveSource::take(const std::string& sender, std::span<const std::byte> bytes, int64_t arrival_ns) {
+  if (const auto wanted = parser_->take_of(bytes)) {
+    if (take_allowance(bytes.size(), arrival_ns))
+      wish(*wanted);
+    else
+      ++counters_.over_rate;
+    return {};
+  }
   if (is_heard(arrival_ns) && sender != sender_) {
     ++counters_.refused;
     if (sender != other_sender_ && notes_.size() < kMaxNotes)
@@ -282,6 +299,7 @@ void LiveSource::use(const LivePacket& packet, int64_t arrival_ns) {
     move_head(pose, arrival_ns);
     taken = &pose;
   }
+  if (packet.take) wish(*packet.take);
   if (packet.wind_mps) wind_.push_back({{{arrival_ns, glm::vec3(*packet.wind_mps)}}});
 }
 
@@ -317,6 +335,11 @@ LiveSource::Due LiveSource::advance(int64_t now_ns) {
   }
   for (const std::string& note : policy_.take_notes()) warn(note);
   due.wind = std::exchange(wind_, {});
+  if (!recordings_.empty() && now_ns - recorded_ns_ >= kRecordPauseNs) {
+    due.recording = std::move(recordings_.front());
+    recordings_.erase(recordings_.begin());
+    recorded_ns_ = now_ns;
+  }
   const bool is_stale_now = policy_.is_stale(now_ns);
   if (is_stale_now && !was_stale_) {
     due.has_ended = true;

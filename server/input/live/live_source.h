@@ -3,11 +3,13 @@
 //
 // * The first address and port that sends a pose or wind is the sender, until nothing readable came from it
 //   for kMotionStaleNs. Meanwhile packets of others are refused unread.
+// * Wishes to record come from all who may send.
 // * At most kMaxSampleRateHz packets (input_hub.h) and kMaxLiveBytesPerS are read.
 // * The head is driven by the chosen subject. Without a choice it is a subject without a name or called head
 //   (in any case), else the first one seen, while it stays visible.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -25,6 +27,9 @@ namespace strandcast {
 inline constexpr double kMaxLiveBytesPerS = 2e6;
 inline constexpr size_t kMaxLiveSubjects = 32;
 inline constexpr int64_t kRateWindowNs = 1'000'000'000;
+/// Wishes to record go on one by one with this pause.
+inline constexpr int64_t kRecordPauseNs = 250'000'000;
+inline constexpr size_t kMaxWaitingRecordings = 2;  // further ones are dropped
 
 struct LiveSourceCounters {
   uint64_t packets = 0;  // that could be read
@@ -64,11 +69,12 @@ class LiveSource {
   struct Due {
     std::vector<MotionSamples> motion;  // at most one sample each; times are the server's
     std::vector<WindSamples> wind;
-    bool has_ended = false;  // the head has become stale: who drives it may be another one
+    std::optional<RecordCommand> recording;  // to begin or to end
+    bool has_ended = false;                  // the head has become stale: who drives it may be another one
   };
   Due advance(int64_t now_ns);
   /// Returns whether advance() has work although nothing was received.
-  bool is_active() const { return was_heard_ || !was_stale_; }
+  bool is_active() const { return was_heard_ || !was_stale_ || !recordings_.empty(); }
 
   void choose_subject(const std::string& subject);
   bool has_seen(const std::string& subject) const;
@@ -98,6 +104,7 @@ class LiveSource {
   void note_subject(const std::string& name, int64_t arrival_ns);
   void follow_subject(int64_t now_ns);
   void use(const LivePacket& packet, int64_t arrival_ns);
+  void wish(const LiveTake& take);
   bool is_namesake(const LivePose& pose, const LivePose& taken);
   void move_head(const LivePose& pose, int64_t arrival_ns);
 
@@ -121,9 +128,11 @@ class LiveSource {
   double packet_allowance_ = 0.0, byte_allowance_ = 0.0;
   int64_t allowance_ns_ = 0;
 
-  std::vector<Subject> subjects_;       // in the order in which they were seen
-  std::optional<std::string> subject_;  // that drives the head
-  std::vector<WindSamples> wind_;       // not given out yet
+  std::vector<Subject> subjects_;          // in the order in which they were seen
+  std::optional<std::string> subject_;     // that drives the head
+  std::vector<WindSamples> wind_;          // not given out yet
+  std::vector<RecordCommand> recordings_;  // likewise
+  int64_t recorded_ns_ = INT64_MIN / 2;    // when one was given out
 
   int64_t window_begin_ns_ = 0;  // of the rate
   uint32_t window_packets_ = 0;

@@ -110,7 +110,6 @@ class OpenTrackIoParser : public LiveParser {
   }
 
   uint64_t ignored() const override { return ignored_; }
-  std::vector<std::string> take_notes() override { return std::exchange(notes_, {}); }
 
   std::vector<std::string> describe() const override {
     if (!last_) return {};
@@ -188,8 +187,8 @@ class OpenTrackIoParser : public LiveParser {
     auto tree = is_json ? read_json(text) : read_cbor(payload);
     if (!tree) return at(is_json ? "OpenTrackIO in JSON" : "OpenTrackIO in CBOR", tree.error());
     TrackFields fields = read_fields(*tree);
-    note_recording(fields);
     LivePacket packet;
+    packet.take = take_of(fields);
     if (fields.pose) packet.poses.push_back(pose_of(fields));
     if (!fields.pose) ++ignored_;  // of a lens or a clock alone
     last_ = std::move(fields);
@@ -262,13 +261,13 @@ class OpenTrackIoParser : public LiveParser {
     return count_;
   }
 
-  void note_recording(const TrackFields& fields) {
+  /// What the tracker's flag asks for where it changes. A sample without the flag leaves it as it was.
+  std::optional<LiveTake> take_of(TrackFields& fields) const {
     const bool was_recording = last_ && last_->is_recording.value_or(false);
+    if (!fields.is_recording && last_) fields.is_recording = last_->is_recording;
     const bool is_recording = fields.is_recording.value_or(false);
-    if (was_recording == is_recording) return;
-    notes_.push_back(is_recording ? fmt::format("the tracker records{}{}",
-                                                fields.slate.empty() ? "" : ", slate ", fields.slate)
-                                  : std::string("the tracker has stopped recording"));
+    if (was_recording == is_recording) return std::nullopt;
+    return LiveTake{is_recording, is_recording ? fields.slate : std::string(), 0};
   }
 
   const double pan_sign_;
@@ -276,7 +275,6 @@ class OpenTrackIoParser : public LiveParser {
   std::optional<TrackFields> last_;
   uint32_t count_ = 0;  // of samples, without beginning anew
   bool has_count_ = false;
-  std::vector<std::string> notes_;
   uint64_t ignored_ = 0;
 };
 

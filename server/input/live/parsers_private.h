@@ -18,6 +18,8 @@ std::unique_ptr<LiveParser> make_freed_parser(size_t axis_order);
 Result<std::unique_ptr<LiveParser>> make_natnet_parser(size_t axis_order, const std::string& version);
 std::unique_ptr<LiveParser> make_vrpn_parser(size_t axis_order);
 std::unique_ptr<LiveParser> make_opentrackio_parser(size_t axis_order);
+std::unique_ptr<LiveParser> make_mvn_parser();
+std::unique_ptr<LiveParser> make_vrchat_parser(const LiveParserConfig& config);
 std::unique_ptr<LiveParser> make_live_link_face_parser(size_t axis_order);
 
 /// Returns the index of a name among `known`; NotFound lists them.

@@ -1,8 +1,9 @@
 // VMC, version 3.1, of a performer: the bones of an avatar, trackers and time as OSC 1.0; and wind in m/s as
 // OSC of our own (`/strandcast/wind fff`). The head is root * hips * spine * chest * upper chest * neck *
-// head, a subject without a name; trackers go by serial number. A zero position is that of a usual body,
-// unless `ignores_zero_positions` is off. VMC has no frames: one ends with the last bone that frames had so
-// far, or before a bone that comes again. A time whose float has steps above 2 ms is not used.
+// head, a subject without a name; `/strandcast/record/start [slate s, take i]` and `/stop` are for
+// recordings, from any sender that may send. Trackers go by serial number. A zero position is that of a usual
+// body, unless `ignores_zero_positions` is off. VMC has no frames: one ends with the last bone that frames
+// had so far, or before a bone that comes again. A time whose float has steps above 2 ms is not used.
 #include <array>
 #include <bit>
 #include <cmath>
@@ -18,6 +19,7 @@
 namespace strandcast {
 namespace {
 
+constexpr std::string_view kRecordAddress = "/strandcast/record/";
 constexpr size_t kNoParent = SIZE_MAX;
 
 /// A bone by its name in Unity and where it is under its parent in a usual body, for senders that tell
@@ -196,6 +198,26 @@ class VmcParser : public LiveParser {
       if (!apply(message, packet)) ++ignored_;
     body_.end_datagram(osc.is_bundle, packet.poses);
     return packet;
+  }
+
+  std::optional<LiveTake> take_of(std::span<const std::byte> bytes) const override {
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    if (text.find(kRecordAddress) == std::string_view::npos) return std::nullopt;
+    const auto osc = read_osc(bytes, limit_bytes_);
+    if (!osc) return std::nullopt;
+    for (const OscMessage& message : osc->messages) {
+      if (!message.address.starts_with(kRecordAddress)) continue;
+      const std::string_view what = message.address.substr(kRecordAddress.size());
+      if (what == "stop") return LiveTake{false, {}, 0};
+      if (what != "start") continue;
+      LiveTake take;
+      OscArguments arguments(message);
+      if (!message.tags.empty()) take.slate = arguments.take_string().value_or("");
+      if (message.tags.size() > 1)
+        take.take = static_cast<uint32_t>(std::max(arguments.take_int().value_or(0), 0));
+      if (arguments.ok()) return take;
+    }
+    return std::nullopt;
   }
 
   uint64_t ignored() const override { return ignored_; }

@@ -6,13 +6,13 @@
 #include <sstream>
 #include <string_view>
 
-#include "client/app/step_speed.h"
 #include "client/app/stop_signal.h"
 #include "client/net/http_get.h"
 #include "common/base/profile.h"
 #include "common/base/quantile.h"
 #include "common/base/text.h"
 #include "common/client/client_token.h"
+#include "common/kernels/step_speed.h"
 #include "tests/tools/load/load_options.h"
 #include "tests/tools/load/load_viewers.h"
 

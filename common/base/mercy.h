@@ -1,0 +1,43 @@
+// What readers of files do with items that they cannot use: leave them out or bridge them, count them, and
+// refuse the file when too little is left. Any thread.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include "common/base/result.h"
+
+namespace strandcast {
+
+/// A file is refused when more than one in this number of its items is bad.
+inline constexpr uint64_t kMostBadShare = 10;
+
+class BadItems {
+ public:
+  void add(Error problem) {
+    if (count_++ == 0) first_ = std::move(problem);
+  }
+  uint64_t count() const { return count_; }
+  /// Returns the first of them; count() is not 0.
+  const Error& first() const { return *first_; }
+  /// Returns the first one's error where more than a tenth of `total` items is bad, or none is good.
+  Status judge(uint64_t total, const char* items) const {
+    if (count_ == 0 || (count_ < total && count_ * kMostBadShare <= total)) return {};
+    return Error(first_->code,
+                 fmt::format("{}; {} of {} {} cannot be used, a tenth at most may be so", first_->message,
+                             count_, total, items),
+                 first_->place);
+  }
+  /// Returns "3 of 40 frames cannot be used, WHAT; the first: PLACE: WHY".
+  std::string sentence(uint64_t total, const char* items, const char* what) const {
+    return fmt::format("{} of {} {} cannot be used, {}; the first: {}", count_, total, items, what,
+                       first_->to_string());
+  }
+
+ private:
+  uint64_t count_ = 0;
+  std::optional<Error> first_;
+};
+
+}  // namespace strandcast

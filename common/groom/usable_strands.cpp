@@ -1,0 +1,95 @@
+#include "common/groom/usable_strands.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "common/base/mercy.h"
+
+namespace strandcast {
+namespace {
+
+bool is_finite(const glm::vec3& point) {
+  return std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z);
+}
+
+}  // namespace
+
+StrandNames::StrandNames(const std::vector<std::string>& texts, size_t strand_count,
+                         const std::string& fallback) {
+  of_strand.assign(strand_count, 0);
+  if (texts.size() != strand_count) {
+    name = {texts.size() == 1 ? texts.front() : fallback};
+    return;
+  }
+  std::unordered_map<std::string, uint32_t> known;
+  for (size_t strand = 0; strand < strand_count; ++strand) {
+    const auto [found, is_new] = known.try_emplace(texts[strand], static_cast<uint32_t>(name.size()));
+    if (is_new) name.push_back(texts[strand]);
+    of_strand[strand] = found->second;
+  }
+}
+
+void keep_strands(Groom& groom, StrandLabels& labels, std::span<const uint8_t> is_kept) {
+  const auto keep = [&](auto& list, const auto& begin_of) {
+    if (list.empty()) return;
+    size_t to = 0;
+    for (size_t strand = 0; strand < is_kept.size(); ++strand)
+      for (size_t i = begin_of(strand); is_kept[strand] != 0 && i < begin_of(strand + 1); ++i)
+        list[to++] = list[i];
+    list.resize(to);
+  };
+  const auto vertices = [&](size_t strand) { return size_t{groom.offset[strand]}; };
+  const auto strands = [](size_t strand) { return strand; };
+  keep(groom.rest_position_m, vertices);
+  keep(groom.pinned, vertices);
+  keep(labels.width, vertices);
+  keep(groom.root_uv, strands);
+  keep(labels.id, strands);
+  keep(labels.group, strands);
+  keep(labels.object, strands);
+  size_t to = 0;
+  uint32_t begin = 0;
+  for (size_t strand = 0; strand < is_kept.size(); ++strand) {
+    const uint32_t end = groom.offset[strand + 1], count = end - std::exchange(begin, end);
+    if (is_kept[strand] == 0) continue;
+    groom.offset[to + 1] = groom.offset[to] + count;
+    ++to;
+  }
+  groom.offset.resize(to + 1);
+}
+
+Result<StatedGroom> with_usable_strands(StatedGroom stated) {
+  Groom& groom = stated.groom;
+  const uint32_t strand_count = groom.strand_count();
+  std::vector<uint8_t> is_kept(strand_count, 1);
+  BadItems broken;
+  size_t empty_count = 0;
+  for (uint32_t strand = 0; strand < strand_count; ++strand) {
+    const auto points =
+        std::span(groom.rest_position_m).subspan(groom.offset[strand], groom.vertex_count(strand));
+    const auto bad = std::find_if_not(points.begin(), points.end(), is_finite);
+    const bool is_broken = bad != points.end();
+    if (is_broken)
+      broken.add(make_error(ErrorCode::BadInput, "strand {} vertex {} has the coordinates {}, {} and {}",
+                            strand, bad - points.begin(), bad->x, bad->y, bad->z));
+    const bool is_empty = !is_broken && (points.size() < kMinVertexCount || !(groom.length_m(strand) > 0.0f));
+    if (is_empty) ++empty_count;
+    if (is_broken || is_empty) is_kept[strand] = 0;
+  }
+  RETURN_IF_ERROR(broken.judge(strand_count, "strands"));
+  if (broken.count() + empty_count == 0) return stated;
+  if (broken.count() + empty_count == strand_count)
+    return make_error(ErrorCode::BadInput, "no strand has {} points and a length", kMinVertexCount);
+  keep_strands(groom, stated.labels, is_kept);
+  if (broken.count() > 0)
+    stated.notes.push_back(broken.sentence(strand_count, "strands", "and are left out"));
+  if (empty_count > 0)
+    stated.notes.push_back(fmt::format("{} strands of fewer than {} points or no length are left out",
+                                       empty_count, kMinVertexCount));
+  return stated;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# Whether a seed is the same run every time, and whether the rules find each planted fault, by its own sentence.
+#   check_vopr.sh PROGRAM
+set -euo pipefail
+vopr=$1
+
+digest_of() {
+  "$vopr" --seed "$1" --simulate 20 | grep -o 'digest [0-9a-f]*'
+}
+
+# finds PLANT SENTENCE
+finds() {
+  local seed output=""
+  for seed in 1 2 3; do
+    output=$("$vopr" --seed "$seed" --plant "$1") || break
+    output=""
+  done
+  if ! grep -qE "^seed [0-9]+: .*$2" <<<"$output"; then
+    tail -n 5 <<<"$output" >&2
+    echo "seeds 1 to 3 do not find the plant $1 by '$2'" >&2
+    exit 1
+  fi
+  if ! grep -q 'again: strandcast-vopr --seed' <<<"$output"; then
+    echo "nothing says how to run the seed again" >&2
+    exit 1
+  fi
+}
+
+first=$(digest_of 5)
+# Some containers forbid what keeps addresses the same.
+if setarch --addr-no-randomize true; then
+  [ "$first" = "$(digest_of 5)" ] || { echo "seed 5 is another run the second time" >&2; exit 1; }
+fi
+[ "$first" != "$(digest_of 6)" ] || { echo "seeds 5 and 6 are one run" >&2; exit 1; }
+
+finds wrong-hash 'has another state'
+finds stays-away 'has seen nothing new for'
+finds done-twice 'twice'
+finds token-in-log 'a token stands in the log'
+finds deaf 'has had no answer for'
+echo "a seed is one run, and every planted fault is found"

@@ -1,0 +1,35 @@
+// System: a server, relays, viewers, feeders and controllers of the product itself, each on a machine of the
+// world of its own, and faults of their links, machines and clocks.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace strandcast::vopr {
+
+/// Faults of a program that the rules must find; each is planted once in a run.
+enum class Plant { None, WrongHash, StaysAway, DoneTwice, TokenInLog, Deaf };
+
+struct RunPlan {
+  uint64_t seed = 1;
+  double simulated_s = 60.0;
+  Plant plant = Plant::None;
+  bool has_faults = true;
+  bool is_shown = false;  // every line, as it comes
+};
+
+struct RunResult {
+  uint64_t digest = 0;  // equal for equal plans
+  double simulated_s = 0.0;
+  uint64_t compared_states = 0;
+  uint64_t answered_changes = 0;
+  uint64_t faults = 0;
+  uint64_t switches = 0;
+  int64_t back_median_ms = 0, back_longest_ms = 0;
+  double back_share_2s = 1.0;  // of those who were disturbed, within kBackNs of the fault's end
+};
+
+/// In a process of its own. A rule that is broken ends the process with 1 and the newest lines.
+RunResult run_system(const RunPlan& plan);
+
+}  // namespace strandcast::vopr
