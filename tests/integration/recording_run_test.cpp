@@ -81,9 +81,10 @@ class RecordedRun : public test::ServerFixture {
   }
   /// The same recording with its messages changed.
   template <class Change>
-  std::filesystem::path altered(const char* name, Change change_message) const {
+  std::filesystem::path altered(const std::filesystem::path& from, const char* name,
+                                Change change_message) const {
     const std::filesystem::path path = folder_.path() / name;
-    const auto reader = RecordingReader::open(path_, RecordedPart::Messages);
+    const auto reader = RecordingReader::open(from);
     auto file = RecordFile::make(path, IfPresent::Refuse);
     EXPECT_TRUE(reader && file);
     (*file)->keep();
@@ -91,6 +92,10 @@ class RecordedRun : public test::ServerFixture {
     change_message(start);
     RecordingWriter writer(**file, start, *(*reader)->asset_frame());
     for (auto item = (*reader)->next(); item && *item; item = (*reader)->next()) {
+      if (const auto* frame = std::get_if<RecordedFrame>(&(*item)->what)) {
+        writer.add((*item)->time_ns, *frame->frame);
+        continue;
+      }
       RecordedMessage message = std::get<RecordedMessage>((*item)->what);
       std::visit([&](auto& one) { change_message(one); }, message);
       writer.add((*item)->time_ns, 0, message);
@@ -162,6 +167,13 @@ TEST_F(RecordedRun, GoesOnFromWhatKeyframesTell) {
     EXPECT_GE(exact_frames, 20) << quality;
     const ReplayResult result = replay(recorded.record->path);
     EXPECT_TRUE(result.is_equal()) << quality << ": " << to_sentence(result);
+
+    const auto without =
+        altered(recorded.record->path, (quality + "_without.mcap").c_str(), [](auto& message) {
+          if constexpr (std::is_same_v<std::decay_t<decltype(message)>, RecordedHandOver>)
+            message.frame_sequence += 100'000;
+        });
+    EXPECT_THAT(replay(without).early_end, HasSubstr("is not in the recording"));
   }
 }
 
@@ -220,7 +232,7 @@ TEST_F(RecordedRun, TellsTheFirstStepThatIsNotAsItWas) {
   if (IsSkipped()) return;
   constexpr uint64_t kTick = 30;
   // A head that is a tenth of a millimetre elsewhere, in one step.
-  const auto moved = altered("moved.mcap", [](auto& message) {
+  const auto moved = altered(path_, "moved.mcap", [](auto& message) {
     if constexpr (std::is_same_v<std::decay_t<decltype(message)>, RecordedStep>)
       if (message.tick == kTick) message.world_from_head.position_m.x += 1e-4;
   });
@@ -230,7 +242,7 @@ TEST_F(RecordedRun, TellsTheFirstStepThatIsNotAsItWas) {
   EXPECT_EQ(result.difference->tick, kTick);
   EXPECT_EQ(result.equal + 1, result.compared);
 
-  const auto elsewhere = altered("elsewhere.mcap", [](auto& message) {
+  const auto elsewhere = altered(path_, "elsewhere.mcap", [](auto& message) {
     if constexpr (std::is_same_v<std::decay_t<decltype(message)>, RecordingStart>) {
       message.sim_device = "gl";
       message.server_version = "0.0.9";
@@ -246,7 +258,7 @@ TEST_F(RecordedRun, TellsTheFirstStepThatIsNotAsItWas) {
   EXPECT_THAT(notes_[0], HasSubstr("recorded by strandcast-server 0.0.9"));
   EXPECT_THAT(notes_[1], HasSubstr("recorded on gl"));
 
-  const auto bald = altered("bald.mcap", [](auto& message) {
+  const auto bald = altered(path_, "bald.mcap", [](auto& message) {
     if constexpr (std::is_same_v<std::decay_t<decltype(message)>, RecordingStart>) {
       auto scene = parse_scene(message.scene_text, "test", {"groom.procedural.strand_count=41"});
       ASSERT_TRUE(scene);
