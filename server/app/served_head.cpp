@@ -124,12 +124,12 @@ LiveDesk::Target ServedHead::live_target() {
   LiveDesk::Target target;
   target.live = config_.scene.live;
   target.inputs = &inputs_;
-  target.listener = {[hub](uint64_t id, const MotionSamples& samples, int64_t arrival_ns) {
-                       hub->tell_motion(id, samples, arrival_ns);
-                     },
-                     [hub](uint64_t id, const WindSamples& samples, int64_t arrival_ns) {
-                       hub->tell_wind(id, samples, arrival_ns);
-                     }};
+  target.listener.on_motion = [hub](uint64_t id, const MotionSamples& samples, int64_t arrival_ns) {
+    hub->tell_motion(id, samples, arrival_ns);
+  };
+  target.listener.on_wind = [hub](uint64_t id, const WindSamples& samples, int64_t arrival_ns) {
+    hub->tell_wind(id, samples, arrival_ns);
+  };
   return target;
 }
 
