@@ -19,7 +19,8 @@ struct HashingViewer {
 
   void listen() {
     session->set_snapshot_listener([this](const auto& snapshot) {
-      hashes.add({snapshot->tick, session->replay().stream_id()}, state_hash(*snapshot));
+      const StrandReplay& replay = session->replay();
+      hashes.add({snapshot->tick, replay.stream_id(), replay.sequence()}, state_hash(*snapshot));
     });
   }
 };

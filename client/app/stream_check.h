@@ -14,13 +14,15 @@
 
 namespace strandcast {
 
-/// State hashes of the newest ticks that a viewer decoded, at most `limit`. A tick has a state per stream;
-/// they are within the same bound, but differ in their numbers.
+/// State hashes of the newest ticks that a viewer decoded, at most `limit`. A tick has a state per stream,
+/// and one more where a keyframe for a joiner tells it again; they are within the same bound, but differ in
+/// their numbers.
 class TickHashes {
  public:
   struct Key {
     uint64_t tick = 0;
     uint16_t stream_id = 0;
+    uint32_t sequence = 0;  // of the frame in its stream
     auto operator<=>(const Key&) const = default;
   };
 

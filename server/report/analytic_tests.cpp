@@ -13,7 +13,7 @@
 namespace strandcast {
 namespace {
 
-constexpr double kLengthM = 0.3;
+constexpr double kAnalyticLengthM = 0.3;
 constexpr double kGravityMps2 = 9.81;
 // Enough for a hair of 0.3 m to come to rest within kSettlingS: its slowest mode decays by omega^2 / drag > 2
 // / s.
@@ -80,13 +80,13 @@ AnalyticResult run_cantilever(const Workbench& workbench, const RunSetting& sett
   const auto shape = std::find_if(shapes.begin(), shapes.end(),
                                   [&](const CantileverShape& candidate) { return candidate.gamma == gamma; });
   RunPhysics physics;
-  physics.length_m = kLengthM;
-  physics.hair = hair_with(kGravityMps2 * std::pow(kLengthM, 3) / gamma);
+  physics.length_m = kAnalyticLengthM;
+  physics.hair = hair_with(kGravityMps2 * std::pow(kAnalyticLengthM, 3) / gamma);
   physics.given = {{"air_drag_per_s", kSettlingDragPerS}};
   auto strand = make_straight(workbench, setting, physics, kSideways);
   if (!strand) return failed(strand.error());
   settle(*strand, kGravityMps2 * kDown, kSettlingS);
-  const glm::dvec3 tip = strand->vertex(strand->vertex_count() - 1) / kLengthM;
+  const glm::dvec3 tip = strand->vertex(strand->vertex_count() - 1) / kAnalyticLengthM;
   AnalyticResult result;
   result.value = -tip.y / tip.x;
   result.exact = shape->height_over_width();
@@ -103,14 +103,14 @@ AnalyticResult run_end_load(const Workbench& workbench, const RunSetting& settin
   const auto exact = std::find_if(tips.begin(), tips.end(),
                                   [&](const EndLoadTip& candidate) { return candidate.alpha == alpha; });
   RunPhysics physics;
-  physics.length_m = kLengthM;
-  physics.hair = hair_with(kBeadPerHair * kGravityMps2 * std::pow(kLengthM, 3) / alpha);
-  const double bead_kg = kBeadPerHair * physics.hair.linear_density_kgpm() * kLengthM;
+  physics.length_m = kAnalyticLengthM;
+  physics.hair = hair_with(kBeadPerHair * kGravityMps2 * std::pow(kAnalyticLengthM, 3) / alpha);
+  const double bead_kg = kBeadPerHair * physics.hair.linear_density_kgpm() * kAnalyticLengthM;
   physics.given = {{"air_drag_per_s", kSettlingDragPerS}, {kBeadName, bead_kg}};
   auto strand = make_straight(workbench, setting, physics, kSideways);
   if (!strand) return failed(strand.error());
   settle(*strand, kGravityMps2 * kDown, 2.0 * kSettlingS);
-  const glm::dvec3 tip = strand->vertex(strand->vertex_count() - 1) / kLengthM;
+  const glm::dvec3 tip = strand->vertex(strand->vertex_count() - 1) / kAnalyticLengthM;
   AnalyticResult result;
   result.value = -tip.y;
   result.exact = exact->y;
@@ -125,14 +125,14 @@ AnalyticResult run_roll_up(const Workbench& workbench, const RunSetting& setting
   // Stiff enough for its slowest mode to decay within the time: omega = 3.516 sqrt(b) / L^2 = 15 / s.
   constexpr double kStiffness = 0.15;
   const uint32_t n = setting.vertex_count;
-  const double radius_m = kLengthM / (2.0 * std::numbers::pi);
+  const double radius_m = kAnalyticLengthM / (2.0 * std::numbers::pi);
   std::vector<glm::dvec3> circle;
   for (uint32_t i = 0; i < n; ++i) {
     const double angle = 2.0 * std::numbers::pi * i / (n - 1);
     circle.push_back(radius_m * glm::dvec3(std::sin(angle), std::cos(angle) - 1.0, 0.0));
   }
   RunPhysics physics;
-  physics.length_m = kLengthM;
+  physics.length_m = kAnalyticLengthM;
   physics.hair = hair_with(kStiffness);
   physics.given = {{"air_drag_per_s", kSettlingDragPerS}};
   auto strand = TestStrand::make(workbench, setting, physics, groom_of({circle}, Pinning::Root));
@@ -143,7 +143,7 @@ AnalyticResult run_roll_up(const Workbench& workbench, const RunSetting& setting
   strand->run().write(state);
   settle(*strand, glm::dvec3(0.0), kSettlingS);
   AnalyticResult result;
-  result.value = result.error = glm::length(strand->vertex(n - 1)) / kLengthM;
+  result.value = result.error = glm::length(strand->vertex(n - 1)) / kAnalyticLengthM;
   result.exact = 0.0;
   result.stretch = strand->stretch();
   return result;
@@ -167,8 +167,8 @@ void displace(StrandRun& run, const glm::dvec3& axis, double amplitude,
   SolverState state = run.state();
   const size_t n = state.position_m.size();
   for (size_t i = 1; i < n; ++i)
-    state.position_m[i] +=
-        glm::vec3(axis * (amplitude * kLengthM * mode(static_cast<double>(i) / static_cast<double>(n - 1))));
+    state.position_m[i] += glm::vec3(
+        axis * (amplitude * kAnalyticLengthM * mode(static_cast<double>(i) / static_cast<double>(n - 1))));
   run.write(state);
 }
 
@@ -188,11 +188,11 @@ AnalyticResult run_heavy_chain(const Workbench& workbench, const RunSetting& set
   constexpr std::ptrdiff_t kStartSteps = 10;
   const auto mode = [](double s) { return chain_mode(s, 1); };
   RunPhysics physics;
-  physics.length_m = kLengthM;
+  physics.length_m = kAnalyticLengthM;
   auto strand = make_straight(workbench, setting, physics, kDown);
   if (!strand) return failed(strand.error());
   displace(strand->run(), kSideways, kAmplitude, mode);
-  const double omega = chain_frequency_radps(kLengthM, kGravityMps2, 1);
+  const double omega = chain_frequency_radps(kAnalyticLengthM, kGravityMps2, 1);
   const double exact_s = 2.0 * std::numbers::pi / omega;
   StepInput input;
   input.gravity_mps2 = kGravityMps2 * kDown;
@@ -223,10 +223,11 @@ AnalyticResult run_beam(const Workbench& workbench, const RunSetting& setting) {
   constexpr double kPeriods = 2.7;
   constexpr double kLoadMps2 = 0.01;
   constexpr double kFirstSwingPeriods = 0.7;  // the first maximum is at 0.49
-  const double b = std::pow(2.0 * std::numbers::pi / kPeriodS / kBeamBetaSquared, 2) * std::pow(kLengthM, 4);
-  const double static_m = kLoadMps2 * std::pow(kLengthM, 4) / (8.0 * b);
+  const double b =
+      std::pow(2.0 * std::numbers::pi / kPeriodS / kBeamBetaSquared, 2) * std::pow(kAnalyticLengthM, 4);
+  const double static_m = kLoadMps2 * std::pow(kAnalyticLengthM, 4) / (8.0 * b);
   RunPhysics physics;
-  physics.length_m = kLengthM;
+  physics.length_m = kAnalyticLengthM;
   physics.hair = hair_with(b);
   auto strand = make_straight(workbench, setting, physics, kSideways);
   if (!strand) return failed(strand.error());
@@ -262,7 +263,7 @@ AnalyticResult run_catenary(const Workbench& workbench, const RunSetting& settin
   constexpr double kSpan = 0.5;
   const uint32_t n = setting.vertex_count;
   const uint32_t segments = n - 3;  // between the inner held vertices; the outer ones only hold
-  const double segment_m = kLengthM / segments;
+  const double segment_m = kAnalyticLengthM / segments;
   // Equal chords of a circle: d = l sin(m a / 2) / sin(a / 2).
   double low = 0.0;
   double high = 2.0 * std::numbers::pi / segments;
@@ -270,8 +271,8 @@ AnalyticResult run_catenary(const Workbench& workbench, const RunSetting& settin
     const double turn = 0.5 * (low + high);
     (std::sin(0.5 * segments * turn) / std::sin(0.5 * turn) > kSpan * segments ? low : high) = turn;
   }
-  std::vector<glm::dvec3> points = {{-0.5 * kSpan * kLengthM, segment_m, 0.0}};
-  glm::dvec3 point(-0.5 * kSpan * kLengthM, 0.0, 0.0);
+  std::vector<glm::dvec3> points = {{-0.5 * kSpan * kAnalyticLengthM, segment_m, 0.0}};
+  glm::dvec3 point(-0.5 * kSpan * kAnalyticLengthM, 0.0, 0.0);
   for (uint32_t i = 0; i <= segments; ++i) {
     points.push_back(point);
     const double angle = low * (i + 0.5 - 0.5 * segments);
@@ -286,7 +287,7 @@ AnalyticResult run_catenary(const Workbench& workbench, const RunSetting& settin
   settle(*strand, kGravityMps2 * kDown, kSettlingS);
   AnalyticResult result;
   const double depth_m = -0.5 * (strand->vertex((n - 1) / 2).y + strand->vertex(n / 2).y);
-  result.value = result.droop = depth_m / kLengthM;
+  result.value = result.droop = depth_m / kAnalyticLengthM;
   result.exact = catenary_sag(kSpan);
   result.error = std::abs(result.value / result.exact - 1.0);
   result.stretch = strand->stretch();
@@ -300,13 +301,13 @@ AnalyticResult run_tractrix(const Workbench& workbench, const RunSetting& settin
   RunSetting two = setting;
   two.vertex_count = 2;
   RunPhysics physics;
-  physics.length_m = kLengthM;
+  physics.length_m = kAnalyticLengthM;
   auto strand = make_straight(workbench, two, physics, {0.0, 0.0, 1.0});
   if (!strand) return failed(strand.error());
   StepInput input;
   input.gravity_mps2 = glm::dvec3(0.0);
   const auto steps = static_cast<int>(std::lround(setting.rate_hz));
-  input.head_shift_m = kSideways * (kWay * kLengthM / steps);
+  input.head_shift_m = kSideways * (kWay * kAnalyticLengthM / steps);
   for (int step = 0; step < steps; ++step) {
     strand->step(input);
     SolverState state = strand->run().state();
@@ -314,7 +315,7 @@ AnalyticResult run_tractrix(const Workbench& workbench, const RunSetting& settin
     strand->run().write(state);
   }
   const glm::dvec2 exact = tractrix_end(kWay);
-  const glm::dvec3 end = strand->vertex(1) / kLengthM + glm::dvec3(kWay, 0.0, 0.0);
+  const glm::dvec3 end = strand->vertex(1) / kAnalyticLengthM + glm::dvec3(kWay, 0.0, 0.0);
   AnalyticResult result;
   result.value = end.x;
   result.exact = exact.x;
@@ -328,9 +329,9 @@ Result<double> growth_of_upright(const Workbench& workbench, const RunSetting& s
                                  double& stretch) {
   constexpr double kAmplitude = 1e-3;
   constexpr double kTimeS = 1.0;
-  const double b = kGravityMps2 * std::pow(kLengthM, 3) / gamma;
+  const double b = kGravityMps2 * std::pow(kAnalyticLengthM, 3) / gamma;
   RunPhysics physics;
-  physics.length_m = kLengthM;
+  physics.length_m = kAnalyticLengthM;
   physics.hair = hair_with(b);
   ASSIGN_OR_RETURN(TestStrand strand, make_straight(workbench, setting, physics, -kDown));
   displace(strand.run(), kSideways, kAmplitude, beam_mode);
@@ -342,7 +343,7 @@ Result<double> growth_of_upright(const Workbench& workbench, const RunSetting& s
     q.push_back(project(strand.run().state(), kSideways, beam_mode));
   }
   stretch = std::max(stretch, strand.stretch());
-  const double free_radps = beam_frequency_radps(kLengthM, b);
+  const double free_radps = beam_frequency_radps(kAnalyticLengthM, b);
   return swing_growth_per_s2(q, 1.0 / setting.rate_hz) / (free_radps * free_radps);
 }
 

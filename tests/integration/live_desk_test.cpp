@@ -26,7 +26,8 @@ class LiveDesks : public testing::Test {
  protected:
   [[nodiscard]] bool open(const LiveDesc& live, const std::vector<AddressRange>& allowed = {}) {
     std::vector<LiveDesk::Target> targets(1);
-    targets[0] = {{live}, &hub_, {[this](uint64_t, const MotionSamples&, int64_t) { ++told_; }, nullptr}};
+    targets[0] = {
+        {live}, &hub_, {[this](uint64_t, const MotionSamples&, int64_t) { ++told_; }, nullptr, nullptr}};
     auto desk = LiveDesk::open(std::move(targets), allowed);
     EXPECT_TRUE(desk) << desk.error().to_string();
     if (!desk) return false;

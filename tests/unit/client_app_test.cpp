@@ -93,6 +93,7 @@ TEST(TickHashes, KeepTheNewestAlsoWhenTicksBeginAgain) {
   EXPECT_EQ(hashes.hash_by_key().size(), 3u);
   EXPECT_FALSE(hashes.find({101, 0}));
   EXPECT_FALSE(hashes.find({102, 1})) << "another stream";
+  EXPECT_FALSE(hashes.find({102, 0, 1})) << "told again to a joiner";
   EXPECT_EQ(hashes.find({102, 0}), 109u);
   EXPECT_EQ(hashes.find({1, 0}), 9u) << "again: the newer counts";
 }

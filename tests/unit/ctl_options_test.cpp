@@ -13,7 +13,7 @@ inline void tell(FieldTexts& told, const std::string& where, const CtlTarget& al
   OPTION_FIELDS(all, connect, token, token_file, is_tls, tls_authorities, stop, head);
 }
 inline void tell(FieldTexts& told, const std::string& where, const MotionFileOptions& all) {
-  OPTION_FIELDS(all, unit_m, up, joint, has_body, body_joints, is_filtering_glitches,
+  OPTION_FIELDS(all, unit_m, up, joint, fps, has_body, body_joints, is_filtering_glitches,
                 is_keeping_first_frames);
 }
 inline void tell(FieldTexts& told, const std::string& where, const FeedOptions& all) {

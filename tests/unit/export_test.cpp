@@ -283,7 +283,6 @@ TEST(Export, FilesBeginAtTheirFrameOfTimecode) {
   }
 }
 
-// Its states are not known beforehand: one of them says what it counts.
 TEST(Export, AnExportOfARunningServerBeginsAtAFrameOfItsTimecode) {
   const TemporaryFolder folder;
   ExportOptions options;
@@ -303,8 +302,7 @@ TEST(Export, AnExportOfARunningServerBeginsAtAFrameOfItsTimecode) {
   EXPECT_EQ(whole->first_timecode, "01:02:03:05") << "the first whole frame";
   EXPECT_NEAR(whole->first_s, 0.75 / rate.hz(), 1e-8);
   EXPECT_EQ(whole->frame_count, 24u) << "as of a recording of the same states";
-  EXPECT_EQ(rows_of(options.path)[0][0] + 1, (3600 + 2 * 60 + 3) * 24 + 5)
-      << "the rest shape stands before it";
+  EXPECT_EQ(rows_of(options.path)[0][0] + 1, (3600 + 2 * 60 + 3) * 24 + 5) << "the rest shape is before";
   const auto range = run("01:02:03:10", "01:02:03:15");
   ASSERT_TRUE(range) << range.error().to_string();
   EXPECT_EQ(range->frame_count, 6u);
@@ -643,8 +641,7 @@ TEST(Export, WhatTheHairsFileSaysComesBackInItsOrder) {
       EXPECT_EQ(placed->labels.id[place], origin->id[strand]);
       EXPECT_EQ(placed->labels.group[place], origin->group[strand]);
       EXPECT_EQ(placed->labels.object_name[placed->labels.object[place]],
-                origin->object_name[origin->object[strand]])
-          << extension;
+                origin->object_name[origin->object[strand]]);
       EXPECT_LT(glm::distance(placed->groom.root_uv[place], origin->root_uv[strand]), 1e-5f);
       for (uint32_t vertex = 0; vertex < kVertices; ++vertex) {
         EXPECT_NEAR(placed->labels.width[place * kVertices + vertex], width_m_of(strand, vertex), 1e-9f);

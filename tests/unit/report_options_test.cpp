@@ -12,7 +12,7 @@ inline void tell(FieldTexts& told, const std::string& where, const ExecutorConfi
   OPTION_FIELDS(all, sim_device, gl_device, shader_folder);
 }
 inline void tell(FieldTexts& told, const std::string& where, const MotionFileOptions& all) {
-  OPTION_FIELDS(all, unit_m, up, joint, has_body, body_joints, is_filtering_glitches,
+  OPTION_FIELDS(all, unit_m, up, joint, fps, has_body, body_joints, is_filtering_glitches,
                 is_keeping_first_frames);
 }
 inline void tell(FieldTexts& told, const std::string& where, const RenderSize& all) {

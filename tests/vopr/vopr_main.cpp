@@ -88,8 +88,7 @@ std::optional<Options> parse(int count, char** words) {
 void hold_still(char** words) {
   const int persona = personality(0xffffffff);
   if ((persona & ADDR_NO_RANDOMIZE) == 0) {
-    if (personality(persona | ADDR_NO_RANDOMIZE) != -1)
-      execv("/proc/self/exe", words);
+    if (personality(persona | ADDR_NO_RANDOMIZE) != -1) execv("/proc/self/exe", words);
     std::fputs("addresses differ from run to run here, so a seed may be another run\n", stderr);
   }
   cpu_set_t one;

@@ -43,6 +43,13 @@ async function picture(tab, name) {
   await tab.evaluate('for (const card of document.querySelectorAll(".card, #warnings")) card.style.visibility = "hidden"');
   return readPng(await tab.screenshot(shots && path.join(shots, `${name}.png`)));
 }
+/** What the page says of a dropped file; that it stays. */
+const drop = (tab, name) => tab.evaluate(`(() => {
+  const dataTransfer = new DataTransfer();
+  dataTransfer.items.add(new File(['x'], '${name}'));
+  const goes = (type) => dispatchEvent(new DragEvent(type, { dataTransfer, cancelable: true }));
+  return [goes('dragover'), goes('drop'), document.getElementById('warnings').lastElementChild?.textContent];
+})()`);
 /** Gives a delta of the page another hash. Returns how many frames stand before it. */
 function damage(page, delta) {
   const html = fs.readFileSync(page, 'utf8');
@@ -62,6 +69,7 @@ await runAll({
     ctl('--connect', `127.0.0.1:${server.port}`, 'step', '90');
     const served = await browser.open(`${server.url}#mode=strands&view-only`, SIZE);
     await served.until((now) => now.mode === 'strands', 'strands');
+    assert.deepEqual(await drop(served, 'a.ply'), [false, false, 'a.ply is hair: strandcast-server --groom a.ply serves it.']);
     const expected = await picture(served, 'served');
     await served.close();
     await server.end();
@@ -73,6 +81,7 @@ await runAll({
     console.log(`  ${alike.toFixed(1)} dB, at least ${LEAST_DB}`);
     assert.ok(alike >= LEAST_DB, `${alike} dB`);
     assert.deepEqual([end.codec, end.wrong, end.error], ['step', 0, '']);
+    assert.deepEqual(await drop(tab, 'a.txt'), [false, false, 'a.txt is neither hair nor motion.']);
     await tab.press('Home');
     await tab.until((now) => now.timeMs === 0, 'the begin');
     assert.ok(psnr(expected, await picture(tab, 'begin')) < LEAST_DB, 'another state looks otherwise');

@@ -5,6 +5,7 @@ import { timecodeText } from './clock';
 import { compileCore } from './core';
 import type { Asked, Camera, DrawFigures, FromDraw, FromNet, NetFigures, ToDraw, ToNet } from './messages';
 import { element } from './ui/element';
+import { followFiles } from './ui/files';
 import { Hud, Row, Warnings } from './ui/hud';
 import type { SocketStart } from './socket';
 import { TAPE_URL, type TapePlace, type ToTape } from './tape';
@@ -489,6 +490,7 @@ class Viewer {
       },
     };
     followPointers(stage, moves);
+    followFiles(bundle !== undefined, (text) => warnings.say(text, true));
     const view = at<HTMLSelectElement>('view');
     view.append(new Option('own', ''));
     presets.forEach((preset, i) => view.append(new Option(preset.name, String(i))));

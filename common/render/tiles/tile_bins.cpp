@@ -14,6 +14,9 @@ struct TileRange {
 };
 
 constexpr uint32_t kPartsPerWorker = 4;
+// Instead of the only tile that a segment touches.
+constexpr uint32_t kNoTile = 0xffffffffu;
+constexpr uint32_t kSeveralTiles = 0xfffffffeu;
 constexpr float kPerTile = 1.0f / static_cast<float>(kTilePx);
 
 /// Towards minus infinity, of values that fit.
@@ -72,7 +75,8 @@ bool visit_tiles(const StrandPoint& a, const StrandPoint& b, const TileGrid& gri
 }  // namespace
 
 uint64_t TileBins::size_bytes() const {
-  return segments_.size_bytes() + boxes_.size_bytes() + counts_.capacity() * sizeof(uint32_t);
+  return segments_.size_bytes() + boxes_.size_bytes() +
+         (counts_.capacity() + only_tile_.capacity()) * sizeof(uint32_t);
 }
 
 BinCounts TileBins::bin_segments(const StrandPoints& points, const TileGrid& grid, float near_m,
@@ -97,6 +101,7 @@ BinCounts TileBins::bin_segments(const StrandPoints& points, const TileGrid& gri
       }
     });
   };
+  only_tile_.resize(points.point.size());
   uint32_t drawn = strands;
   size_t pairs = 0;
   for (;;) {
@@ -106,7 +111,14 @@ BinCounts TileBins::bin_segments(const StrandPoints& points, const TileGrid& gri
       const StrandPoint& a = points.point[i];
       const StrandPoint& b = points.point[i + 1];
       uint32_t* const counts = counts_.data() + size_t{tiles} * part;
-      if (visit_tiles(a, b, grid, near_m, [&](uint32_t tile) { ++counts[tile]; }))
+      uint32_t only = kNoTile;
+      const auto count = [&](uint32_t tile) {
+        ++counts[tile];
+        only = only == kNoTile ? tile : kSeveralTiles;
+      };
+      const bool is_seen = visit_tiles(a, b, grid, near_m, count);
+      only_tile_[i] = only;
+      if (is_seen)
         ++counted[part].segments;
       else if (!(std::isfinite(a.x + b.x) && std::isfinite(a.y + b.y) && std::isfinite(a.z + b.z)))
         ++counted[part].not_finite;
@@ -130,10 +142,14 @@ BinCounts TileBins::bin_segments(const StrandPoints& points, const TileGrid& gri
   segments_.first[tiles] = next;
   segments_.item.resize(next);
   in_parts(drawn, [&](uint32_t part, uint32_t i) {
+    const uint32_t only = only_tile_[i];
+    if (only == kNoTile) return;
     uint32_t* const places = counts_.data() + size_t{tiles} * part;
-    visit_tiles(points.point[i], points.point[i + 1], grid, near_m, [&](uint32_t tile) {
+    const auto put = [&](uint32_t tile) {
       segments_.item[places[tile]++] = {points.point[i].z + points.point[i + 1].z, i};
-    });
+    };
+    if (only != kSeveralTiles) return put(only);
+    visit_tiles(points.point[i], points.point[i + 1], grid, near_m, put);
   });
   BinCounts sum;
   for (const BinCounts& counts : counted) {

@@ -58,7 +58,8 @@ class TileBins {
  private:
   TileLists<TileSegment> segments_;
   TileLists<uint32_t> boxes_;
-  std::vector<uint32_t> counts_;  // (part x tile)
+  std::vector<uint32_t> counts_;     // (part x tile)
+  std::vector<uint32_t> only_tile_;  // of the segment from each point
 };
 
 }  // namespace strandcast

@@ -37,12 +37,9 @@ struct TilePixels {
 struct TileHead {
   simd::Float depth[kBlocks];  // m, nearest
   simd::Float seen[kBlocks];   // share of the pixel that is head and has no strand in front of it yet
-  simd::Float red[kBlocks];
-  simd::Float green[kBlocks];
-  simd::Float blue[kBlocks];
-  float hides[kBlocks];  // m: nothing of what lies wholly beyond this is seen in the block
-  float hides_all;       // likewise in the whole tile
-  float end;             // m: behind all that is head in the tile
+  float hides[kBlocks];        // m: nothing of what lies wholly beyond this is seen in the block
+  float hides_all;             // likewise in the whole tile
+  float end;                   // m: behind all that is head in the tile
 };
 inline constexpr float kNothingHidden = 1e30f;
 
@@ -94,10 +91,12 @@ struct SegmentBatch {
   Row base, slope, peak;  // of the filter, per width
   Row width, width_step;
   Row depth, depth_step;
-  Row low_x, high_x, low_y, high_y;  // of middles of pixels that can be covered
-  Row x_per_y, x_at_top, room;       // of the line, and of what it covers to both sides of it in a row
-  float value[simd::kLanes][8];      // at the first end
-  float step[simd::kLanes][8];       // from there to the second
+  Row low_y, high_y;  // of middles of pixels that can be covered
+  // Of columns of blocks: where what the line covers begins and ends in the first row of blocks, how far from
+  // row to row, and where it begins and ends in all.
+  Row first, last, per_row, lowest, highest;
+  float value[simd::kLanes][8];  // at the first end
+  float step[simd::kLanes][8];   // from there to the second
 };
 
 /// Returns the slant of a mitre along a segment, per distance from it.
@@ -190,8 +189,6 @@ STRANDCAST_LANES void place_segments(const StrandPoint* points, const uint64_t* 
   constexpr float kSlack = 1e-3f;
   const Float aside_x = min(reach * abs(uy) + beyond * abs(ux), reach) + kSlack;
   const Float aside_y = min(reach * abs(ux) + beyond * abs(uy), reach) + kSlack;
-  store_lanes(min(ax, bx) - aside_x, out.low_x);
-  store_lanes(max(ax, bx) + aside_x, out.high_x);
   store_lanes(min(ay, by) - aside_y, out.low_y);
   store_lanes(max(ay, by) + aside_y, out.high_y);
   // Of a line that is not level the pixels of a row lie close around it.
@@ -200,9 +197,17 @@ STRANDCAST_LANES void place_segments(const StrandPoint* points, const uint64_t* 
   const Float steepness = abs(uy);
   const Bool is_level = steepness < kLevel;
   const Float x_per_y = select(is_level, 0.0f, dx / select(is_level, 1.0f, dy));
-  store_lanes(x_per_y, out.x_per_y);
-  store_lanes(ax - ay * x_per_y, out.x_at_top);
-  store_lanes(select(is_level, kWholeTile, reach / max(steepness, kLevel) + kSlack), out.room);
+  const Float room = select(is_level, kWholeTile, reach / max(steepness, kLevel) + kSlack);
+  // From the middles of the first row of pixels in a block to those of the last.
+  const Float x_first = ax + (0.5f - ay) * x_per_y;
+  const Float x_last = x_first + static_cast<float>(kBlockRows - 1) * x_per_y;
+  constexpr float kPerColumn = 1.0f / static_cast<float>(kBlockColumns);
+  store_lanes((min(x_first, x_last) - room + 0.5f) * kPerColumn, out.first);
+  store_lanes((max(x_first, x_last) + room - 0.5f) * kPerColumn, out.last);
+  store_lanes(x_per_y * (kPerColumn * static_cast<float>(kBlockRows)), out.per_row);
+  store_lanes(max((min(ax, bx) - aside_x + 0.5f) * kPerColumn, 0.0f), out.lowest);
+  store_lanes(min((max(ax, bx) + aside_x - 0.5f) * kPerColumn, static_cast<float>(kBlocksAcross - 1)),
+              out.highest);
 }
 
 /// Returns the first block whose last pixel centre is at or above `low`, for blocks of `side` pixels.
@@ -232,12 +237,13 @@ STRANDCAST_LANES void blend_segment(const SegmentBatch& s, uint32_t i, TileHead*
   const int y1 = last_block(s.high_y[i], kBlockRows, kBlocksDown);
   for (int y = first_block(s.low_y[i], kBlockRows); y <= y1; ++y) {
     const auto top = static_cast<float>(y * kBlockRows);
-    const float x_first = s.x_at_top[i] + (top + 0.5f) * s.x_per_y[i];
-    const float x_last = x_first + static_cast<float>(kBlockRows - 1) * s.x_per_y[i];
-    const float from = std::max(s.low_x[i], std::min(x_first, x_last) - s.room[i]);
-    const float to = std::min(s.high_x[i], std::max(x_first, x_last) + s.room[i]);
-    const int x0 = first_block(std::min(from, static_cast<float>(kTileSidePx)), kBlockColumns);
-    const int x1 = last_block(to, kBlockColumns, kBlocksAcross);
+    const float moved = static_cast<float>(y) * s.per_row[i];
+    const float from = std::max(s.lowest[i], s.first[i] + moved);
+    const float to = std::min(s.highest[i], s.last[i] + moved);
+    // Also where one is no number.
+    if (!(to >= 0.0f && from < static_cast<float>(kBlocksAcross))) continue;
+    const auto x0 = static_cast<int>(from);
+    const auto x1 = static_cast<int>(to);
     if (x0 > x1) continue;
     uint32_t left = pixels.open[y] & (~0u << x0) & (~0u >> (31 - x1));
     if (left == 0) continue;

@@ -27,24 +27,30 @@ constexpr uint32_t kNoTriangle = 0xffffffffu;
 
 // ---- the head
 
-STRANDCAST_LANES bool draw_head(const TileInput& in, uint32_t tile, TileHead& out) {
+constexpr int kHeadSidePx = kTileSidePx * kHeadSamples;
+constexpr int kHeadRowBlocks = kHeadSidePx / kBlockColumns;
+constexpr int kHeadBlocks = kHeadRowBlocks * (kHeadSidePx / kBlockRows);
+constexpr float kHeadStep = 1.0f / kHeadSamples;
+
+/// What the head's samples in a tile see.
+struct HeadSamples {
+  Float depth[kHeadBlocks];
+  simd::UintBits which[kHeadBlocks];  // triangle
+};
+
+/// Returns false where no triangle is near the tile.
+STRANDCAST_LANES bool sample_head(const TileInput& in, uint32_t tile, HeadSamples& samples) {
   const TileLists<uint32_t>& lists = in.bins->boxes();
   const uint32_t begin = lists.first[tile];
   const uint32_t end = lists.first[tile + 1];
   if (begin == end) return false;
   const HeadPicture& head = *in.head;
-  constexpr int kSide = kTileSidePx * kHeadSamples;
-  constexpr int kRowBlocks = kSide / kBlockColumns;
-  constexpr int kSampleBlocks = kRowBlocks * (kSide / kBlockRows);
-  Float depth[kSampleBlocks];
-  simd::UintBits which[kSampleBlocks];
-  for (int i = 0; i < kSampleBlocks; ++i) {
-    depth[i] = kFarDepth;
-    which[i] = simd::UintBits{} + kNoTriangle;
+  for (int i = 0; i < kHeadBlocks; ++i) {
+    samples.depth[i] = kFarDepth;
+    samples.which[i] = simd::UintBits{} + kNoTriangle;
   }
   const auto tile_x = static_cast<float>(tile % in.grid.columns() * kTilePx);
   const auto tile_y = static_cast<float>(tile / in.grid.columns() * kTilePx);
-  constexpr float kStep = 1.0f / kHeadSamples;
   for (uint32_t j = begin; j < end; ++j) {
     const uint32_t triangle = lists.item[j];
     const glm::uvec3& corner = head.mesh->triangle[triangle];
@@ -57,122 +63,150 @@ STRANDCAST_LANES bool draw_head(const TileInput& in, uint32_t tile, TileHead& ou
     const glm::vec4& box = head.box[triangle];
     const int x0 = std::max(0, static_cast<int>((box.x - tile_x) * kHeadSamples) / kBlockColumns);
     const int x1 =
-        std::min(kRowBlocks - 1, static_cast<int>((box.z - tile_x) * kHeadSamples) / kBlockColumns);
+        std::min(kHeadRowBlocks - 1, static_cast<int>((box.z - tile_x) * kHeadSamples) / kBlockColumns);
     const int y0 = std::max(0, static_cast<int>((box.y - tile_y) * kHeadSamples) / kBlockRows);
-    const int y1 =
-        std::min(kSide / kBlockRows - 1, static_cast<int>((box.w - tile_y) * kHeadSamples) / kBlockRows);
+    const int y1 = std::min(kHeadSidePx / kBlockRows - 1,
+                            static_cast<int>((box.w - tile_y) * kHeadSamples) / kBlockRows);
     for (int y = y0; y <= y1; ++y)
       for (int x = x0; x <= x1; ++x) {
-        const Float px = Float(tile_x) + (block_columns() + static_cast<float>(x * kBlockColumns)) * kStep;
-        const Float py = Float(tile_y) + (block_rows() + static_cast<float>(y * kBlockRows)) * kStep;
+        const Float px =
+            Float(tile_x) + (block_columns() + static_cast<float>(x * kBlockColumns)) * kHeadStep;
+        const Float py = Float(tile_y) + (block_rows() + static_cast<float>(y * kBlockRows)) * kHeadStep;
         // The other way round an edge gives the same number with the other sign: neighbours leave no gap.
         const Float w0 = ((b.x - px) * (c.y - py) - (b.y - py) * (c.x - px)) * per_area;
         const Float w1 = ((c.x - px) * (a.y - py) - (c.y - py) * (a.x - px)) * per_area;
         const Float w2 = ((a.x - px) * (b.y - py) - (a.y - py) * (b.x - px)) * per_area;
         const Bool is_inside = w0 >= 0.0f && w1 >= 0.0f && w2 >= 0.0f;
         if (!is_any(is_inside)) continue;
-        const int block = y * kRowBlocks + x;
+        const int block = y * kHeadRowBlocks + x;
         const Float z = 1.0f / (w0 * a.w + w1 * b.w + w2 * c.w);
-        const Bool is_nearest = is_inside && z < depth[block];
-        depth[block] = select(is_nearest, z, depth[block]);
-        which[block] = is_nearest.v ? simd::UintBits{} + triangle : which[block];
+        const Bool is_nearest = is_inside && z < samples.depth[block];
+        samples.depth[block] = select(is_nearest, z, samples.depth[block]);
+        samples.which[block] = is_nearest.v ? simd::UintBits{} + triangle : samples.which[block];
       }
   }
+  return true;
+}
 
-  // A pixel has the light of its first covered sample, and covers what its samples do.
-  const ShadeInput& shade = *in.shade;
-  const law::HairLights lights = hair_lights(shade.look, shade.lights);
-  const auto* const depths = reinterpret_cast<const float*>(depth);
-  const auto* const triangles = reinterpret_cast<const uint32_t*>(which);
+/// Returns where the first sample of a pixel lies among those of the tile. All of a pixel lie in one block.
+STRANDCAST_LANES int first_sample(int x, int y) {
+  static_assert(kBlockColumns % kHeadSamples == 0 && kBlockRows % kHeadSamples == 0);
+  const int sample_x = x * kHeadSamples;
+  const int sample_y = y * kHeadSamples;
+  return (sample_y / kBlockRows * kHeadRowBlocks + sample_x / kBlockColumns) * static_cast<int>(kLanes) +
+         sample_y % kBlockRows * kBlockColumns + sample_x % kBlockColumns;
+}
+
+/// How far the head is from pixels and how much of each it covers; false where it covers nothing.
+STRANDCAST_LANES bool cover_by_head(const HeadSamples& samples, TileHead& out) {
+  const auto* const depths = reinterpret_cast<const float*>(samples.depth);
+  const auto* const triangles = reinterpret_cast<const uint32_t*>(samples.which);
   bool is_there = false;
   for (int y = 0; y < kBlocksDown; ++y)
     for (int x = 0; x < kBlocksAcross; ++x) {
       const int block = y * kBlocksAcross + x;
-      float nearest[kLanes], covered_share[kLanes], seen_x[kLanes], seen_y[kLanes];
-      float corner_x[3][kLanes], corner_y[3][kLanes], corner_w[3][kLanes];
-      float value[3][7][kLanes];  // position, normal, cover
-      bool is_block = false;
+      float nearest[kLanes], covered_share[kLanes];
       for (int lane = 0; lane < static_cast<int>(kLanes); ++lane) {
-        const int sample_x = (x * kBlockColumns + lane % kBlockColumns) * kHeadSamples;
-        const int sample_y = (y * kBlockRows + lane / kBlockColumns) * kHeadSamples;
-        // The samples of a pixel lie in one block.
-        static_assert(kBlockColumns % kHeadSamples == 0 && kBlockRows % kHeadSamples == 0);
         const int first =
-            (sample_y / kBlockRows * kRowBlocks + sample_x / kBlockColumns) * static_cast<int>(kLanes) +
-            sample_y % kBlockRows * kBlockColumns + sample_x % kBlockColumns;
-        uint32_t triangle = kNoTriangle;
+            first_sample(x * kBlockColumns + lane % kBlockColumns, y * kBlockRows + lane / kBlockColumns);
         int covered = 0;
         nearest[lane] = kFarDepth;
-        seen_x[lane] = seen_y[lane] = 0.0f;
         for (int sample = 0; sample < kHeadSamples * kHeadSamples; ++sample) {
           const int at = first + sample / kHeadSamples * kBlockColumns + sample % kHeadSamples;
           if (triangles[at] == kNoTriangle) continue;
           ++covered;
           nearest[lane] = std::min(nearest[lane], depths[at]);
-          if (triangle != kNoTriangle) continue;
-          triangle = triangles[at];
-          seen_x[lane] = tile_x + (static_cast<float>(sample_x + sample % kHeadSamples) + 0.5f) * kStep;
-          seen_y[lane] = tile_y + (static_cast<float>(sample_y + sample / kHeadSamples) + 0.5f) * kStep;
         }
         covered_share[lane] = static_cast<float>(covered) / (kHeadSamples * kHeadSamples);
-        is_block |= covered > 0;
-        const glm::uvec3& corner = head.mesh->triangle[covered > 0 ? triangle : 0];
-        for (int c = 0; c < 3; ++c) {
-          const glm::vec4& screen = head.screen[corner[c]];
-          corner_x[c][lane] = screen.x;
-          corner_y[c][lane] = screen.y;
-          corner_w[c][lane] = screen.w;
-          const glm::vec3& position = head.mesh->position_m[corner[c]];
-          const glm::vec3& normal = head.mesh->normal[corner[c]];
-          for (int axis = 0; axis < 3; ++axis) {
-            value[c][axis][lane] = position[axis];
-            value[c][3 + axis][lane] = normal[axis];
-          }
-          value[c][6][lane] = (*head.cover)[corner[c]];
-        }
+        is_there |= covered > 0;
       }
       out.depth[block] = simd::load_lanes(nearest);
       out.seen[block] = simd::load_lanes(covered_share);
-      out.red[block] = out.green[block] = out.blue[block] = Float(0.0f);
-      if (!is_block) continue;
-      is_there = true;
-      // Weights in space: those on the screen, each over its depth.
-      Float off_x[3], off_y[3], weight[3], mean[7];
-      for (int c = 0; c < 3; ++c) {
-        off_x[c] = simd::load_lanes(corner_x[c]) - simd::load_lanes(seen_x);
-        off_y[c] = simd::load_lanes(corner_y[c]) - simd::load_lanes(seen_y);
-      }
-      for (int c = 0; c < 3; ++c)
-        weight[c] = (off_x[(c + 1) % 3] * off_y[(c + 2) % 3] - off_y[(c + 1) % 3] * off_x[(c + 2) % 3]) *
-                    simd::load_lanes(corner_w[c]);
-      const Float per_sum = 1.0f / (weight[0] + weight[1] + weight[2]);
-      for (int i = 0; i < 7; ++i)
-        mean[i] = (weight[0] * simd::load_lanes(value[0][i]) + weight[1] * simd::load_lanes(value[1][i]) +
-                   weight[2] * simd::load_lanes(value[2][i])) *
-                  per_sum;
-      const law::vec3 position(mean[0], mean[1], mean[2]);
-      const law::vec3 normal =
-          law::unit_or(law::vec3(mean[3], mean[4], mean[5]), law::vec3(0.0f, 0.0f, 1.0f));
-      const law::vec3 to_eye =
-          law::unit_or(law::vec3(shade.view.eye_m) - position, law::vec3(0.0f, 0.0f, 1.0f));
-      const law::LightDepth light = light_depth_at(shade.lattice, position + head.shadow_lift_m * normal);
-      const law::vec3 color = law::skin_radiance(shade.look.skin_color, shade.look.root_color, lights, light,
-                                                 normal, to_eye, mean[6]);
-      out.red[block] = color.x;
-      out.green[block] = color.y;
-      out.blue[block] = color.z;
     }
   return is_there;
 }
 
+/// The head's light in a block of pixels, each that of its first covered sample.
+STRANDCAST_LANES law::vec3 light_head(const TileInput& in, uint32_t tile, const HeadSamples& samples, int x,
+                                      int y) {
+  const HeadPicture& head = *in.head;
+  const ShadeInput& shade = *in.shade;
+  const auto* const triangles = reinterpret_cast<const uint32_t*>(samples.which);
+  const auto tile_x = static_cast<float>(tile % in.grid.columns() * kTilePx);
+  const auto tile_y = static_cast<float>(tile / in.grid.columns() * kTilePx);
+  float seen_x[kLanes], seen_y[kLanes];
+  float corner_x[3][kLanes], corner_y[3][kLanes], corner_w[3][kLanes];
+  float value[3][7][kLanes];  // position, normal, cover
+  for (int lane = 0; lane < static_cast<int>(kLanes); ++lane) {
+    const int pixel_x = x * kBlockColumns + lane % kBlockColumns;
+    const int pixel_y = y * kBlockRows + lane / kBlockColumns;
+    const int first = first_sample(pixel_x, pixel_y);
+    uint32_t triangle = kNoTriangle;
+    seen_x[lane] = seen_y[lane] = 0.0f;
+    for (int sample = 0; sample < kHeadSamples * kHeadSamples && triangle == kNoTriangle; ++sample) {
+      triangle = triangles[first + sample / kHeadSamples * kBlockColumns + sample % kHeadSamples];
+      if (triangle == kNoTriangle) continue;
+      seen_x[lane] =
+          tile_x + (static_cast<float>(pixel_x * kHeadSamples + sample % kHeadSamples) + 0.5f) * kHeadStep;
+      seen_y[lane] =
+          tile_y + (static_cast<float>(pixel_y * kHeadSamples + sample / kHeadSamples) + 0.5f) * kHeadStep;
+    }
+    const glm::uvec3& corner = head.mesh->triangle[triangle != kNoTriangle ? triangle : 0];
+    for (int c = 0; c < 3; ++c) {
+      const glm::vec4& screen = head.screen[corner[c]];
+      corner_x[c][lane] = screen.x;
+      corner_y[c][lane] = screen.y;
+      corner_w[c][lane] = screen.w;
+      const glm::vec3& position = head.mesh->position_m[corner[c]];
+      const glm::vec3& normal = head.mesh->normal[corner[c]];
+      for (int axis = 0; axis < 3; ++axis) {
+        value[c][axis][lane] = position[axis];
+        value[c][3 + axis][lane] = normal[axis];
+      }
+      value[c][6][lane] = (*head.cover)[corner[c]];
+    }
+  }
+  // Weights in space: those on the screen, each over its depth.
+  Float off_x[3], off_y[3], weight[3], mean[7];
+  for (int c = 0; c < 3; ++c) {
+    off_x[c] = simd::load_lanes(corner_x[c]) - simd::load_lanes(seen_x);
+    off_y[c] = simd::load_lanes(corner_y[c]) - simd::load_lanes(seen_y);
+  }
+  for (int c = 0; c < 3; ++c)
+    weight[c] = (off_x[(c + 1) % 3] * off_y[(c + 2) % 3] - off_y[(c + 1) % 3] * off_x[(c + 2) % 3]) *
+                simd::load_lanes(corner_w[c]);
+  const Float per_sum = 1.0f / (weight[0] + weight[1] + weight[2]);
+  for (int i = 0; i < 7; ++i)
+    mean[i] = (weight[0] * simd::load_lanes(value[0][i]) + weight[1] * simd::load_lanes(value[1][i]) +
+               weight[2] * simd::load_lanes(value[2][i])) *
+              per_sum;
+  const law::vec3 position(mean[0], mean[1], mean[2]);
+  const law::vec3 normal = law::unit_or(law::vec3(mean[3], mean[4], mean[5]), law::vec3(0.0f, 0.0f, 1.0f));
+  const law::vec3 to_eye = law::unit_or(law::vec3(shade.view.eye_m) - position, law::vec3(0.0f, 0.0f, 1.0f));
+  const law::LightDepth light = light_depth_at(shade.lattice, position + head.shadow_lift_m * normal);
+  return law::skin_radiance(shade.look.skin_color, shade.look.root_color,
+                            hair_lights(shade.look, shade.lights), light, normal, to_eye, mean[6]);
+}
+
 // ---- strands
 
-/// The segments of a tile from front to back: by the depth of their middles, then by their number.
-STRANDCAST_LANES const uint64_t* sort_segments(const TileInput& in, uint32_t begin, uint32_t count,
-                                               TileScratch& scratch) {
+/// Segments of a tile from front to back: `order` has, in its lower half, the first of two ends.
+struct SortedSegments {
+  const StrandPoint* end;
+  const uint64_t* order;
+  uint32_t count;
+};
+
+/// Sorts the segments of a tile by the depth of their middles, then by their number; without those that lie
+/// wholly beyond `hidden`. Their ends are copied here, where they are read as they lie in memory, and then
+/// found in a cache in any order.
+STRANDCAST_LANES SortedSegments sort_segments(const TileInput& in, uint32_t begin, uint32_t count,
+                                              float hidden, TileScratch& scratch) {
   const TileSegment* const items = in.bins->segments().item.data() + begin;
+  const StrandPoint* const points = in.points->point.data();
   scratch.order.resize(count);
   scratch.sorted.resize(count);
+  scratch.end.resize(size_t{2} * count);
   float low = kFarDepth;
   float high = -kFarDepth;
   for (uint32_t i = 0; i < count; ++i) {
@@ -182,10 +216,19 @@ STRANDCAST_LANES const uint64_t* sort_segments(const TileInput& in, uint32_t beg
   constexpr float kDepthSteps = 65535.0f;
   const float scale = kDepthSteps / std::max(high - low, 1e-9f);
   uint32_t counts[2][256] = {};
+  uint32_t kept = 0;
   for (uint32_t i = 0; i < count; ++i) {
+    constexpr uint32_t kAhead = 16;
+    const StrandPoint* const later = points + items[std::min(i + kAhead, count - 1)].point;
+    __builtin_prefetch(later);
+    __builtin_prefetch(later + 1);
+    const StrandPoint* const ends = points + items[i].point;
+    if (std::min(ends[0].z, ends[1].z) > hidden) continue;
+    std::memcpy(scratch.end.data() + 2 * kept, ends, 2 * sizeof *ends);
     const float step = std::min((items[i].depth - low) * scale, kDepthSteps);
     const auto key = static_cast<uint32_t>(static_cast<int32_t>(step));
-    scratch.order[i] = uint64_t{key} << 32 | items[i].point;
+    scratch.order[kept] = uint64_t{key} << 32 | 2 * kept;
+    ++kept;
     ++counts[0][key & 255];
     ++counts[1][key >> 8];
   }
@@ -199,10 +242,10 @@ STRANDCAST_LANES const uint64_t* sort_segments(const TileInput& in, uint32_t beg
       sum += here;
     }
     const int shift = 32 + 8 * pass;
-    for (uint32_t i = 0; i < count; ++i) to[counts[pass][from[i] >> shift & 255]++] = from[i];
+    for (uint32_t i = 0; i < kept; ++i) to[counts[pass][from[i] >> shift & 255]++] = from[i];
     std::swap(from, to);
   }
-  return from;
+  return {scratch.end.data(), from, kept};
 }
 
 STRANDCAST_LANES Float tone_mapped(Float linear) {
@@ -263,32 +306,19 @@ STRANDCAST_LANES void blend_strands(const TileInput& in, uint32_t tile, TileHead
   const auto top = static_cast<float>(tile / in.grid.columns() * kTilePx);
   // Segments are sorted by their middles, and few are longer than this along the view.
   constexpr float kLongM = 0.04f;
-  const uint64_t* const order = sort_segments(in, begin, count, scratch);
-  const StrandPoint* const points = in.points->point.data();
+  const SortedSegments sorted =
+      sort_segments(in, begin, count, head != nullptr ? head->hides_all : kNothingHidden, scratch);
   for (int y = 0; y < kBlocksDown; ++y) pixels.open[y] = (uint32_t{1} << kBlocksAcross) - 1;
-  const float hidden = head != nullptr ? head->hides_all : kNothingHidden;
   uint32_t until_check = kPairsBetweenChecks;
-  for (uint32_t i = 0; i < count;) {
-    // The next eight that are not behind the head.
-    uint64_t some[kLanes];
-    uint32_t found = 0;
-    for (; found < kLanes && i < count; ++i) {
-      constexpr uint32_t kAhead = 2 * kLanes;
-      const StrandPoint* const later = points + static_cast<uint32_t>(order[std::min(i + kAhead, count - 1)]);
-      __builtin_prefetch(later);
-      __builtin_prefetch(later + 1);
-      const StrandPoint* const ends = points + static_cast<uint32_t>(order[i]);
-      if (std::min(ends[0].z, ends[1].z) > hidden) continue;
-      some[found++] = order[i];
-    }
-    if (found == 0) break;
+  for (uint32_t i = 0; i < sorted.count; i += kLanes) {
+    const uint32_t found = std::min(kLanes, sorted.count - i);
     SegmentBatch batch;
-    place_segments(points, some, found, left, top, batch);
+    place_segments(sorted.end, sorted.order + i, found, left, top, batch);
     for (uint32_t lane = 0; lane < found; ++lane) blend_segment(batch, lane, head, pixels);
     until_check -= std::min(until_check, kLanes);
     if (until_check > 0) continue;
     until_check = kPairsBetweenChecks;
-    const StrandPoint* const last = points + static_cast<uint32_t>(some[found - 1]);
+    const StrandPoint* const last = sorted.end + static_cast<uint32_t>(sorted.order[i + found - 1]);
     const bool is_behind = head != nullptr && std::min(last[0].z, last[1].z) > head->end + kLongM;
     if (!close_opaque_blocks(is_behind ? head : nullptr, pixels)) break;
   }
@@ -296,7 +326,7 @@ STRANDCAST_LANES void blend_strands(const TileInput& in, uint32_t tile, TileHead
 
 /// The picture's pixels of a tile: head and strands over the background, tone curve, sRGB.
 STRANDCAST_LANES void write_pixels(const TileInput& in, uint32_t tile, const TileHead* head,
-                                   const TilePixels& pixels) {
+                                   const HeadSamples& samples, const TilePixels& pixels) {
   const uint32_t left = tile % in.grid.columns() * kTilePx;
   const uint32_t top = tile / in.grid.columns() * kTilePx;
   const uint32_t width = std::min(kTilePx, in.grid.size_px.x - left);
@@ -315,10 +345,13 @@ STRANDCAST_LANES void write_pixels(const TileInput& in, uint32_t tile, const Til
         Float drawn = 1.0f - pixels.passed[block];
         if (head != nullptr) {
           const Float seen = head->seen[block];
-          scene[0] += seen * head->red[block];
-          scene[1] += seen * head->green[block];
-          scene[2] += seen * head->blue[block];
-          drawn += seen;
+          if (is_any(seen > 0.0f)) {
+            const law::vec3 light = light_head(in, tile, samples, x, y);
+            scene[0] += seen * light.x;
+            scene[1] += seen * light.y;
+            scene[2] += seen * light.z;
+            drawn += seen;
+          }
         }
         const Float per_drawn = 1.0f / simd::max(drawn, 1e-5f);
         for (int c = 0; c < 3; ++c) color[c] += drawn * (tone_mapped(scene[c] * per_drawn) - color[c]);
@@ -342,8 +375,10 @@ STRANDCAST_LANES void write_pixels(const TileInput& in, uint32_t tile, const Til
 STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
   const TileInput& in = *arguments.input;
   const uint32_t tile = arguments.tile;
+  HeadSamples samples;
   TileHead head;
-  const bool has_head = in.head->mesh != nullptr && draw_head(in, tile, head);
+  const bool has_head =
+      in.head->mesh != nullptr && sample_head(in, tile, samples) && cover_by_head(samples, head);
   const bool has_strands = in.bins->segments().first[tile + 1] > in.bins->segments().first[tile];
   if (!has_strands && !has_head) return fill_background(in, tile);
   if (has_head) find_hidden(head);
@@ -353,7 +388,7 @@ STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
     pixels.passed[block] = Float(1.0f);
   }
   blend_strands(in, tile, has_head ? &head : nullptr, *arguments.scratch, pixels);
-  write_pixels(in, tile, has_head ? &head : nullptr, pixels);
+  write_pixels(in, tile, has_head ? &head : nullptr, samples, pixels);
 }
 STRANDCAST_KERNEL(draw_any_tile, TileArguments);
 

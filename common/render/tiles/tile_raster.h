@@ -50,6 +50,7 @@ std::vector<float> make_linear_table(const std::vector<uint8_t>& srgb);
 struct TileScratch {
   std::vector<uint64_t> order;
   std::vector<uint64_t> sorted;
+  std::vector<StrandPoint> end;  // two of each segment
 };
 
 struct TileArguments {
