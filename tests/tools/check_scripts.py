@@ -134,6 +134,7 @@ def check_run():
         "--motion": (["--motion", "a.bvh"], feed(("--motion", "HERE/a.bvh"), gone=[builtin])),
         "--motion-unit": (["--motion-unit", "0.5"], feed(("--unit", "0.5"))),
         "--motion-up": (["--motion-up", "z"], feed(("--up", "z"))),
+        "--motion-fps": (["--motion-fps", "25"], feed(("--fps", "25"))),
         "--joint": (["--joint", "Skull"], feed(("--joint", "Skull"))),
         "--filter-glitches": (["--filter-glitches"], feed(("--filter-glitches",))),
         "--wind": (["--wind", "a.csv"], feed(("--wind", "HERE/a.csv"), gone=[gusts])),
