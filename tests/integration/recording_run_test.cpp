@@ -138,7 +138,9 @@ TEST_F(RecordedRun, GoesOnFromWhatKeyframesTell) {
     recorded.record->path = folder_.path() / (quality + ".mcap");
     ASSERT_TRUE(start(recorded));
     const auto join = [&] {
-      const auto viewer = open(client_config());
+      ClientConfig predicting = client_config();
+      predicting.hello.step_ns = 1.0;
+      const auto viewer = open(predicting);
       ASSERT_NE(viewer, nullptr);
       EXPECT_TRUE(pump_until({viewer.get()}, [&] { return viewer->replay().stats().keyframes > 0; }));
     };
