@@ -2,11 +2,16 @@
 // from a state that all of them have. As long as it does, viewers need no corrections.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <glm/glm.hpp>
 #include <memory>
+#include <span>
 
+#include "common/base/result.h"
 #include "common/kernels/step_model.h"
 #include "common/kernels/strand_blocks.h"
+#include "common/strands/strand_codec.h"
 
 namespace strandcast {
 
@@ -40,6 +45,13 @@ struct SharedUpdate {
   std::shared_ptr<const SharedState> state;
   /// Strands of this model, for the receiver alone; nullptr if they came with an earlier update.
   std::shared_ptr<SharedStrands> strands = {};
+  bool is_told = false;   // by a keyframe, for which read_shared() gives the same state
+  uint32_t sequence = 0;  // of the frame
 };
+
+/// Reads the state that a keyframe of "step" tells, with strands of its model; the update's model is the
+/// caller's to set. Fails as a decoder, and where the keyframe tells no state of all strands.
+Result<SharedUpdate> read_shared(std::span<const std::byte> keyframe, const StrandStreamLimits& limits,
+                                 std::span<const glm::vec3> rest_in_head_m, WorkerPool& workers);
 
 }  // namespace strandcast

@@ -27,6 +27,10 @@ struct JoinFrames {
   EncodedFramePtr keyframe;  // of the same state and sequence: after it, all following deltas can be decoded
 };
 
+/// Which states of viewers an encoder hands over: those alone that keyframes tell, so that who has the stream
+/// can take them over as well, or all.
+enum class SharedStates { None, Told, All };
+
 /// Encodes successive snapshots of one stream. The first is a keyframe.
 class StrandEncoder {
  public:
@@ -44,7 +48,7 @@ class StrandEncoder {
   virtual JoinFrames encode_for_join(const Snapshot& snapshot) = 0;
   /// Returns the state that viewers have after the last frame, unless steps of the state before, a tick a
   /// frame, lead to it as well. Nothing for codecs that do not predict by steps.
-  virtual std::shared_ptr<SharedUpdate> take_shared() { return nullptr; }
+  virtual std::shared_ptr<SharedUpdate> take_shared(SharedStates = SharedStates::All) { return nullptr; }
   /// Tells the state of the strands in the next snapshot, where the simulation goes on from an update; null
   /// without one. The bytes are the same with and without it.
   virtual void set_state(std::shared_ptr<const SharedState>) {}

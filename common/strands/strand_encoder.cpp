@@ -35,7 +35,9 @@ class PrefixEncoder final : public StrandEncoder {
     adopt(snapshot);
     return encoder_->encode_for_join(snapshot);
   }
-  std::shared_ptr<SharedUpdate> take_shared() override { return encoder_->take_shared(); }
+  std::shared_ptr<SharedUpdate> take_shared(SharedStates which) override {
+    return encoder_->take_shared(which);
+  }
   void set_state(std::shared_ptr<const SharedState> state) override { encoder_->set_state(std::move(state)); }
   uint64_t step_count() const override { return encoder_->step_count(); }
 

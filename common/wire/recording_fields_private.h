@@ -80,6 +80,13 @@ void visit(Visitor& v, RecordedStream& m) {
 }
 
 template <class Visitor>
+void visit(Visitor& v, RecordedHandOver& m) {
+  v.value("tick", m.tick);
+  v.value("frame_tick", m.frame_tick);
+  v.value("frame_sequence", m.frame_sequence);
+}
+
+template <class Visitor>
 void visit(Visitor& v, RecordedState& m) {
   v.value("tick", m.tick);
   v.value("sim_time_ns", m.sim_time_ns);

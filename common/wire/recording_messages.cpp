@@ -30,7 +30,7 @@ namespace {
 /// The message of each kind, in the order of RecordedMessage.
 using Wires = std::tuple<v1::RecordingStart, v1::RecordedMotion, v1::RecordedWind, v1::RecordedStep,
                          v1::RecordedChange, v1::RecordedStream, v1::RecordedState, v1::RecordedCamera,
-                         v1::RecordedLoss, v1::LookChange, v1::ServerStatus>;
+                         v1::RecordedLoss, v1::LookChange, v1::ServerStatus, v1::RecordedHandOver>;
 constexpr size_t kKindCount = std::variant_size_v<RecordedMessage>;
 static_assert(std::tuple_size_v<Wires> == kKindCount);
 
@@ -46,6 +46,7 @@ constexpr std::array<RecordedKind, kKindCount> kKinds{{
     {"/losses", "strandcast.v1.RecordedLoss"},
     {"/look", "strandcast.v1.LookChange"},
     {"/status", "strandcast.v1.ServerStatus"},
+    {"/hand_overs", "strandcast.v1.RecordedHandOver"},
 }};
 
 constexpr std::byte kMediaTag{0x0a};  // field 1, of bytes

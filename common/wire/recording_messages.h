@@ -95,6 +95,14 @@ struct RecordedStream {
   bool operator==(const RecordedStream&) const = default;
 };
 
+/// After step `tick`, strands go on from the state of a keyframe, with the steps since then repeated.
+struct RecordedHandOver {
+  uint64_t tick = 0;
+  uint64_t frame_tick = 0;
+  uint32_t frame_sequence = 0;
+  bool operator==(const RecordedHandOver&) const = default;
+};
+
 /// A published state.
 struct RecordedState {
   uint64_t tick = 0;
@@ -121,7 +129,7 @@ struct RecordedLoss {
 
 using RecordedMessage =
     std::variant<RecordingStart, RecordedMotion, RecordedWind, RecordedStep, RecordedChange, RecordedStream,
-                 RecordedState, RecordedCamera, RecordedLoss, LookChange, ServerStatus>;
+                 RecordedState, RecordedCamera, RecordedLoss, LookChange, ServerStatus, RecordedHandOver>;
 
 /// Description of one kind of recorded message, as stored in its channel of the file.
 struct RecordedKind {

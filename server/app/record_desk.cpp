@@ -49,6 +49,9 @@ class TapPair : public StepTap {
   void on_lattice(const LatticeChange& change) override {
     for (StepTap* tap : taps_) tap->on_lattice(change);
   }
+  void on_hand_over(const HandOver& hand_over) override {
+    for (StepTap* tap : taps_) tap->on_hand_over(hand_over);
+  }
 
  private:
   const std::array<StepTap*, 2> taps_;

@@ -191,8 +191,8 @@ JoinFrames StrandEncodeWorker::encode(const Snapshot& published, const StrandEnc
     const bool is_keyframe = frames.frame != nullptr && frames.frame->header.opcode == Opcode::StrandKeyframe;
     if (is_keyframe) frames.keyframe = frames.frame;
   }
-  if (shared_ != nullptr && shared_->is_wanted() && config.coarsening == 1)
-    if (const auto update = encoder_->take_shared()) shared_->put(std::move(*update));
+  if (shared_ != nullptr && config.coarsening == 1)
+    if (const auto update = encoder_->take_shared(shared_->wanted())) shared_->put(std::move(*update));
   count(frames, static_cast<double>(now_ns() - begin_ns) * kMsPerNs, audience);
   return frames;
 }

@@ -15,9 +15,9 @@ namespace strandcast {
 
 class SharedSlot {
  public:
-  /// Sets whether the simulation takes updates; encoders make none otherwise.
-  void set_wanted(bool is_wanted) { is_wanted_ = is_wanted; }
-  bool is_wanted() const { return is_wanted_; }
+  /// Sets which updates the simulation takes; encoders make no others.
+  void set_wanted(SharedStates wanted) { wanted_ = wanted; }
+  SharedStates wanted() const { return wanted_; }
 
   void put(SharedUpdate update) {
     const std::lock_guard lock(mutex_);
@@ -48,7 +48,7 @@ class SharedSlot {
   bool is_read(uint64_t tick) const { return tick <= read_tick_ + kMostTrailTicks; }
 
  private:
-  std::atomic<bool> is_wanted_{false};
+  std::atomic<SharedStates> wanted_{SharedStates::None};
   std::mutex mutex_;
   std::optional<SharedUpdate> update_;
   std::array<std::pair<uint64_t, std::shared_ptr<const SharedState>>, 2> states_;

@@ -116,6 +116,11 @@ void Recorder::on_lattice(const LatticeChange& change) {
                                                                static_cast<double>(change.stream.bound_m)})});
 }
 
+void Recorder::on_hand_over(const HandOver& hand_over) {
+  push_of_simulation({now_ns(), RecordedMessage(RecordedHandOver{hand_over.tick, hand_over.update.tick,
+                                                                 hand_over.update.sequence})});
+}
+
 void Recorder::push_of_simulation(Item item) {
   if (open_change_)
     held_.push_back(std::move(item));

@@ -102,6 +102,7 @@ class Recorder : public StreamReader, public StepTap {
   void on_change(const PostedChange& change) override;
   void on_answer(const Notice& answer) override;
   void on_lattice(const LatticeChange& change) override;
+  void on_hand_over(const HandOver& hand_over) override;
 
  private:
   using StatePtr = std::shared_ptr<const Snapshot>;

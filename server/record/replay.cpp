@@ -12,6 +12,7 @@
 #include "common/base/version.h"
 #include "common/record/recording_reader.h"
 #include "common/scene/scene_file.h"
+#include "common/strands/shared_strands.h"
 #include "server/record/recorded_step.h"
 
 namespace strandcast {
@@ -24,6 +25,38 @@ constexpr const char* kStatesTopic = "/states";
 struct MadeState {
   uint64_t tick = 0;
   uint64_t hash = 0;
+};
+
+/// The states that a recording's keyframes tell, in their order.
+class ToldStates {
+ public:
+  static Result<std::unique_ptr<ToldStates>> open(const std::filesystem::path& recording) {
+    auto states = std::make_unique<ToldStates>();
+    ASSIGN_OR_RETURN(states->reader_, RecordingReader::open(recording, RecordedPart::Frames));
+    ASSIGN_OR_RETURN(const SceneAsset asset, states->reader_->asset());
+    states->limits_ = {asset.strand_count, asset.vertex_count};
+    states->rest_in_head_m_ = asset.rest_position_m;
+    return states;
+  }
+  Result<SharedUpdate> find(const RecordedHandOver& wanted) {
+    while (true) {
+      ASSIGN_OR_RETURN(const auto item, reader_->next());
+      if (!item)
+        return make_error(ErrorCode::NotFound, "the keyframe of step {} is not in the recording",
+                          wanted.frame_tick);
+      const EncodedFramePtr& frame = std::get<RecordedFrame>(item->what).frame;
+      const bool is_keyframe = frame->header.opcode == Opcode::StrandKeyframe;
+      if (!is_keyframe || frame->header.sequence != wanted.frame_sequence) continue;
+      ASSIGN_OR_RETURN(SharedUpdate update,
+                       read_shared(frame->message, limits_, rest_in_head_m_, shared_workers()));
+      if (update.tick == wanted.frame_tick) return update;
+    }
+  }
+
+ private:
+  std::unique_ptr<RecordingReader> reader_;
+  StrandStreamLimits limits_;
+  std::vector<glm::vec3> rest_in_head_m_;
 };
 
 /// Gives the simulation what the recording has, and holds what comes of it against what is recorded.
@@ -58,6 +91,7 @@ class ReplayScript : public StepScript, public StateSink {
 
  private:
   Next find_action();
+  Next take_over(const RecordedHandOver& hand_over);
   void compare(const RecordedState& recorded);
   bool differs(uint64_t tick, std::string what);
   void wait_for_turn(int64_t time_ns);
@@ -66,6 +100,7 @@ class ReplayScript : public StepScript, public StateSink {
 
   RecordingReader& reader_;
   const ReplayConfig& config_;
+  std::unique_ptr<ToldStates> told_;  // from the first hand-over on
   std::deque<MadeState> made_;
   ReplayResult result_;
   ReplayProgress progress_;
@@ -106,9 +141,9 @@ StepScript::Next ReplayScript::find_action() {
                                       loss->messages, progress_.tick);
       return End{};
     }
-    const bool is_action = std::holds_alternative<RecordedStep>(message) ||
-                           std::holds_alternative<RecordedChange>(message) ||
-                           std::holds_alternative<RecordedStream>(message);
+    const bool is_action =
+        std::holds_alternative<RecordedStep>(message) || std::holds_alternative<RecordedChange>(message) ||
+        std::holds_alternative<RecordedStream>(message) || std::holds_alternative<RecordedHandOver>(message);
     if (!is_action) continue;
     if (!made_.empty()) {
       differs(made_.front().tick, "was published now, and was not when it was recorded");
@@ -120,9 +155,24 @@ StepScript::Next ReplayScript::find_action() {
     }
     if (const auto* change = std::get_if<RecordedChange>(&message))
       return PostedChange{change->tick, change->what, change->who};
+    if (const auto* hand_over = std::get_if<RecordedHandOver>(&message)) return take_over(*hand_over);
     return LatticeChange{std::get<RecordedStream>(message).tick, {}};
   }
   result_.early_end = fmt::format("it was stopped after step {}", progress_.tick);
+  return End{};
+}
+
+StepScript::Next ReplayScript::take_over(const RecordedHandOver& hand_over) {
+  const auto find = [&]() -> Result<SharedUpdate> {
+    if (told_ == nullptr) {
+      ASSIGN_OR_RETURN(told_, ToldStates::open(config_.recording));
+    }
+    return told_->find(hand_over);
+  };
+  Result<SharedUpdate> update = find();
+  if (update) return HandOver{hand_over.tick, std::move(*update)};
+  result_.early_end = fmt::format("after step {} strands of a keyframe were taken over: {}", hand_over.tick,
+                                  update.error().to_string());
   return End{};
 }
 

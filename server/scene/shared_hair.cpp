@@ -24,19 +24,21 @@ SolverState state_of(const SolverBlocks& blocks) {
   return {unpacked(blocks.position_m), unpacked(blocks.velocity_mps)};
 }
 
-void SharedHair::follow(SharedUpdate update, const StepTrail& trail, double step_rate_hz) {
-  if (update.model == nullptr || update.model != trail.model || trail.scene == nullptr) return;
+bool SharedHair::follow(SharedUpdate update, const StepTrail& trail, double step_rate_hz) {
+  if (update.model == nullptr || update.model != trail.model || trail.scene == nullptr) return false;
   if (update.strands != nullptr) {
     strands_ = std::move(update.strands);
     model_ = update.model;
   }
-  if (strands_ == nullptr || model_ != update.model || trail.ticks.empty()) return;
+  if (strands_ == nullptr || model_ != update.model || trail.ticks.empty() || update.state == nullptr)
+    return false;
   const uint64_t now = trail.ticks.back().tick;
-  if (update.tick < first_tick_ || update.tick > now || now - update.tick > trail.ticks.size()) return;
+  if (update.tick < first_tick_ || update.tick > now || now - update.tick > trail.ticks.size()) return false;
   strands_->take(*update.state);
   number_ = update.number;
   for (const StepTick& tick : trail.ticks)
     if (tick.tick > update.tick) step(tick, *trail.scene, step_rate_hz);
+  return true;
 }
 
 void SharedHair::step(const StepTick& tick, const StepScene& scene, double step_rate_hz) {

@@ -20,8 +20,9 @@ class SharedHair {
   /// Returns SharedUpdate::number of the state that they go on from; 0 = none.
   uint64_t number() const { return number_; }
   /// Continues from the viewers' state, with the steps of `trail` after it. `step_rate_hz` as in step().
-  /// Changes nothing if the model is another one, or the state is too old or from before leave() or drop().
-  void follow(SharedUpdate update, const StepTrail& trail, double step_rate_hz);
+  /// Returns false and changes no strands if the model is another one, there is no state, or it is too old
+  /// or from before leave() or drop().
+  bool follow(SharedUpdate update, const StepTrail& trail, double step_rate_hz);
   /// Simulates a step of the announced model; needs is_active().
   void step(const StepTick& tick, const StepScene& scene, double step_rate_hz);
   /// Returns a copy of their state, for encoders; needs is_active().

@@ -145,6 +145,8 @@ void SimLoop::follow_script() {
       scripted_ = nullptr;
     } else if (const auto* change = std::get_if<PostedChange>(&next)) {
       std::visit([&](const auto& what) { carry_out({what, {}, change->who}); }, change->what);
+    } else if (const auto* hand_over = std::get_if<HandOver>(&next)) {
+      take_over(hand_over->update);
     } else {
       begin_stream();
     }

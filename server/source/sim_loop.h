@@ -187,6 +187,7 @@ class SimLoop {
   int64_t next_step_ns(int64_t time_ns) const;
   bool shares() const;
   void follow_viewers();
+  bool take_over(SharedUpdate update);
   void leave_viewers();
   StageTurn turn();
   void take_input(int64_t time_ns);

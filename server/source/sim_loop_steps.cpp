@@ -79,23 +79,33 @@ void SimLoop::wake() {
                  has_path ? head_motion(head_path_.front(), head_path_.back(), passed_s) : HeadMotion{});
 }
 
-/// Returns whether the simulation goes on from the viewers' strands. Recordings and steps by commands must
-/// not depend on who watches.
+/// Returns whether the simulation goes on from the viewers' strands. Steps by commands must not depend on who
+/// watches.
 bool SimLoop::shares() const {
-  return config_.shared != nullptr && !is_recorded() && !config_.is_lockstep && !config_.on_publish &&
-         !solver_features_.is_carried && executor_->info().device == SimDevice::Lanes;
+  return config_.shared != nullptr && config_.script == nullptr && !config_.is_lockstep &&
+         !config_.on_publish && !solver_features_.is_carried && executor_->info().device == SimDevice::Lanes;
 }
 
 /// Before a step: takes over the viewers' strands if the encoder has handed them over.
 void SimLoop::follow_viewers() {
   if (config_.shared == nullptr) return;
   const bool is_shared = shares();
-  config_.shared->set_wanted(is_shared);
+  // Whoever takes a recorded step again has what its keyframes tell.
+  const SharedStates wanted = is_recorded() ? SharedStates::Told : SharedStates::All;
+  config_.shared->set_wanted(is_shared ? wanted : SharedStates::None);
   std::optional<SharedUpdate> update = config_.shared->take();
   if (!is_shared) return leave_viewers();
   if (!update) return;
-  if (const auto trail = step_log_.trail())
-    shared_hair_.follow(std::move(*update), *trail, config_.scene.step_rate_hz);
+  if (is_recorded() && !update->is_told) update->state = nullptr;
+  if (take_over(*update) && config_.tap != nullptr) config_.tap->on_hand_over({tick_, std::move(*update)});
+}
+
+/// Returns whether strands go on from this state from now on.
+bool SimLoop::take_over(SharedUpdate update) {
+  const auto trail = step_log_.trail();
+  if (trail == nullptr) return false;
+  if (config_.script != nullptr) update.model = trail->model;  // as it was when it was recorded
+  return shared_hair_.follow(std::move(update), *trail, config_.scene.step_rate_hz);
 }
 
 /// The solver goes on with the strands as they are.
@@ -149,8 +159,8 @@ void SimLoop::step(int64_t time_ns) {
     ++tick_;
     return;
   }
-  take_input(time_ns);
   follow_viewers();
+  take_input(time_ns);
   ++tick_;
   if (solver_features_.is_carried) return carry_step();
   const double end_time_s = static_cast<double>(tick_) / config_.scene.step_rate_hz;

@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "common/scene/scene_desc.h"
+#include "common/strands/shared_strands.h"
 #include "common/wire/messages.h"
 #include "server/input/input_frame.h"
 
@@ -33,6 +34,12 @@ struct LatticeChange {
   StreamDesc stream;
 };
 
+/// After step `tick`, strands go on from those that a keyframe told viewers, and repeat the steps since then.
+struct HandOver {
+  uint64_t tick = 0;
+  SharedUpdate update;
+};
+
 /// Observer of steps and changes on the simulation thread; called before the states that result from them.
 /// Must return quickly.
 class StepTap {
@@ -43,13 +50,14 @@ class StepTap {
   /// Reports the answer to the preceding change, after it was carried out.
   virtual void on_answer(const Notice& answer) = 0;
   virtual void on_lattice(const LatticeChange& change) = 0;
+  virtual void on_hand_over(const HandOver& hand_over) = 0;
 };
 
 /// Drives a simulation by a script instead of clock, inputs and commands.
 class StepScript {
  public:
   struct End {};
-  using Next = std::variant<End, TakenStep, PostedChange, LatticeChange>;
+  using Next = std::variant<End, TakenStep, PostedChange, LatticeChange, HandOver>;
 
   virtual ~StepScript() = default;
   /// Returns the next item; called on the simulation thread, and not again after End.

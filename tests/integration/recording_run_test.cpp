@@ -6,7 +6,9 @@
 #include "common/record/recording_check.h"
 #include "common/record/recording_reader.h"
 #include "server/record/replay.h"
+#include "server/source/scene_change.h"
 #include "tests/support/server_fixture.h"
+#include "tests/support/stepped_hair.h"
 #include "tests/support/temporary_folder.h"
 
 namespace strandcast::recording_run_test {
@@ -79,9 +81,10 @@ class RecordedRun : public test::ServerFixture {
   }
   /// The same recording with its messages changed.
   template <class Change>
-  std::filesystem::path altered(const char* name, Change change_message) const {
+  std::filesystem::path altered(const std::filesystem::path& from, const char* name,
+                                Change change_message) const {
     const std::filesystem::path path = folder_.path() / name;
-    const auto reader = RecordingReader::open(path_, RecordedPart::Messages);
+    const auto reader = RecordingReader::open(from);
     auto file = RecordFile::make(path, IfPresent::Refuse);
     EXPECT_TRUE(reader && file);
     (*file)->keep();
@@ -89,6 +92,10 @@ class RecordedRun : public test::ServerFixture {
     change_message(start);
     RecordingWriter writer(**file, start, *(*reader)->asset_frame());
     for (auto item = (*reader)->next(); item && *item; item = (*reader)->next()) {
+      if (const auto* frame = std::get_if<RecordedFrame>(&(*item)->what)) {
+        writer.add((*item)->time_ns, *frame->frame);
+        continue;
+      }
       RecordedMessage message = std::get<RecordedMessage>((*item)->what);
       std::visit([&](auto& one) { change_message(one); }, message);
       writer.add((*item)->time_ns, 0, message);
@@ -117,6 +124,59 @@ TEST_F(RecordedRun, IsSimulatedAgainBitForBit) {
     EXPECT_EQ(result.compared, check->states);
   }
   EXPECT_TRUE(notes_.empty()) << testing::PrintToString(notes_);
+}
+
+/// Strands go on from those of viewers where a keyframe tells them: frames are exact, and the run can be
+/// simulated again for all that.
+TEST_F(RecordedRun, GoesOnFromWhatKeyframesTell) {
+  for (const std::string quality : {"fast", "full"}) {
+    ServerConfig recorded = config();
+    recorded.scene = test::bald_scene(40, 8);
+    const auto scene = change_scene(recorded.scene, "quality=" + quality);
+    ASSERT_TRUE(scene) << scene.error().to_string();
+    recorded.scene = *scene;
+    recorded.record->path = folder_.path() / (quality + ".mcap");
+    ASSERT_TRUE(start(recorded));
+    const auto join = [&] {
+      ClientConfig predicting = client_config();
+      predicting.hello.step_ns = 1.0;
+      const auto viewer = open(predicting);
+      ASSERT_NE(viewer, nullptr);
+      EXPECT_TRUE(pump_until({viewer.get()}, [&] { return viewer->replay().stats().keyframes > 0; }));
+    };
+    run_steps(30);
+    for (int i = 0; i < 3; ++i) {
+      join();
+      run_steps(15);
+    }
+    EXPECT_EQ(command(Command::Reset), kDoneExit);
+    run_steps(15);
+    join();
+    run_steps(15);
+    server_->stop();
+    server_.reset();
+
+    const auto reader = RecordingReader::open(recorded.record->path);
+    ASSERT_TRUE(reader) << reader.error().to_string();
+    int hand_overs = 0, exact_frames = 0;
+    for (auto item = (*reader)->next(); item && *item; item = (*reader)->next()) {
+      if (const auto* frame = std::get_if<RecordedFrame>(&(*item)->what))
+        exact_frames += is_exact(*frame->frame) ? 1 : 0;
+      else
+        hand_overs += std::holds_alternative<RecordedHandOver>(std::get<RecordedMessage>((*item)->what));
+    }
+    EXPECT_GE(hand_overs, 3) << quality;
+    EXPECT_GE(exact_frames, 20) << quality;
+    const ReplayResult result = replay(recorded.record->path);
+    EXPECT_TRUE(result.is_equal()) << quality << ": " << to_sentence(result);
+
+    const auto without =
+        altered(recorded.record->path, (quality + "_without.mcap").c_str(), [](auto& message) {
+          if constexpr (std::is_same_v<std::decay_t<decltype(message)>, RecordedHandOver>)
+            message.frame_sequence += 100'000;
+        });
+    EXPECT_THAT(replay(without).early_end, HasSubstr("is not in the recording"));
+  }
 }
 
 // A groom so small that decoding all of it takes nothing.
@@ -174,7 +234,7 @@ TEST_F(RecordedRun, TellsTheFirstStepThatIsNotAsItWas) {
   if (IsSkipped()) return;
   constexpr uint64_t kTick = 30;
   // A head that is a tenth of a millimetre elsewhere, in one step.
-  const auto moved = altered("moved.mcap", [](auto& message) {
+  const auto moved = altered(path_, "moved.mcap", [](auto& message) {
     if constexpr (std::is_same_v<std::decay_t<decltype(message)>, RecordedStep>)
       if (message.tick == kTick) message.world_from_head.position_m.x += 1e-4;
   });
@@ -184,7 +244,7 @@ TEST_F(RecordedRun, TellsTheFirstStepThatIsNotAsItWas) {
   EXPECT_EQ(result.difference->tick, kTick);
   EXPECT_EQ(result.equal + 1, result.compared);
 
-  const auto elsewhere = altered("elsewhere.mcap", [](auto& message) {
+  const auto elsewhere = altered(path_, "elsewhere.mcap", [](auto& message) {
     if constexpr (std::is_same_v<std::decay_t<decltype(message)>, RecordingStart>) {
       message.sim_device = "gl";
       message.server_version = "0.0.9";
@@ -200,7 +260,7 @@ TEST_F(RecordedRun, TellsTheFirstStepThatIsNotAsItWas) {
   EXPECT_THAT(notes_[0], HasSubstr("recorded by strandcast-server 0.0.9"));
   EXPECT_THAT(notes_[1], HasSubstr("recorded on gl"));
 
-  const auto bald = altered("bald.mcap", [](auto& message) {
+  const auto bald = altered(path_, "bald.mcap", [](auto& message) {
     if constexpr (std::is_same_v<std::decay_t<decltype(message)>, RecordingStart>) {
       auto scene = parse_scene(message.scene_text, "test", {"groom.procedural.strand_count=41"});
       ASSERT_TRUE(scene);

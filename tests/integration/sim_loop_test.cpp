@@ -462,8 +462,7 @@ class EncodingSink final : public LoopSink {
   void put(std::shared_ptr<const Snapshot> snapshot) override {
     encoder_->set_state(slot_.take_state(snapshot->tick));
     encoder_->encode(*snapshot);
-    const auto update = encoder_->take_shared();
-    if (update != nullptr && slot_.is_wanted()) slot_.put(*update);
+    if (const auto update = encoder_->take_shared(slot_.wanted())) slot_.put(*update);
     shared_ = snapshot->trail == nullptr ? 0 : snapshot->trail->shared;
     if (shared_ == 0) ++alone_count_;
     if (shared_ != 0 && shared_ == known_ && encoder_->step_count() == steps_) ++handed_count_;
@@ -484,8 +483,8 @@ class EncodingSink final : public LoopSink {
   uint64_t known_ = 0, steps_ = 0;
 };
 
-// With an observer, which stands for a recording, they are not: what is recorded does not hang on viewers.
-TEST(SimLoopShared, StrandsGoOnFromThoseOfViewersUnlessSomebodyRecords) {
+// With an observer they are not: what it sees does not hang on viewers.
+TEST(SimLoopShared, StrandsGoOnFromThoseOfViewersUnlessSomebodyObserves) {
   for (const bool is_observed : {false, true}) {
     SharedSlot slot;
     SimLoopConfig config;

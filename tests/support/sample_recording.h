@@ -95,7 +95,8 @@ inline std::vector<RecordedMessage> sample_recorded_messages() {
       RecordedCamera{16, sample_camera()},
       RecordedLoss{1, 2, 3},
       LookChange{sample_look(), sample_camera()},
-      status};
+      status,
+      RecordedHandOver{17, 12, 18}};
 }
 
 /// Two seconds with ten states and frames each, a keyframe at the beginning of both; flushed after each.

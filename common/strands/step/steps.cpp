@@ -205,7 +205,7 @@ void EncoderSteps::begin(const SnapshotInfo& snapshot, const tangent::Layout& la
   bytes_.clear();
   said_.clear();
   ticks_.reset();
-  is_stepping_ = is_following_ = is_handing_ = false;
+  is_stepping_ = is_following_ = is_handing_ = is_settled_ = false;
   rounding_ = Rounding::Coarse;
   flags_ = say(snapshot, layout);
 }
@@ -312,14 +312,16 @@ void EncoderSteps::end(const SnapshotInfo& snapshot, bool is_disturbed) {
   told_state_.reset();
 }
 
-std::shared_ptr<SharedUpdate> EncoderSteps::take_shared(const tangent::Layout& layout,
+std::shared_ptr<SharedUpdate> EncoderSteps::take_shared(SharedStates which, const tangent::Layout& layout,
                                                         const tangent::History& history) {
+  if (which == SharedStates::Told && !is_settled_) return nullptr;
   constexpr uint32_t kFirstFrames = 4;  // strands that start without velocities are not the simulation's yet
   const bool is_whole = told_model_ != nullptr && told_model_->strand_count == layout.strand_count;
   if (!is_disturbed_ || !predictor_ || !has_model_ || !is_whole || age_ < kFirstFrames) return nullptr;
   if (layout.plane_size() > kMostSharedVertices) return nullptr;
   auto update =
       std::make_shared<SharedUpdate>(SharedUpdate{++shared_number_, last_.tick, told_model_, nullptr});
+  update->is_told = is_settled_;
   shared_tick_ = last_.tick;
   if (shared_model_ != told_model_) {
     ByteReader reader(model_bytes_);
@@ -346,7 +348,7 @@ std::shared_ptr<SharedUpdate> EncoderSteps::take_shared(const tangent::Layout& l
 void EncoderSteps::settle(const tangent::History& history) {
   own_state();
   Steps::settle(history);
-  is_disturbed_ = true;
+  is_disturbed_ = is_settled_ = true;
 }
 
 void EncoderSteps::append_state(std::vector<std::byte>& body) {
@@ -445,6 +447,11 @@ Result<Rounding> DecoderSteps::read_state(ByteReader& body, const Moment& now,
   ASSIGN_OR_RETURN(joined_.scene, read_scene(body));
   ASSIGN_OR_RETURN(StepModel model,
                    read_model(body, rest_in_head_m_, layout.strand_count, layout.vertex_count));
+  shared_.reset();
+  if (keeps_shared_ && model.strand_count == layout.strand_count) {
+    shared_ = std::make_shared<SharedUpdate>();
+    ASSIGN_OR_RETURN(shared_->strands, SharedSteps::make(model, rest_in_head_m_, workers_, set_));
+  }
   ASSIGN_OR_RETURN(joined_.predictor, Predictor::make(std::move(model), ground(layout)));
   RETURN_IF_ERROR(joined_.predictor->read_state(body, now.world_from_head, rounding));
   return rounding;
@@ -460,6 +467,16 @@ void DecoderSteps::take_over(const Moment& now, const tangent::History& history)
   if (!predictor_) return;
   predictor_->set_scene(scene_);
   predictor_->place(history.lattice, history.quantum_m);
+  if (shared_ == nullptr) return;
+  auto state = std::make_shared<PredictedState>();
+  Predictor::copy(predictor_->state(), state->state);
+  state->base = base_;
+  state->lattice = history.lattice;
+  state->quantum_m = history.quantum_m;
+  state->tick = shared_->tick = now.tick;
+  shared_->number = 1;
+  shared_->is_told = true;
+  shared_->state = std::move(state);
 }
 
 }  // namespace strandcast::step

@@ -89,7 +89,8 @@ class EncoderSteps : public Steps {
   /// Appends the state for a joiner; call settle() first.
   void append_state(std::vector<std::byte>& body);
   /// As StrandEncoder::take_shared(), after a frame.
-  std::shared_ptr<SharedUpdate> take_shared(const tangent::Layout& layout, const tangent::History& history);
+  std::shared_ptr<SharedUpdate> take_shared(SharedStates which, const tangent::Layout& layout,
+                                            const tangent::History& history);
 
  private:
   uint8_t say(const SnapshotInfo& snapshot, const tangent::Layout& layout);
@@ -115,6 +116,7 @@ class EncoderSteps : public Steps {
   uint64_t next_told_ = 0;
   uint8_t flags_ = 0;
   bool is_handing_ = false;
+  bool is_settled_ = false;  // a keyframe has its state
 
   bool is_disturbed_ = false;                      // more than a step a frame acted since take_shared()
   std::shared_ptr<const StepModel> shared_model_;  // whose strands were given away
@@ -142,6 +144,10 @@ class DecoderSteps final : public Steps, public StepReader {
   void settle(const tangent::History& history) override;
   Result<Rounding> read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout) override;
   void take_over(const Moment& now, const tangent::History& history) override;
+  /// Keeps what the next keyframe tells, for take_shared().
+  void keep_shared() { keeps_shared_ = true; }
+  /// Returns the strands of the last keyframe, as a simulation goes on from them; null if it told of none.
+  std::shared_ptr<SharedUpdate> take_shared() { return std::move(shared_); }
 
  private:
   /// State read from a keyframe.
@@ -152,6 +158,8 @@ class DecoderSteps final : public Steps, public StepReader {
   };
 
   Joined joined_;  // until take_over()
+  bool keeps_shared_ = false;
+  std::shared_ptr<SharedUpdate> shared_;
   StepScene saved_scene_;
   TickBase saved_base_;
   bool is_saved_ = false;

@@ -132,8 +132,11 @@ class Encoder final : public StrandEncoder {
     if (steps_) steps_->set_state(std::move(state));
   }
   uint64_t step_count() const override { return steps_ ? steps_->step_count() : 0; }
-  std::shared_ptr<SharedUpdate> take_shared() override {
-    return steps_ && has_chain_ ? steps_->take_shared(layout_, chain_.history) : nullptr;
+  std::shared_ptr<SharedUpdate> take_shared(SharedStates which) override {
+    if (!steps_ || !has_chain_ || which == SharedStates::None) return nullptr;
+    auto update = steps_->take_shared(which, layout_, chain_.history);
+    if (update != nullptr) update->sequence = sequence_;
+    return update;
   }
 
  private:
