@@ -122,8 +122,10 @@ const all = {
     const tab = await browser.open(`${mortal.url}#mode=strands`);
     await tab.until((now) => now.states > 3, 'states');
     mortal.child.kill('SIGSTOP'); // as if the link had died unnoticed
-    await tab.evaluate('dispatchEvent(new Event("online"))');
-    await tab.until((now) => /after this machine slept/.test(now.error), 'the answer that does not come');
+    await tab.until(async (now) => {
+      await tab.evaluate('dispatchEvent(new Event("online"))'); // once more, as frames may still be on their way
+      return /after this machine slept/.test(now.error);
+    }, 'the answer that does not come');
     mortal.child.kill('SIGCONT');
     await tab.until((now) => now.isConnected && now.states > 3, 'states again');
     await mortal.end();
@@ -279,7 +281,7 @@ const all = {
     fs.writeFileSync(file, 'viewer right-0123456789abcdef\n', { mode: 0o600 });
     const strict = await Server.start(program, [...SMALL, '--token-file', file, '--distrust-loopback']);
     const tab = await browser.open(strict.url, { width: 320, height: 180 });
-    await tab.until(async () => !(await tab.evaluate('document.getElementById("token-form").hidden')), 'the question');
+    await tab.until(() => tab.evaluate('document.getElementById("token-form")?.hidden === false'), 'the question');
     assert.equal(await tab.evaluate('document.getElementById("trouble-title").textContent'), 'Sign in');
     await tab.until(async () => /^Sign in: /.test(await tab.evaluate('document.title')), 'its title');
     assert.deepEqual(await tab.evaluate(UNREACHABLE), []);
