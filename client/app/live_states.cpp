@@ -11,6 +11,11 @@ namespace {
 
 constexpr std::chrono::milliseconds kStatesPumpWait{20};
 constexpr double kNoStateTimeoutS = 15.0;
+constexpr double kNoStatusS = 2.0;  // after the first state; servers tell their status once a second
+
+double seconds_since(int64_t then_ns) {
+  return static_cast<double>(now_ns() - then_ns) * 1e-9;
+}
 
 }  // namespace
 
@@ -19,11 +24,16 @@ Result<std::unique_ptr<LiveStates>> LiveStates::open(const ClientConfig& config,
   ASSIGN_OR_RETURN(auto live, LiveConnection::open(config));
   std::unique_ptr<LiveStates> states(new LiveStates(std::move(live), stop));
   const int64_t begin_ns = now_ns();
-  // Statuses have the timecode.
-  while (states->waiting_.empty() || states->live_->session().asset() == nullptr ||
-         !states->live_->session().has_status()) {
+  std::optional<int64_t> first_ns;
+  const auto is_begun = [&] {
+    const ViewerSession& session = states->live_->session();
+    if (states->waiting_.empty() || session.asset() == nullptr) return false;
+    if (!first_ns) first_ns = now_ns();
+    return session.has_status() || seconds_since(*first_ns) > kNoStatusS;  // statuses have the timecode
+  };
+  while (!is_begun()) {
     if (stop) return make_error(ErrorCode::Unavailable, "stopped before the first state had come");
-    if (static_cast<double>(now_ns() - begin_ns) * 1e-9 > kNoStateTimeoutS)
+    if (seconds_since(begin_ns) > kNoStateTimeoutS)
       return make_error(ErrorCode::Timeout, "the server sent no state for {} s", kNoStateTimeoutS);
     RETURN_IF_ERROR(states->pump());
   }
@@ -63,7 +73,7 @@ Result<std::shared_ptr<const Snapshot>> LiveStates::next() {
   const int64_t begin_ns = now_ns();
   while (waiting_.empty()) {
     if (stop_) return std::shared_ptr<const Snapshot>();
-    if (static_cast<double>(now_ns() - begin_ns) * 1e-9 > kNoStateTimeoutS)
+    if (seconds_since(begin_ns) > kNoStateTimeoutS)
       return make_error(ErrorCode::Timeout, "no new state for {} s ({})", kNoStateTimeoutS,
                         live_->is_connected() ? "is the server paused?" : live_->trouble());
     RETURN_IF_ERROR(pump());
