@@ -4,6 +4,7 @@
 
 #include "common/base/text.h"
 #include "server/input/live/big_endian_reader.h"
+#include "server/input/live/parsers_private.h"
 
 namespace strandcast {
 namespace {
@@ -212,6 +213,14 @@ std::string to_line(const OscMessage& message) {
     if (skip_argument(tag, bytes) != Skip::Done) break;
   }
   return line;
+}
+
+std::vector<std::string> describe_osc(std::span<const std::byte> packet, size_t limit_bytes) {
+  MonitorLines lines;
+  const auto osc = read_osc(packet, limit_bytes);
+  if (packet.empty() || !osc) return {};
+  for (const OscMessage& message : osc->messages) lines.add(lines.has_room() ? to_line(message) : "");
+  return std::move(lines).take();
 }
 
 }  // namespace strandcast

@@ -4,6 +4,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -54,5 +55,8 @@ class MonitorLines {
   std::vector<std::string> lines_;
   uint64_t left_out_ = 0;
 };
+
+/// Returns describe()'s lines of an OSC packet; none for what is no such packet.
+std::vector<std::string> describe_osc(std::span<const std::byte> packet, size_t limit_bytes);
 
 }  // namespace strandcast

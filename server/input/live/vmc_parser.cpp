@@ -223,13 +223,7 @@ class VmcParser : public LiveParser {
   uint64_t ignored() const override { return ignored_; }
   std::vector<std::string> take_notes() override { return std::exchange(notes_, {}); }
 
-  std::vector<std::string> describe() const override {
-    MonitorLines lines;
-    const auto osc = read_osc(last_, limit_bytes_);
-    if (last_.empty() || !osc) return {};
-    for (const OscMessage& message : osc->messages) lines.add(lines.has_room() ? to_line(message) : "");
-    return std::move(lines).take();
-  }
+  std::vector<std::string> describe() const override { return describe_osc(last_, limit_bytes_); }
 
  private:
   /// False for a message that is not known, or has other arguments than its address asks for.
