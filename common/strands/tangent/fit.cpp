@@ -155,7 +155,7 @@ class SampleRow {
     for (uint32_t lane = 0; lane < eight.count; ++lane)
       for (size_t axis = 0; axis < 3; ++axis) fit.count(trusted[lane]);
     const auto own = [&](const auto* row) STRANDCAST_LANES_LAMBDA { return eight.take<are_pieces>(row); };
-    add_features(trusted, fit, eight, own, std::make_index_sequence<kMotionFeatures.size()>());
+    add_features(trusted, fit, eight, own);
     add_head(own, trusted, fit);
     LaneVectors wanted;
     for (size_t axis = 0; axis < 3; ++axis) wanted.axis[axis] = now(axis, 0, own);
@@ -163,40 +163,33 @@ class SampleRow {
     fit.add_eights(3);
   }
 
-  // The table is read while compiling.
-  template <class Own, size_t... k>
-  STRANDCAST_LANES void add_features(const Lanes& trusted, MotionFit& fit, const SampleEight& eight, Own own,
-                                     std::index_sequence<k...>) const {
-    std::array<std::array<uint32_t, kLaneCount>, 2> place;
-    for (size_t which = 0; which < 2; ++which)
-      for (uint32_t lane = 0; lane < kLaneCount; ++lane)
-        place[which][lane] = layout_.neighbour[which][eight.place[lane]];
-    const auto neighbour = [&](const auto* row)
-                               STRANDCAST_LANES_LAMBDA { return gather_lanes(row, place[0].data()); };
-    const auto second = [&](const auto* row)
-                            STRANDCAST_LANES_LAMBDA { return gather_lanes(row, place[1].data()); };
-    const auto add = [&]<size_t which>(std::integral_constant<size_t, which>) STRANDCAST_LANES_LAMBDA {
-      constexpr MotionStrand kStrand = kMotionFeatures[which].strand;
-      if constexpr (kStrand == MotionStrand::Own)
-        add_feature<which>(own, trusted, fit);
-      else if constexpr (kStrand == MotionStrand::Neighbour)
-        add_feature<which>(neighbour, trusted, fit);
-      else
-        add_feature<which>(second, trusted, fit);
-    };
-    (add(std::integral_constant<size_t, k>()), ...);
+  /// What takes the vertices of eight places' nearest (0) or second neighbours.
+  STRANDCAST_LANES auto neighbours_of(const SampleEight& eight, size_t which) const {
+    std::array<uint32_t, kLaneCount> place;
+    for (uint32_t lane = 0; lane < kLaneCount; ++lane)
+      place[lane] = layout_.neighbour[which][eight.place[lane]];
+    return [place](const auto* row) STRANDCAST_LANES_LAMBDA { return gather_lanes(row, place.data()); };
   }
-  template <size_t k, class Take>
-  STRANDCAST_LANES void add_feature(Take take, const Lanes& trusted, MotionFit& fit) const {
-    constexpr MotionFeature kFeature = kMotionFeatures[k];
-    LaneVectors value;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      if constexpr (kFeature.quantity == MotionQuantity::Now)
-        value.axis[axis] = now(axis, static_cast<uint32_t>(-kFeature.tipward), take);
-      else
-        value.axis[axis] = take(rows_[axis][k]);
+  /// Loops, as one body a feature would cost the compiler a minute and gain nothing.
+  template <class Own>
+  STRANDCAST_LANES void add_features(const Lanes& trusted, MotionFit& fit, const SampleEight& eight,
+                                     Own own) const {
+    add_features_of<MotionStrand::Own>(own, trusted, fit);
+    add_features_of<MotionStrand::Neighbour>(neighbours_of(eight, 0), trusted, fit);
+    add_features_of<MotionStrand::SecondNeighbour>(neighbours_of(eight, 1), trusted, fit);
+  }
+  template <MotionStrand strand, class Take>
+  STRANDCAST_LANES void add_features_of(Take take, const Lanes& trusted, MotionFit& fit) const {
+    constexpr uint32_t kFirst = first_feature_of(strand), kEnd = kFirst + feature_count_of(strand);
+    for (uint32_t k = kFirst; k < kEnd; ++k) {
+      const MotionFeature& feature = kMotionFeatures[k];
+      LaneVectors value;
+      for (size_t axis = 0; axis < 3; ++axis)
+        value.axis[axis] = feature.quantity == MotionQuantity::Now
+                               ? now(axis, static_cast<uint32_t>(-feature.tipward), take)
+                               : take(rows_[axis][k]);
+      put(k, value, trusted, fit);
     }
-    put(k, value, trusted, fit);
   }
 
   template <class Own>

@@ -79,12 +79,12 @@ struct Corners {
   /// Tries the corner of the cell nearest to the origin first, then the two beside it, then the opposite one.
   STRANDCAST_LANES void try_with(const IntLanes& correction, Found& found) const {
     found.consider({low_a, low_b, correction});
-    if (!is_any(found.is_open)) return;
-    found.consider({is_a_farther ? high_a : low_a, is_a_farther ? low_b : high_b, correction});
-    if (!is_any(found.is_open)) return;
-    found.consider({is_a_farther ? low_a : high_a, is_a_farther ? high_b : low_b, correction});
-    if (!is_any(found.is_open)) return;
-    found.consider({high_a, high_b, correction});
+    for (uint32_t corner = 1; corner < 4 && is_any(found.is_open); ++corner) {
+      const IntLanes nearer = corner == 1 ? is_a_farther : ~is_a_farther;
+      const IntLanes is_high_a = corner == 3 ? IntLanes{} - 1 : nearer;
+      const IntLanes is_high_b = corner == 3 ? IntLanes{} - 1 : ~nearer;
+      found.consider({is_high_a ? high_a : low_a, is_high_b ? high_b : low_b, correction});
+    }
   }
 };
 
@@ -99,9 +99,12 @@ STRANDCAST_LANES void find_codes(Found& found) {
   const IntLanes rounded = nearest_lanes(of.length);
   const IntLanes is_near = sizes_of(of.length - to_floats(found.origin.length)) <= kAsIs;
   found.is_open = of.is_possible;
-  corners.try_with(is_near ? found.origin.length : rounded, found);
-  found.is_open &= is_near & (rounded != found.origin.length);
-  if (is_any(found.is_open)) corners.try_with(rounded, found);
+  IntLanes length = is_near ? found.origin.length : rounded;
+  for (uint32_t attempt = 0; attempt < 2 && is_any(found.is_open); ++attempt) {
+    corners.try_with(length, found);
+    found.is_open &= is_near & (rounded != found.origin.length);
+    length = rounded;
+  }
 }
 
 /// A block of which some vertices are to be escaped.
