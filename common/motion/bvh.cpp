@@ -204,6 +204,23 @@ Result<uint32_t> find_head(const Skeleton& skeleton, const std::string& wanted) 
                     wanted.empty() ? "Head or head" : shown(wanted), known_joints(skeleton));
 }
 
+uint32_t root_of(const Skeleton& skeleton, uint32_t joint) {
+  while (skeleton.joints[joint].parent != kNoJoint) joint = skeleton.joints[joint].parent;
+  return joint;
+}
+
+/// Whose head is taken, where the file has several; empty for one performer.
+std::string other_heads(const Skeleton& skeleton, uint32_t head) {
+  std::string others;
+  for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
+    if (!is_head_name(skeleton.joints[i].name) || root_of(skeleton, i) == root_of(skeleton, head)) continue;
+    others += fmt::format("{}{}", others.empty() ? "" : ", ", shown(skeleton.joints[i].name));
+  }
+  if (others.empty()) return {};
+  return fmt::format("of several performers the one with {} is taken, others have {} (--joint takes another)",
+                     shown(skeleton.joints[head].name), others);
+}
+
 /// Joints from the root down to the head.
 std::vector<const Joint*> path_to(const Skeleton& skeleton, uint32_t joint_index) {
   std::vector<const Joint*> path;
@@ -220,7 +237,14 @@ bool guess_z_up(const std::vector<const Joint*>& path) {
   return head.z > kUpClearly * std::abs(head.y);
 }
 
+/// Axes of a file.
+struct FileUp {
+  bool is_z_at_rest = false, is_z_in_motion = false;
+};
+
 constexpr double kLeastLegShare = 0.1;  // of the height above the hips
+// Legs that end at a knee: the hips stand so many times higher over the floor than their bones reach.
+constexpr double kShortLegs = 1.2, kShortestLegs = 2.5;
 
 /// Where a joint lies from the one above it: its positions in a row go before its OFFSET.
 glm::dvec3 place_of(const Joint& joint, std::span<const double> row) {
@@ -231,13 +255,16 @@ glm::dvec3 place_of(const Joint& joint, std::span<const double> row) {
 }
 
 /// Body height, file units: the bones from the hips down to the lowest point and up to the highest one, as
-/// long as they are; rest poses often spread the legs. 0 for a skeleton without extent.
-double body_height(const Skeleton& skeleton, bool is_z_up, std::span<const double> first_row) {
+/// long as they are; rest poses often spread the legs. Where the hips stand higher over the floor than these
+/// legs reach, that counts. Of the tree of `head` alone; 0 for a skeleton without extent.
+double body_height(const Skeleton& skeleton, uint32_t head, const FileUp& axes,
+                   std::span<const double> first_row) {
   struct Reach {
     double height = 0.0;  // above the root with all rotations zero
     double bones = 0.0;   // length of the bones from the root
   };
-  const int up = is_z_up ? 2 : 1;
+  const int up = axes.is_z_at_rest ? 2 : 1;
+  const uint32_t root = root_of(skeleton, head);
   const auto grown = [&](const Reach& parent, const glm::dvec3& offset) {
     return Reach{parent.height + offset[up], parent.bones + glm::length(offset)};
   };
@@ -245,19 +272,22 @@ double body_height(const Skeleton& skeleton, bool is_z_up, std::span<const doubl
   double root_height = 0.0;
   for (const Joint& joint : skeleton.joints) {
     const glm::dvec3 place = place_of(joint, first_row);
-    if (joint.parent == kNoJoint) root_height = place[up];
-    reach.push_back(joint.parent == kNoJoint ? Reach{} : grown(reach[joint.parent], place));
+    const bool is_own = root_of(skeleton, static_cast<uint32_t>(reach.size())) == root;
+    if (is_own && joint.parent == kNoJoint) root_height = place[axes.is_z_in_motion ? 2 : 1];
+    reach.push_back(joint.parent == kNoJoint || !is_own ? Reach{} : grown(reach[joint.parent], place));
   }
   const size_t joint_count = reach.size();
   for (const EndSite& site : skeleton.end_sites) {
     CHECK(site.parent < joint_count);
-    reach.push_back(grown(reach[site.parent], site.offset));
+    if (root_of(skeleton, site.parent) == root) reach.push_back(grown(reach[site.parent], site.offset));
   }
   const auto [lowest, highest] = std::minmax_element(
       reach.begin(), reach.end(), [](const Reach& a, const Reach& b) { return a.height < b.height; });
   // Of a body without legs the hips are as high as these would be long.
   const bool has_legs = lowest->height < -kLeastLegShare * highest->height;
-  return (has_legs ? lowest->bones : std::max(root_height, 0.0)) + highest->bones;
+  const bool are_legs_cut =
+      root_height > kShortLegs * lowest->bones && root_height < kShortestLegs * lowest->bones;
+  return (has_legs && !are_legs_cut ? lowest->bones : std::max(root_height, 0.0)) + highest->bones;
 }
 
 /// Sets the clip's unit to the one that makes a body of `height` file units about as tall as people are.
@@ -365,6 +395,8 @@ struct Rows {
   std::vector<uint8_t> is_good;        // of each; the pose of a bad one is none
   std::vector<double> first;           // the first good one
   std::array<double, 2> rest_share{};  // of the first two good ones
+  glm::dvec3 lift{0.0};                // sums of good ones: from the root to the head, and the root's place
+  glm::dvec3 root{0.0};
   BadItems bad;
 };
 
@@ -393,6 +425,9 @@ Result<Rows> read_rows(TextCursor& cursor, const Skeleton& skeleton, const Joint
     ++good_count;
     clip.world_from_head.push_back(evaluate(head, row));
     const Pose& at_frame = clip.world_from_head.back();
+    const glm::dvec3 root = place_of(*head.front(), row);
+    rows.lift += at_frame.position_m - root;
+    rows.root += root;
     for (const JointPath& joint : body)
       clip.joint_m.push_back(glm::conjugate(at_frame.rotation) *
                              (evaluate(joint, row).position_m - at_frame.position_m));
@@ -434,15 +469,28 @@ bool begins_with_t_pose(const std::vector<Pose>& poses, double rest_share_first,
   return first > kTPoseStepRatio * median(std::move(steps));
 }
 
+/// Whether +Z is up in the motion, which need not be up at rest: who stands has the head above the hips, and
+/// these above the floor.
+bool moves_z_up(const Rows& rows, bool is_rest_z_up) {
+  const int rest = is_rest_z_up ? 2 : 1, other = is_rest_z_up ? 1 : 2;
+  const bool is_other = rows.lift[other] > kUpClearly * std::abs(rows.lift[rest]) &&
+                        rows.lift[other] > kUpClearly * std::abs(rows.lift.x) &&
+                        rows.root[other] > 0.5 * rows.lift[other];
+  return is_other != is_rest_z_up;
+}
+
+glm::dquat upright_from(bool is_z_up) {
+  return is_z_up ? glm::angleAxis(glm::radians(-90.0), kAxis[0]) : glm::dquat(1, 0, 0, 0);
+}
+
 /// From the file's axes and units to world axes and metres.
-void to_world(std::vector<Pose>& poses, double unit_m, bool is_z_up, bool recentre) {
-  const double quarter_turn_rad = glm::radians(90.0);
-  const glm::dquat world_from_file =
-      is_z_up ? glm::angleAxis(-quarter_turn_rad, kAxis[0]) : glm::dquat(1, 0, 0, 0);
+void to_world(std::vector<Pose>& poses, double unit_m, const FileUp& up, bool recentre) {
+  const glm::dquat world_from_file = upright_from(up.is_z_in_motion);
+  const glm::dquat rest_from_upright = glm::conjugate(upright_from(up.is_z_at_rest));
   for (Pose& pose : poses) {
     pose.position_m = world_from_file * (pose.position_m * unit_m);
     // On both sides: the file's rest pose is turned upright too, so that it becomes the identity.
-    pose.rotation = glm::normalize(world_from_file * pose.rotation * glm::conjugate(world_from_file));
+    pose.rotation = glm::normalize(world_from_file * pose.rotation * rest_from_upright);
   }
   if (!recentre) return;
   const glm::dvec3 start = poses.front().position_m * glm::dvec3(1, 0, 1);
@@ -450,30 +498,36 @@ void to_world(std::vector<Pose>& poses, double unit_m, bool is_z_up, bool recent
 }
 
 /// Likewise: seen from the head, whose rest pose is upright.
-void to_head_space(std::vector<glm::dvec3>& places, double unit_m, bool is_z_up) {
-  const glm::dquat upright = is_z_up ? glm::angleAxis(glm::radians(-90.0), kAxis[0]) : glm::dquat(1, 0, 0, 0);
+void to_head_space(std::vector<glm::dvec3>& places, double unit_m, bool is_z_at_rest) {
+  const glm::dquat upright = upright_from(is_z_at_rest);
   for (glm::dvec3& place : places) place = upright * (place * unit_m);
 }
 
-/// Paths to the joints of the body that are known, and their names; NotFound for one that was asked for.
-Result<std::vector<JointPath>> find_body(const Skeleton& skeleton, const BvhOptions& options,
+/// Paths to the joints of the body that are known, and their names; NotFound for one that was asked for. In
+/// the tree of the head; what is asked for may be in another one.
+Result<std::vector<JointPath>> find_body(const Skeleton& skeleton, uint32_t head, const BvhOptions& options,
                                          std::vector<std::string>& names) {
-  std::vector<std::string> in_file;
-  for (const Joint& joint : skeleton.joints) in_file.push_back(joint.name);
+  std::vector<std::string> in_file, of_head;
+  for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
+    in_file.push_back(skeleton.joints[i].name);
+    of_head.push_back(root_of(skeleton, i) == root_of(skeleton, head) ? in_file.back() : std::string());
+  }
   std::vector<JointPath> paths;
   const auto add = [&](const std::string& name, size_t joint) {
     names.push_back(name);
     paths.push_back(path_to(skeleton, static_cast<uint32_t>(joint)));
   };
   if (options.has_body)
-    for (const auto& [name, joint] : usual_body(in_file)) add(name, joint);
+    for (const auto& [name, joint] : usual_body(of_head)) add(name, joint);
   for (const std::string& wanted : options.body_joints) {
-    const auto found = std::find(in_file.begin(), in_file.end(), wanted);
-    if (found == in_file.end())
+    const bool is_own = std::find(of_head.begin(), of_head.end(), wanted) != of_head.end();
+    const std::vector<std::string>& searched = is_own ? of_head : in_file;
+    const auto found = std::find(searched.begin(), searched.end(), wanted);
+    if (found == searched.end())
       return make_error(ErrorCode::NotFound, "no joint named {} (--body-joint, known: {})", shown(wanted),
                         known_joints(skeleton));
     if (std::find(names.begin(), names.end(), wanted) == names.end())
-      add(wanted, static_cast<size_t>(found - in_file.begin()));
+      add(wanted, static_cast<size_t>(found - searched.begin()));
   }
   if (names.size() > kMaxBodyJoints)
     return make_error(ErrorCode::LimitExceeded, "{} joints of the body, the limit is {}", names.size(),
@@ -499,7 +553,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   MotionClip clip;
   std::vector<JointPath> body;
   if (options.has_body || !options.body_joints.empty()) {
-    auto found = find_body(skeleton, options, clip.joint_name);
+    auto found = find_body(skeleton, *head, options, clip.joint_name);
     if (!found) return at(place, found.error());
     body = std::move(found).value();
   }
@@ -515,10 +569,19 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   if (options.skip_first_frame_if_t_pose &&
       begins_with_t_pose(clip.world_from_head, rows.rest_share[0], rows.rest_share[1]))
     leave_out_first_frames(clip, 1);
-  const bool is_z_up = options.is_z_up.value_or(guess_z_up(path));
-  if (is_z_up && !options.is_z_up)
+  if (std::string others = other_heads(skeleton, *head); !others.empty())
+    clip.repairs.push_back(std::move(others));
+  FileUp up;
+  up.is_z_at_rest = options.is_z_up.value_or(guess_z_up(path));
+  up.is_z_in_motion = options.is_z_up.value_or(moves_z_up(rows, up.is_z_at_rest));
+  if (up.is_z_at_rest != up.is_z_in_motion)
+    clip.up_reason = fmt::format(
+        "+{} is taken as up: there the head is above the hips in the motion, though +{} "
+        "is up in the rest pose",
+        up.is_z_in_motion ? 'Z' : 'Y', up.is_z_at_rest ? 'Z' : 'Y');
+  else if (up.is_z_at_rest && !options.is_z_up)
     clip.up_reason = "+Z is taken as up: there the head is above the hips in the rest pose";
-  const double height = body_height(skeleton, is_z_up, rows.first);
+  const double height = body_height(skeleton, *head, up, rows.first);
   const bool is_guessed = options.unit_m == 0.0;
   if (is_guessed && !(height > 0.0))
     return at(place, make_error(ErrorCode::BadInput,
@@ -527,8 +590,8 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
     guess_unit(clip, height);
   else
     clip.file_unit_m = options.unit_m;
-  to_world(clip.world_from_head, clip.file_unit_m, is_z_up, options.recentre);
-  to_head_space(clip.joint_m, clip.file_unit_m, is_z_up);
+  to_world(clip.world_from_head, clip.file_unit_m, up, options.recentre);
+  to_head_space(clip.joint_m, clip.file_unit_m, up.is_z_at_rest);
   return clip;
 }
 

@@ -58,7 +58,8 @@ struct BvhOptions {
 /// Loads world poses of the head joint, one per frame. Rotations are applied in the order of CHANNELS; a
 /// position channel of any joint replaces that axis of its OFFSET. The rest pose (all rotations zero) is
 /// assumed to look along +Z if +Y is up, and along -Y if +Z is up, as in all known files. It becomes the
-/// identity: +Z forward, +Y up.
+/// identity: +Z forward, +Y up. The up axis of the motion may differ from that of the rest pose, and is
+/// guessed by itself: where the head is above the hips. Of several performers the first with a head counts.
 /// Frames that cannot be read are bridged, and there are as many as there are rows; MotionClip's repairs say
 /// so. BadInput and LimitExceeded name file and line; NotFound lists the joints.
 Result<MotionClip> load_bvh(const std::filesystem::path& path, const BvhOptions& options);

@@ -15,6 +15,7 @@
 namespace strandcast::bvh_test {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -554,6 +555,72 @@ TEST(Bvh, TheUpAxisIsWhereTheHeadIsAboveTheHipsAtRest) {
   EXPECT_EQ(up_of("0 10 12"), "") << "a bent body";
   EXPECT_EQ(up_of("0 1 20", false), "") << "stated";
   EXPECT_EQ(up_of("0 1 20", true), "") << "stated";
+}
+
+// Who stands has the head above the hips, whatever the rest pose says.
+TEST(Bvh, TheUpAxisOfTheMotionMayBeAnother) {
+  BvhOptions options = kPlain;
+  options.is_z_up.reset();
+  // Y is up at rest; the hips are turned by 90 degrees about X, 5 high along Z: the body stands up along Z.
+  const MotionClip stands = parsed(small_with("0 0 5 0 0 90 0 0 0 0 0 0\n1 0 5 0 0 90 0 0 0 0 0 0"), options);
+  EXPECT_THAT(stands.up_reason, AllOf(HasSubstr("+Z is taken as up"), HasSubstr("in the motion, though +Y")));
+  const Pose& first = stands.world_from_head[0];
+  EXPECT_NEAR(first.position_m.y, 7.0, 1e-12) << "hips, and 2 above them";
+  EXPECT_NEAR(glm::distance(first.rotation * glm::dvec3(0, 1, 0), glm::dvec3(0, 1, 0)), 0.0, 1e-12);
+  EXPECT_NEAR(glm::distance(first.rotation * glm::dvec3(0, 0, 1), glm::dvec3(0, 0, 1)), 0.0, 1e-12);
+  // Who lies on a floor has the hips there too.
+  EXPECT_EQ(parsed(small_with("0 .2 0 0 0 90 0 0 0 0 0 0\n1 .2 0 0 0 90 0 0 0 0 0 0"), options).up_reason,
+            "");
+  options.is_z_up = false;
+  EXPECT_EQ(parsed(small_with("0 0 5 0 0 90 0 0 0 0 0 0\n1 0 5 0 0 90 0 0 0 0 0 0"), options).up_reason, "")
+      << "stated";
+}
+
+// Legs that end at the knees are no measure where the hips stand higher.
+TEST(Bvh, ABodyIsAsHighAsItsHipsStand) {
+  BvhOptions options = kPlain;
+  options.unit_m = 0.0;
+  const auto unit_at = [&](double hips) {
+    const std::string end = "End Site\n{\nOFFSET 0 0 0\n}\n}\n";
+    return parsed(
+               "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\nJOINT "
+               "Head\n{\nOFFSET 0 78 0\nCHANNELS 0\n" +
+                   end + "JOINT Knee\n{\nOFFSET 0 -45 0\nCHANNELS 0\n" + end +
+                   fmt::format("}}\nMOTION\nFrames: 1\nFrame Time: .01\n0 {} 0\n", hips),
+               options)
+        .file_unit_m;
+  };
+  EXPECT_EQ(unit_at(95.0), 0.01);
+  EXPECT_NE(unit_at(0.0), 0.01) << "by 123 units of bones alone";
+  EXPECT_EQ(unit_at(0.0), unit_at(500.0)) << "on a roof";
+}
+
+TEST(Bvh, OfSeveralPerformersOneIsTakenAndNamed) {
+  const auto performer = [](const std::string& name, const std::string& body) {
+    return "ROOT " + name + ":Hips\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n" + body +
+           "}\n";
+  };
+  const auto joint = [](const std::string& name, double height) {
+    return "JOINT " + name +
+           fmt::format("\n{{\nOFFSET 0 {} 0\nCHANNELS 0\nEnd Site\n{{\nOFFSET 0 0 0\n}}\n}}\n", height);
+  };
+  const std::string text = "HIERARCHY\n" + performer("ann", joint("ann:Head", 80) + joint("ann:Foot", -90)) +
+                           performer("giant", joint("giant:Neck", 900) + joint("giant:Head", 1000)) +
+                           "MOTION\nFrames: 1\nFrame Time: .01\n0 90 0 500 90 0\n";
+  BvhOptions options = kPlain;
+  options.unit_m = 0.0;
+  options.has_body = true;
+  const MotionClip clip = parsed(text, options);
+  EXPECT_EQ(clip.file_unit_m, 0.01) << "by ann's own bones";
+  EXPECT_THAT(clip.joint_name, testing::IsEmpty()) << "the neck is the other's";
+  EXPECT_THAT(clip.repairs,
+              testing::ElementsAre(
+                  AllOf(HasSubstr("ann:Head"), HasSubstr("others have giant:Head"), HasSubstr("--joint"))));
+  options.head_joint = "giant:Head";
+  const MotionClip other = parsed(text, options);
+  EXPECT_THAT(other.joint_name, testing::ElementsAre("neck"));
+  EXPECT_THAT(other.repairs,
+              testing::ElementsAre(HasSubstr("the one with giant:Head is taken, others have ann:Head")));
 }
 
 TEST(BvhRealFiles, GuessedUpAxesAreTheKnownOnes) {
