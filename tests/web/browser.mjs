@@ -1,30 +1,22 @@
 // A browser for tests: headless Chromium over its own protocol on a pipe, without any package of Node.
 //   const browser = await Browser.start(); const tab = await browser.open('http://127.0.0.1:7878/');
 //   await tab.until('document.title === "Strandcast"'); await browser.end();
-import { spawn, spawnSync } from 'node:child_process';
+import { spawn } from 'node:child_process';
 import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 
 const USUAL_MS = 30_000;
-const POLL_MS = 50;
+const POLL_MS = 100; // the page tells of itself twice a second
+const MOST_SAID = 4000; // characters of its complaints
 
 function findChromium() {
   const names = ['chromium', 'chromium-browser', 'google-chrome'];
   const folders = (process.env.PATH ?? '').split(':');
   return folders.flatMap((folder) => names.map((name) => path.join(folder, name))).find((file) => fs.existsSync(file));
 }
-/** Why there is no browser to test with; undefined where there is one. */
-export function whyNoBrowser() {
-  const chromium = findChromium();
-  if (!chromium) return 'needs a browser (chromium)';
-  const profile = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-browser-'));
-  const options = ['--headless=new', `--user-data-dir=${profile}`, '--disable-dev-shm-usage', ...asRoot()];
-  const shown = spawnSync(chromium, [...options, '--dump-dom', 'data:text/html,<p>here</p>'], { encoding: 'utf8', timeout: 2 * USUAL_MS });
-  fs.rmSync(profile, { recursive: true, force: true, maxRetries: 50, retryDelay: 100 });
-  if (shown.stdout?.includes('<p>here</p>')) return undefined;
-  return `${chromium} shows no page here: ${shown.stderr?.trim().split('\n').pop() || shown.error || `status ${shown.status}`}`;
-}
+/** Why there is no browser to test with; undefined where there may be one. */
+export const whyNoBrowser = () => (findChromium() ? undefined : 'needs a browser (chromium)');
 const asRoot = () => (process.getuid?.() === 0 ? ['--no-sandbox'] : []);
 export const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
 
@@ -49,11 +41,25 @@ export class Browser {
       '--disable-background-networking', '--disable-component-update', '--disable-extensions', '--disable-dev-shm-usage',
       '--hide-scrollbars', '--mute-audio', '--ignore-certificate-errors',
       ...asRoot(), ...graphics, ...options, 'about:blank',
-    ], { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
+    ], { stdio: ['ignore', 'ignore', 'pipe', 'pipe', 'pipe'] });
     return new Browser(child, profile);
   }
+  /** The first one of a test, which is skipped where the browser shows no page. */
+  static async startOrSkip(...wishes) {
+    const missing = whyNoBrowser();
+    if (!missing) {
+      const browser = await Browser.start(...wishes);
+      const tab = await Promise.race([browser.open('data:text/html,<p>here</p>').catch(() => undefined), sleep(2 * USUAL_MS)]);
+      if (await tab?.until(() => tab.evaluate('document.body?.innerText === "here"').catch(() => false), 'a page').catch(() => false)) return tab.close().then(() => browser);
+      console.log(`skipped: ${findChromium()} shows no page here: ${browser.said.trim().split('\n').pop()}`);
+      await browser.end();
+    } else console.log(`skipped: ${missing}`);
+    process.exit(77);
+  }
   constructor(child, profile) {
-    Object.assign(this, { child, profile, nextId: 1, waiting: new Map(), tabs: new Map(), rest: '' });
+    Object.assign(this, { child, profile, nextId: 1, waiting: new Map(), tabs: new Map(), rest: '', said: '' });
+    child.stdio[2].setEncoding('utf8').on('data', (text) => (this.said = (this.said + text).slice(-MOST_SAID)));
+    child.stdio[3].on('error', () => {}); // of a browser that has ended
     child.stdio[4].setEncoding('utf8').on('data', (text) => {
       const parts = (this.rest + text).split('\0');
       this.rest = parts.pop();
@@ -85,7 +91,7 @@ export class Browser {
     this.tabs.set(sessionId, tab);
     for (const domain of ['Page', 'Runtime', 'Network', 'Log']) await tab.send(`${domain}.enable`);
     if (seesWorkers) await tab.send('Target.setAutoAttach', { autoAttach: true, waitForDebuggerOnStart: false, flatten: true });
-    await tab.send('Emulation.setDeviceMetricsOverride', { width, height, deviceScaleFactor: 1, mobile: false });
+    await tab.resize(width, height);
     await tab.go(url);
     return tab;
   }
@@ -120,6 +126,9 @@ export class Tab {
   }
   go(url) {
     return this.send('Page.navigate', { url });
+  }
+  resize(width, height) {
+    return this.send('Emulation.setDeviceMetricsOverride', { width, height, deviceScaleFactor: 1, mobile: false });
   }
   async evaluate(expression) {
     const { result, exceptionDetails } = await this.send('Runtime.evaluate', { expression, awaitPromise: true, returnByValue: true });

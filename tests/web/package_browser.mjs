@@ -7,18 +7,19 @@ import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 import { pathToFileURL } from 'node:url';
-import { Browser, sleep, whyNoBrowser } from './browser.mjs';
+import { Browser, sleep } from './browser.mjs';
 import { NodeSocket } from './node_socket.mjs';
 import { HEAD, PackageSite, root, whyNoThree } from './package_site.mjs';
 import { psnr, readPng } from './png.mjs';
 import { Server, SMALL } from './server.mjs';
 
 const [program, tar, shots] = process.argv.slice(2);
-const missing = whyNoBrowser() ?? whyNoThree();
+const missing = whyNoThree();
 if (missing) {
   console.log(`skipped: ${missing}`);
   process.exit(77);
 }
+const browser = await Browser.startOrSkip();
 const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-package-'));
 const Socket = globalThis.WebSocket ?? NodeSocket;
 const LEAST_DB = 40;
@@ -103,7 +104,6 @@ const PAGES = {
 PAGES['/lines.html'] = () => PAGES['/hair.html']().replace('followsPose: true', "followsPose: true, style: 'lines'");
 
 let server;
-let browser;
 let site;
 let strandcast; // in this Node
 let pausing; // stays, so that the state does
@@ -200,7 +200,6 @@ try {
   if (shots) fs.mkdirSync(shots, { recursive: true });
   site = await PackageSite.open(tar, work, PAGES);
   server = await Server.start(program, [...SMALL, '--allow-origin', site.origin]);
-  browser = await Browser.start();
   strandcast = await import(pathToFileURL(path.join(work, 'node_modules/strandcast/node.js')));
   pausing = strandcast.connect(server.url, { WebSocket: Socket });
   await pausing.opened;
@@ -215,7 +214,7 @@ try {
   pausing.close();
   site.close();
 } finally {
-  await browser?.end();
+  await browser.end();
   await server?.end();
   fs.rmSync(work, { recursive: true, force: true });
 }

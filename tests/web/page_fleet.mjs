@@ -8,7 +8,7 @@ import fs from 'node:fs';
 import net from 'node:net';
 import os from 'node:os';
 import path from 'node:path';
-import { Browser, sleep, whyNoBrowser } from './browser.mjs';
+import { Browser, sleep } from './browser.mjs';
 
 const [source, programs, shots] = process.argv.slice(2);
 if (!programs) {
@@ -17,12 +17,13 @@ if (!programs) {
 }
 const folders = [...(process.env.PATH ?? '').split(':'), '/usr/sbin'];
 const find = (name) => folders.map((folder) => path.join(folder, name)).find((file) => fs.existsSync(file));
-const missing = ['haproxy', 'python3'].filter((name) => !find(name)).map((name) => `needs ${name}`)[0] ?? whyNoBrowser();
+const missing = ['haproxy', 'python3'].filter((name) => !find(name)).map((name) => `needs ${name}`)[0];
 if (missing) {
   console.log(`skipped: ${missing}`);
   process.exit(77);
 }
 
+const browser = await Browser.startOrSkip();
 const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-page-fleet-'));
 const env = {
   ...process.env, STRANDCAST_FLEET: path.join(work, 'fleet'), FAKE_SLURM: path.join(work, 'slurm'), FAKE_GPUS: '1',
@@ -78,7 +79,6 @@ function killJob(folder) {
 }
 
 let port;
-let browser;
 let token;
 const link = (words) => `http://127.0.0.1:${port}/s/anna/#token=${token}&${words}`;
 
@@ -169,7 +169,6 @@ try {
   await until(() => fs.existsSync(path.join(work, 'socket')) && fs.readFileSync(path.join(work, 'tend.log'), 'utf8').includes('tending'), 'HAProxy and who tends');
   await fleet('start', 'anna', '--', ...SMALL);
   token = fs.readFileSync(path.join(work, 'fleet/sessions/anna/viewer_token'), 'utf8');
-  browser = await Browser.start();
   for (const [name, test] of Object.entries(all)) {
     const since = Date.now();
     try {
@@ -181,7 +180,7 @@ try {
     }
   }
 } finally {
-  await browser?.end();
+  await browser.end();
   // Who tends first, so that nothing is started any more.
   await Promise.all(started.map((child) => child.exitCode ?? child.signalCode ?? new Promise((done) => child.once('exit', done).kill('SIGKILL'))));
   await fleet('stop', 'anna').catch(() => {});

@@ -6,15 +6,14 @@ import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import path from 'node:path';
 import { Browser, sleep } from './browser.mjs';
-import { begin, program, runAll, shots, work } from './served.mjs';
+import { begin, program, runAll, sharedTab, shots, work } from './served.mjs';
 import { Server, SMALL } from './server.mjs';
 
-// The last one is a window of 1280 x 720 at four times its size.
-const SIZES = [[640, 360], [568, 320], [480, 270], [360, 640], [320, 256], [320, 180]];
+// With them a window of 1280 x 720 at one, two, three and four times its size.
+const SIZES = [[1280, 720], [640, 360], [568, 320], [480, 270], [427, 240], [360, 640], [320, 256], [320, 180]];
 const { browser, server } = await begin();
 
 const shown = (tab) => tab.evaluate('Number(document.body.dataset.pictures ?? 0)');
-const resize = (tab, [width, height]) => tab.send('Emulation.setDeviceMetricsOverride', { width, height, deviceScaleFactor: 1, mobile: false });
 const shoot = async (tab, name) => void (shots && (await tab.screenshot(path.join(shots, `${name}.png`))));
 /** Of the server's pictures, for a window of this size. */
 const pictureSide = (side) => Math.max(64, Math.round(side / 16) * 16);
@@ -42,6 +41,48 @@ const UNREACHABLE = `(() => {
   return faults;
 })()`;
 
+/** The least contrast of the page's texts and icons with what may be behind them (WCAG 2.2, 1.4.3 and 1.4.11): what lets light
+    through lies on white and on black, whichever is worse. In shares of what each needs; 1 is enough. */
+const LEAST_CONTRAST = `(() => {
+  const rgba = (text) => { const [r, g, b, a = 1] = text.match(/[\\d.]+/g).map(Number); return [r, g, b, a]; };
+  const over = ([r, g, b, a], under) => [r, g, b].map((one, i) => one * a + under[i] * (1 - a));
+  const light = (color) => color.map((one) => one / 255).map((one) => (one <= 0.04045 ? one / 12.92 : ((one + 0.055) / 1.055) ** 2.4))
+    .reduce((sum, one, i) => sum + one * [0.2126, 0.7152, 0.0722][i], 0);
+  const behind = (one, base) => {
+    const layers = [];
+    for (let at = one; at && at.localName !== 'main' && at !== document.body; at = at.parentElement) layers.unshift(rgba(getComputedStyle(at).backgroundColor));
+    return layers.reduce((under, layer) => over(layer, under), base);
+  };
+  const isOff = (one) => one.closest(':disabled, [aria-disabled=true]') || one.closest('.control')?.querySelector('input:disabled');
+  let least = [Infinity, ''];
+  for (const one of document.querySelectorAll('main *')) {
+    const isText = one.matches('select, input:not([type=range], [type=checkbox], [type=color])') || [...one.childNodes].some((node) => node.nodeType === 3 && node.data.trim());
+    if (!(isText || one.matches('svg, input')) || !one.checkVisibility({ visibilityProperty: true }) || !one.getClientRects().length || isOff(one)) continue;
+    const style = getComputedStyle(one);
+    let opacity = 1;
+    for (let at = one; at; at = at.parentElement) opacity *= Number(getComputedStyle(at).opacity);
+    const isLarge = parseFloat(style.fontSize) >= 24 || (parseFloat(style.fontSize) >= 18.66 && Number(style.fontWeight) >= 700);
+    for (const base of [[0, 0, 0], [255, 255, 255]]) {
+      const under = behind(one, base);
+      const [r, g, b, a] = rgba(style.color);
+      const [low, high] = [light(under), light(over([r, g, b, a * opacity], under))].sort((x, y) => x - y);
+      const share = (high + 0.05) / (low + 0.05) / (isText && !isLarge ? 4.5 : 3);
+      if (share < least[0]) least = [share, (one.id || one.className || one.localName) + ' ' + one.textContent.trim().slice(0, 20) + ' ' + style.color + ' on ' + under.map(Math.round)];
+    }
+  }
+  return least;
+})()`;
+const SCHEMES = [['prefers-color-scheme', 'dark'], ['forced-colors', 'active'], ['prefers-color-scheme', 'light']];
+
+/** Of what can be chosen or typed into, as a screen reader is told. */
+async function namelessControls(tab) {
+  const { nodes } = await tab.send('Accessibility.getFullAXTree');
+  const isControl = ({ ignored, properties = [] }) => !ignored && properties.some(({ name, value }) => name === 'focusable' && value.value);
+  const named = nodes.filter((one) => isControl(one) && one.role.value !== 'RootWebArea');
+  assert.ok(named.length > 3, `${named.length} controls`);
+  return named.filter(({ name }) => !name?.value?.trim()).map(({ role, backendDOMNodeId }) => `${role.value} ${backendDOMNodeId}`);
+}
+
 /** Of what happens in the page between now and its next picture after it is seen again, ms. */
 const UNTIL_PICTURE = `window.seen = new Promise((done) => document.addEventListener('visibilitychange', () => {
   const begun = performance.now();
@@ -52,11 +93,10 @@ const UNTIL_PICTURE = `window.seen = new Promise((done) => document.addEventList
 const all = {
   async 'the server\'s pictures are as large as the window, soon after it changes'() {
     for (const codec of ['tiles', 'vp8']) {
-      const tab = await browser.open(`${server.url}#mode=pictures&pictures=${codec}`);
-      await tab.until((now) => now.pictures > 3, 'pictures');
+      const tab = await sharedTab(browser, server, `mode=pictures&pictures=${codec}`);
       assert.deepEqual(await pictureSize(tab), [640, pictureSide(360)]);
       const since = Date.now();
-      await resize(tab, [360, 640]);
+      await tab.resize(360, 640);
       const size = [pictureSide(360), 640];
       await tab.until(async () => String(await pictureSize(tab)) === String(size), 'pictures of the new size');
       console.log(`  ${codec}: after ${Date.now() - since} ms`);
@@ -64,16 +104,12 @@ const all = {
       assert.equal(state.hash_ok, true, state.rejected);
       assert.equal(await tab.evaluate('document.getElementById("pictures").classList.contains("fills")'), true, 'no strip');
       if (codec === 'tiles') await shoot(tab, 'turned');
-      await tab.close();
     }
   },
   async 'a hidden tab gets nothing, and is back at once'() {
     const tabs = [];
-    for (const mode of ['strands', 'pictures']) {
-      const tab = await browser.open(`${server.url}#mode=${mode}`); // which hides the one before
-      await tab.until((now) => now.states > 20 && now.pictures > 3, 'frames');
-      tabs.push({ tab, mode, now: {} });
-    }
+    for (const mode of ['strands', 'pictures&pictures=tiles'])
+      tabs.push({ tab: await sharedTab(browser, server, `mode=${mode}`), mode, now: {} }); // which hides the one before
     const other = await browser.open('about:blank');
     // What was on its way, and the account of it, which comes once a second.
     for (const one of tabs) {
@@ -101,11 +137,10 @@ const all = {
       assert.equal(state.hash_ok, true, state.rejected);
       assert.equal(state.error, '');
     }
-    for (const { tab } of [...tabs, { tab: other }]) await tab.close();
+    await other.close();
   },
   async 'a tab that is hidden for a moment misses nothing'() {
-    const tab = await browser.open(`${server.url}#mode=strands`);
-    await tab.until((now) => now.states > 20, 'states');
+    const tab = await sharedTab(browser, server, 'mode=strands');
     const other = await browser.open('about:blank'); // which hides it
     await sleep(500);
     const { states } = await tab.state();
@@ -115,7 +150,7 @@ const all = {
     await tab.send('Page.bringToFront');
     console.log(`  ${after - states} states came meanwhile`);
     assert.ok(after > states + 8, `${after - states} states`);
-    for (const one of [tab, other]) await one.close();
+    await other.close();
   },
   async 'what slept comes back at once'() {
     const mortal = await Server.start(program, SMALL);
@@ -132,7 +167,7 @@ const all = {
     await tab.close();
   },
   async 'the way back finds hair that moves'() {
-    const tab = await browser.open(`${server.url}#mode=strands`);
+    const tab = await browser.open(`${server.url}#mode=strands`); // whose count of states begins anew
     await tab.until((now) => now.states > 10, 'states');
     await tab.evaluate('addEventListener("pageshow", (event) => (window.wasKept = event.persisted))');
     await tab.go('about:blank');
@@ -144,32 +179,23 @@ const all = {
     console.log(`  the page was ${(await tab.evaluate('window.wasKept')) ? 'kept' : 'loaded anew'}`);
     await tab.close();
   },
-  async 'a graphics card that was away draws again'() {
-    const own = await Browser.start();
-    try {
-      const tab = await own.open(`${server.url}#mode=strands&draw=gl`);
-      await tab.until((now) => now.pictures > 3, 'pictures');
-      await own.send('Browser.crashGpuProcess').catch(() => {});
-      await sleep(500);
-      const before = await shown(tab);
-      await tab.until(async () => (await shown(tab)) > before + 3, 'pictures again');
-      assert.equal((await tab.state()).mode, 'strands');
-      assert.match(await tab.evaluate('document.getElementById("warnings").textContent'), /^(?!.*taken away)/);
-      await tab.close();
-    } finally {
-      await own.end();
-    }
-  },
   async 'every control can be reached on every screen'() {
-    const tab = await browser.open(`${server.url}#mode=strands`);
-    await tab.until((now) => now.states > 3, 'states');
+    const tab = await sharedTab(browser, server, 'mode=strands');
+    let least = [Infinity];
     const check = async (what, size) => {
       await shoot(tab, `${what}_${size.join('x')}`);
       assert.deepEqual(await tab.evaluate(UNREACHABLE), [], `${what} at ${size.join(' x ')}`);
+      assert.deepEqual(await namelessControls(tab), [], `${what} at ${size.join(' x ')}`);
+      if (size !== SIZES[1] && size !== SIZES.at(-1)) return;
+      for (const [name, value] of SCHEMES) {
+        await tab.send('Emulation.setEmulatedMedia', { features: [{ name, value }] });
+        const [share, text] = await tab.evaluate(LEAST_CONTRAST);
+        if (share < least[0]) least = [share, `${text}, ${what}, ${value}`];
+      }
     };
     const press = async (key) => (await tab.press(key), sleep(50));
     for (const size of SIZES) {
-      await resize(tab, size);
+      await tab.resize(...size);
       await sleep(100);
       await check('plain', size);
       const collapses = await tab.evaluate('getComputedStyle(document.getElementById("menu")).display !== "none"');
@@ -197,17 +223,23 @@ const all = {
       await check('measurements', size);
       await tab.evaluate('document.getElementById("hud-line").click()');
     }
+    console.log(`  least contrast: ${least[0].toFixed(2)} of what it needs, ${least[1]}`);
+    assert.ok(least[0] >= 1, least.join(' '));
     // Without the rules for small screens the same check finds what the panel hides.
-    await tab.evaluate(`for (const rule of [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules]))
-      if (rule.media?.mediaText.startsWith('(max-')) rule.media.mediaText = 'not all'`);
-    await resize(tab, [320, 256]);
+    await tab.evaluate(`window.small = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules])
+      .filter((rule) => rule.media?.mediaText.startsWith('(max-')).map((rule) => [rule, rule.media.mediaText]);
+      for (const [rule] of small) rule.media.mediaText = 'not all'`);
+    await tab.resize(320, 256);
     await press('l');
     assert.notDeepEqual(await tab.evaluate(UNREACHABLE), []);
-    await tab.close();
+    await tab.evaluate('document.documentElement.style.setProperty("--quiet", "#8a919c")');
+    assert.ok((await tab.evaluate(LEAST_CONTRAST))[0] < 1, 'a pale text is not found');
+    await tab.evaluate('document.documentElement.removeAttribute("style")');
+    await press('Escape');
+    await tab.evaluate('for (const [rule, media] of small) rule.media.mediaText = media');
   },
   async 'keys alone reach everything, and the focus is seen'() {
-    const tab = await browser.open(`${server.url}#mode=strands`, { width: 480, height: 270 });
-    await tab.until((now) => now.states > 3, 'states');
+    const tab = await sharedTab(browser, server, 'mode=strands', [480, 270]);
     await tab.send('Emulation.setEmulatedMedia', { features: [{ name: 'forced-colors', value: 'active' }, { name: 'prefers-reduced-motion', value: 'reduce' }] });
     const around = async (most) => {
       const names = [];
@@ -230,11 +262,11 @@ const all = {
     const open = await around(20);
     for (const name of ['view', 'mode', 'shot', 'link', 'look', 'help', 'hud-line', 'stage']) assert.ok(open.includes(name), `${name} of ${open}`);
     await shoot(tab, 'forced_colors');
-    await tab.close();
+    await tab.send('Emulation.setEmulatedMedia', { features: [] });
+    await tab.evaluate('document.getElementById("menu").click()');
   },
   async 'a drag ends where it is let go of, and two fingers zoom and turn'() {
-    const tab = await browser.open(`${server.url}#mode=pictures`);
-    await tab.until((now) => now.pictures > 3, 'pictures');
+    const tab = await sharedTab(browser, server, 'mode=pictures&pictures=tiles');
     const camera = () => tab.evaluate('JSON.parse(document.documentElement.dataset.strandcast).camera');
     const pointer = (type, x, buttons) => tab.evaluate(`(() => {
       const stage = document.getElementById('stage');
@@ -274,7 +306,6 @@ const all = {
     assert.ok(Math.abs(twist.turned) > 0.3, JSON.stringify(twist));
     assert.equal(await tab.evaluate('getComputedStyle(document.getElementById("stage")).touchAction'), 'none');
     assert.equal(await tab.evaluate('getComputedStyle(document.getElementById("tools")).touchAction'), 'auto');
-    await tab.close();
   },
   async 'who lacks a token signs in, and what a browser lacks is said'() {
     const file = path.join(work, 'tokens');
@@ -305,6 +336,17 @@ const all = {
     } finally {
       await bare.end();
     }
+  },
+  async 'a graphics card that was away draws again'() {
+    const tab = await browser.open(`${server.url}#mode=strands&draw=gl`, { width: 160, height: 90 });
+    await tab.until((now) => now.pictures > 3, 'pictures');
+    await browser.send('Browser.crashGpuProcess').catch(() => {});
+    await sleep(500);
+    const before = await shown(tab);
+    await tab.until(async () => (await shown(tab)) > before + 3, 'pictures again');
+    assert.equal((await tab.state()).mode, 'strands');
+    assert.match(await tab.evaluate('document.getElementById("warnings").textContent'), /^(?!.*taken away)/);
+    await tab.close();
   },
 };
 

@@ -4,7 +4,7 @@
 import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
-import { Browser, whyNoBrowser } from './browser.mjs';
+import { Browser } from './browser.mjs';
 import { Server, SMALL } from './server.mjs';
 
 export const [program, shots] = process.argv.slice(2);
@@ -16,19 +16,31 @@ export const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-page-'));
 
 /** A browser, and a server of little hair. */
 export async function begin(options = SMALL) {
-  const missing = whyNoBrowser();
-  if (missing) {
-    console.log(`skipped: ${missing}`);
-    process.exit(77);
-  }
+  const browser = await Browser.startOrSkip();
   if (shots) fs.mkdirSync(shots, { recursive: true });
-  const browser = await Browser.start();
   try {
     return { browser, server: await Server.start(program, options) };
   } catch (error) {
     await browser.end();
     throw error;
   }
+}
+
+const kept = new Map();
+/** The tab of these wishes that tests share, since opening one costs as much as most tests: in front, and moving. */
+export async function sharedTab(browser, server, wishes, size = [640, 360]) {
+  const tab = kept.get(wishes) ?? (await browser.open(`${server.url}#${wishes}`, { seesWorkers: true }));
+  kept.set(wishes, tab);
+  await tab.send('Page.bringToFront');
+  await tab.resize(...size);
+  const { states = 0 } = await tab.state().catch(() => ({}));
+  await tab.until((now) => now.isConnected && now.states > states + 3, wishes);
+  return tab;
+}
+/** What a test that failed has done to them is not known. */
+async function forgetTabs() {
+  for (const tab of kept.values()) await tab.close().catch(() => {});
+  kept.clear();
 }
 
 /** Those whose name has STRANDCAST_TEST in it, and the end of all. */
@@ -43,6 +55,7 @@ export async function runAll(all, browser, server) {
     } catch (error) {
       ++failed;
       console.log(`FAILED: ${name}: ${error.stack}`);
+      await forgetTabs();
     }
   }
   await browser.end();
