@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Whether the strand core in WebAssembly does what this build's does, bit for bit: lanes at the edges of numbers, kept
-# streams, hostile messages, kernels on tiny strands, and streams of the server's own solvers (all sizes where
-# STRANDCAST_TEST_GRID is `whole`).
+# streams, hostile messages, kernels on tiny strands, streams of the server's own solvers, and strands that the server
+# shares with its viewers (all sizes, and ten minutes of these, where STRANDCAST_TEST_GRID is `whole`).
 #   bash tests/web/as_native.sh BUILD_FOLDER     with record_tapes and lane_check in bin, modules in web/bin
 set -euo pipefail
 build="$(realpath "${1:?usage: as_native.sh BUILD_FOLDER}")"
@@ -20,8 +20,12 @@ echo "$(wc -l <"$work/lanes") functions of lanes as native"
 for tape in kept hostile tiny full; do
   "$build/bin/record_tapes" "$tape" "$work/$tape.tape"
 done
-sizes=(2000x16); rounds=1
-[ "${STRANDCAST_TEST_GRID:-small}" != whole ] || { sizes+=(10000x16); rounds=3; }
+sizes=(2000x16); rounds=1; exact="300x16 150"
+[ "${STRANDCAST_TEST_GRID:-small}" != whole ] || { sizes+=(10000x16); rounds=3; exact="1100x16 36000"; }
+for quality in fast full; do
+  # shellcheck disable=SC2086
+  "$build/bin/record_tapes" exact "$work/exact_$quality.tape" $quality $exact
+done
 for size in "${sizes[@]}"; do
   for stream in "dftl step" "direct_rod step" "dftl tangent"; do
     # shellcheck disable=SC2086

@@ -7,7 +7,9 @@
 //   changes
 //                                          of scene and model, and somebody who joins every now and then
 //   record_tapes stream FILE SOLVER CODEC STRANDSxVERTICES FRAMES    the server's own solver on the built-in
-//   walk
+//                                          walk
+//   record_tapes exact FILE QUALITY STRANDSxVERTICES FRAMES    strands that are shared with viewers of every
+//                                          instruction set, who must see the same
 #include <array>
 #include <cmath>
 #include <ctime>
@@ -16,6 +18,7 @@
 #include "common/scene/scene_file.h"
 #include "common/strands/scene_asset.h"
 #include "common/strands/step/rod_planes.h"
+#include "common/strands/tangent/codec.h"
 #include "server/report/stream_codec.h"
 #include "server/report/stream_recording.h"
 #include "server/sim/executor/lanes_executor.h"
@@ -330,6 +333,103 @@ Status record_stream(const StreamWish& wish, Tape& tape) {
   return {};
 }
 
+/// A head that walks, dances and shakes, ten seconds each.
+InputFrame turned_head(int frame) {
+  constexpr int kPartFrames = 600;
+  struct Part {
+    double most_rad, per_s;
+  };
+  constexpr std::array<Part, 3> kParts = {{{0.0, 0.0}, {0.5, 0.9}, {0.96, 2.2}}};
+  const double t_s = frame / 60.0;
+  const Part& part = kParts[static_cast<size_t>(frame / kPartFrames) % kParts.size()];
+  InputFrame input;
+  input.has_motion = true;
+  input.world_from_head = walking_head(t_s);
+  input.world_from_head.rotation =
+      glm::angleAxis(part.most_rad * std::sin(2.0 * std::numbers::pi * part.per_s * t_s),
+                     glm::dvec3(0.0, 1.0, 0.0)) *
+      input.world_from_head.rotation;
+  input.joints = {{kJoint}, {lifted_joint(t_s)}};
+  return input;
+}
+
+/// Viewers of a stream, one for each instruction set of this processor.
+class Audience {
+ public:
+  Audience(const StrandStreamLimits& limits, std::span<const glm::vec3> rest_in_head_m) {
+    for (const simd::InstructionSet set : simd::instruction_sets()) {
+      viewers_.push_back(tangent::make_step_decoder(limits, workers_, set));
+      viewers_.back()->set_rest_shape(rest_in_head_m);
+    }
+  }
+  /// What all of them decode it to.
+  Result<std::shared_ptr<const Snapshot>> see(std::span<const std::byte> message) {
+    ASSIGN_OR_RETURN(const auto seen, viewers_.front()->decode(message));
+    for (size_t i = 1; i < viewers_.size(); ++i) {
+      ASSIGN_OR_RETURN(const auto other, viewers_[i]->decode(message));
+      if (other->lattice != seen->lattice)
+        return make_error(ErrorCode::Internal, "instruction set {} sees other strands", i);
+    }
+    return seen;
+  }
+  size_t size() const { return viewers_.size(); }
+
+ private:
+  WorkerPool workers_{1};
+  std::vector<std::unique_ptr<StrandDecoder>> viewers_;
+};
+
+/// In full quality a shoulder goes up and down. Somebody joins now and then. No other frame after the first
+/// second may be corrected.
+Status record_exact(const std::string& quality, const StreamSize& size, int frames, Tape& tape) {
+  constexpr int kSettledFrames = 60;
+  constexpr int kJoinEvery = 1201;
+  constexpr double kMostKbps = 45.0;
+  ASSIGN_OR_RETURN(SceneDesc scene, built_in_scene_with({"quality=" + quality}));
+  auto& groom = std::get<ProceduralGroomDesc>(scene.groom);
+  groom.strand_count = size.strand_count;
+  groom.vertex_count = size.vertex_count;
+  if (quality == kFullQuality) {
+    scene.body.capsules = {{kJoint, kJoint}};
+    scene.body.joint_offset_m = glm::dvec3(0.0);
+  }
+  SteppedHair hair(scene);
+  hair.move_bust();
+  ASSIGN_OR_RETURN(const auto encoder, make_strand_encoder("step"));
+  encoder->set_rest_shape(hair.rest_in_head_m());
+  const StrandStreamLimits limits{size.strand_count, size.vertex_count};
+  Audience audience(limits, hair.rest_in_head_m());
+  tape.add_name(fmt::format("exact {} {}", quality, to_string(size)));
+  tape.add_decoder("step", limits, hair.rest_in_head_m());
+  int exact = 0, corrected = 0;
+  double bytes = 0.0;
+  for (int i = 0; i < frames; ++i) {
+    const SteppedState state = hair.step(turned_head(i));
+    encoder->set_state(state.shared);
+    const bool joins = i % kJoinEvery == kJoinEvery - 1;
+    const EncodedFramePtr frame =
+        joins ? encoder->encode_for_join(state.snapshot).frame : encoder->encode(state.snapshot);
+    if (const auto update = encoder->take_shared()) hair.share(*update);
+    const auto seen = audience.see(frame->message);
+    RETURN_IF_ERROR(seen);
+    tape.add_message(frame->message, seen, 0.0);
+    if (i < kSettledFrames || joins) continue;
+    bytes += static_cast<double>(frame->message.size());
+    (is_exact(*frame) ? exact : corrected) += 1;
+  }
+  const double kbps = 8e-3 * 60.0 * bytes / std::max(exact + corrected, 1);
+  fmt::print("{} {}: {} exact frames, {} corrected, {:.1f} kbit/s, the same for {} instruction sets\n",
+             quality, to_string(size), exact, corrected, kbps, audience.size());
+  if (corrected == 0 && kbps <= kMostKbps) return {};
+  return make_error(ErrorCode::Internal, "{} frames are corrected, {:.1f} kbit/s are sent", corrected, kbps);
+}
+
+Result<StreamSize> size_of(const std::string& text) {
+  StreamSize size{};
+  if (std::sscanf(text.c_str(), "%ux%u", &size.strand_count, &size.vertex_count) == 2) return size;
+  return make_error(ErrorCode::BadInput, "\"{}\" is no size", text);
+}
+
 Status record(const std::vector<std::string>& arguments) {
   Tape tape;
   if (arguments.size() == 2 && arguments[0] == "kept") {
@@ -341,12 +441,14 @@ Status record(const std::vector<std::string>& arguments) {
   } else if (arguments.size() == 2 && arguments[0] == "full") {
     RETURN_IF_ERROR(record_full(tape));
   } else if (arguments.size() == 6 && arguments[0] == "stream") {
-    StreamWish wish{arguments[2], arguments[3], {}, std::atoi(arguments[5].c_str())};
-    if (std::sscanf(arguments[4].c_str(), "%ux%u", &wish.size.strand_count, &wish.size.vertex_count) != 2)
-      return make_error(ErrorCode::BadInput, "\"{}\" is no size", arguments[4]);
-    RETURN_IF_ERROR(record_stream(wish, tape));
+    ASSIGN_OR_RETURN(const StreamSize size, size_of(arguments[4]));
+    RETURN_IF_ERROR(record_stream({arguments[2], arguments[3], size, std::atoi(arguments[5].c_str())}, tape));
+  } else if (arguments.size() == 5 && arguments[0] == "exact") {
+    ASSIGN_OR_RETURN(const StreamSize size, size_of(arguments[3]));
+    RETURN_IF_ERROR(record_exact(arguments[2], size, std::atoi(arguments[4].c_str()), tape));
   } else {
-    return make_error(ErrorCode::BadInput, "usage: record_tapes kept|hostile|tiny|full|stream FILE ...");
+    return make_error(ErrorCode::BadInput,
+                      "usage: record_tapes kept|hostile|tiny|full|stream|exact FILE ...");
   }
   return tape.save(arguments[1]);
 }

@@ -21,7 +21,8 @@ class PredictedState final : public SharedState {
  public:
   Predictor::State state;
   TickBase base;
-  tangent::Planes<int32_t> lattice;  // decoded positions
+  /// Decoded positions. An encoder takes them out of a state that it was given: nobody else has it.
+  mutable tangent::Planes<int32_t> lattice;
   float quantum_m = 0.0f;
   uint64_t tick = 0;
   uint64_t told = 0;  // hash of all that acted since an encoder's update, as viewers are told it

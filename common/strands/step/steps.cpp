@@ -252,8 +252,7 @@ uint8_t EncoderSteps::predict(const SnapshotInfo& snapshot, const tangent::Layou
   if (!ticks_) return flags_;
   uint8_t how = kStepFlag | kSparseFlag;
   if (is_handing_) {
-    target = told_state_->lattice;
-    expected_ = target;
+    std::swap(expected_, told_state_->lattice);
   } else {
     own_state();
     step(*ticks_, moment_of(snapshot), layout, history);

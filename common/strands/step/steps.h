@@ -66,8 +66,8 @@ class EncoderSteps : public Steps {
   }
   /// Begins a frame: says what acts.
   void begin(const SnapshotInfo& snapshot, const tangent::Layout& layout);
-  /// After begin(): whether the simulation has taken the viewers' step already (set_state()).
-  /// predict() then needs no target.
+  /// After begin(): whether the simulation has taken the viewers' step already (set_state()). predict() then
+  /// leaves the target alone, which is the history's lattice.
   bool is_handing() const { return is_handing_; }
   /// Decides how the frame is predicted. Returns its flags; append_bytes() writes the bytes that follow them.
   /// Sets the target to the prediction if the simulation has taken the viewers' step, or is about to take

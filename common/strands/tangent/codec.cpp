@@ -54,9 +54,11 @@ struct Chain {
   SparseTables sparse_tables = make_first_sparse_tables();
   BlockCounts blocks;
   step::HeadBase head;
+  bool has_integers = false;  // any of sizes and blocks is not 0
 
   void reset(const Layout& layout) {
     history.reset(layout);
+    has_integers = true;
     forget_integers(layout);
     forget_tables();
   }
@@ -70,7 +72,13 @@ struct Chain {
     history.forget_motion();
     forget_integers(layout);
   }
+  /// Sizes of a frame's integers; blocks are told beside them.
+  void learn(SymbolSizes& now) {
+    std::swap(sizes, now);
+    has_integers = true;
+  }
   void forget_integers(const Layout& layout) {
+    if (!std::exchange(has_integers, false)) return;
     sizes.reset(layout);
     blocks.assign(block_count_of(layout), 0);
   }
@@ -195,6 +203,9 @@ class Encoder final : public StrandEncoder {
     if (has_steps) steps_->begin(snapshot, layout_);
     if (!has_steps || !steps_->is_handing()) take(snapshot);
     if (has_steps) flags_ = steps_->predict(snapshot, layout_, chain_.history, target_);
+    is_foretold_ = has_steps && flags_ == kExactFlags && snapshot.bust == steps_->chest() &&
+                   (steps_->is_handing() || is_foretold(chain_.history.lattice, target_));
+    if (has_steps && steps_->is_handing() && !is_foretold_) target_ = chain_.history.lattice;
     if ((flags_ & step::kStepFlag) != 0)
       frame_.head = {snapshot.world_from_head, {}};
     else
@@ -202,12 +213,6 @@ class Encoder final : public StrandEncoder {
     if ((flags_ & step::kSparseFlag) == 0)
       fit_motion(set_, layout_, chain_.history, target_, workers_, frame_);
     writers_.resize(layout_.slice_count());
-  }
-
-  /// After begin(): whether steps tell all of the frame.
-  bool is_foretold(const SnapshotInfo& snapshot) const {
-    return flags_ == kExactFlags && snapshot.bust == steps_->chest() &&
-           (steps_->is_handing() || tangent::is_foretold(chain_.history.lattice, target_));
   }
 
   /// What every frame ends with.
@@ -219,7 +224,7 @@ class Encoder final : public StrandEncoder {
 
   EncodedFramePtr encode_delta(const Snapshot& snapshot) {
     begin(snapshot, Followers::Some);
-    if (is_foretold(snapshot)) return encode_exact(snapshot);
+    if (is_foretold_) return encode_exact(snapshot);
     if ((flags_ & step::kSparseFlag) != 0) return encode_sparse(snapshot);
     for (auto& escapes : frame_.codes.escapes) escapes.clear();
     std::vector<Tables> tables(layout_.slice_count(), chain_.tables);
@@ -234,7 +239,7 @@ class Encoder final : public StrandEncoder {
     });
     chain_.tables = mean_tables(tables);
     end(snapshot);
-    std::swap(chain_.sizes, next_sizes_);
+    chain_.learn(next_sizes_);
     return make_delta(state_of(snapshot), slices);
   }
 
@@ -250,7 +255,7 @@ class Encoder final : public StrandEncoder {
     remember_step(chain_.history, frame_);
     steps_->finish(snapshot, frame_, chain_.history);
     chain_.head.follow(snapshot, false);
-    std::swap(chain_.sizes, next_sizes_);
+    chain_.learn(next_sizes_);
     std::swap(chain_.blocks, next_blocks_);
     Slices slices(1);
     writers_[0].finish(slices[0]);
@@ -276,7 +281,7 @@ class Encoder final : public StrandEncoder {
 
   JoinFrames encode_anchor(const Snapshot& snapshot, Followers followers) {
     begin(snapshot, followers);
-    const bool is_exact = is_foretold(snapshot);
+    const bool is_exact = is_foretold_;
     if (is_exact) target_ = chain_.history.lattice;
     if ((flags_ & step::kSparseFlag) != 0) {
       // Who joins is told of the shape, which needs weights.
@@ -403,7 +408,8 @@ class Encoder final : public StrandEncoder {
   std::vector<glm::vec3> rest_in_head_m_;
   Layout layout_;
   Chain chain_;
-  uint8_t flags_ = 0;  // of the frame at work
+  uint8_t flags_ = 0;         // of the frame at work
+  bool is_foretold_ = false;  // steps tell all of it
   Frame frame_;
   SymbolSizes next_sizes_;
   SymbolSizes no_sizes_;
@@ -569,7 +575,7 @@ class Decoder final : public StrandDecoder {
     }
     chain_.tables = learnt.tables;
     chain_.sparse_tables = learnt.sparse;
-    std::swap(chain_.sizes, next_sizes_);
+    chain_.learn(next_sizes_);
     if (is_sparse) std::swap(chain_.blocks, next_blocks_);
     return {};
   }

@@ -57,7 +57,7 @@ Lattice escaped(const Escape& escape, const Lattice& from, int32_t step) {
 }
 
 void History::reset(const Layout& layout) {
-  has_motion = false;
+  has_motion = has_residual = false;
   for (size_t axis = 0; axis < 3; ++axis) {
     lattice[axis].assign(layout.plane_size(), 0);
     for (auto* planes : {&velocity, &velocity_before, &residual, &residual_before, &drift})
@@ -75,9 +75,13 @@ void clear(std::initializer_list<Planes<float>*> all) {
 }  // namespace
 
 void History::forget_motion() {
-  clear({&residual});
+  forget_residual();
   forget_all_but_residual();
   head = {head.pose, {}};
+}
+
+void History::forget_residual() {
+  if (std::exchange(has_residual, false)) clear({&residual});
 }
 
 void History::forget_all_but_residual() {
@@ -132,19 +136,20 @@ void remember(History& history, Frame& frame) {
   std::swap(history.residual_before, history.residual);
   std::swap(history.residual, frame.residual);
   std::swap(history.drift, frame.drift);
-  history.has_motion = true;
+  history.has_motion = history.has_residual = true;
 }
 
 void remember_step(History& history, Frame& frame) {
   history.head = frame.head;
   std::swap(history.lattice, frame.lattice);
   std::swap(history.residual, frame.residual);
+  history.has_residual = true;
   history.forget_all_but_residual();
 }
 
 void remember_exact(History& history, const Pose& world_from_head) {
   history.head = {world_from_head, {}};
-  clear({&history.residual});
+  history.forget_residual();
   history.forget_all_but_residual();
 }
 

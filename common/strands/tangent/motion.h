@@ -78,12 +78,14 @@ struct History {
   Planes<float> residual_before;
   Planes<float> drift;      // sum of all velocities, older ones fading: where strands swing back from
   bool has_motion = false;  // any of velocities, residual_before and drift is not 0
+  bool has_residual = false;
 
   void reset(const Layout& layout);
   /// Forgets everything except strand positions and pose, which are all that a keyframe gives a late joiner.
   void forget_motion();
   /// Forgets what a frame of steps does not know.
   void forget_all_but_residual();
+  void forget_residual();
 };
 
 /// A vertex coded directly: its position less its last one (in an anchor: less its parent's), in steps of a
