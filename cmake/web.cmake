@@ -53,7 +53,7 @@ endforeach()
 # Of what draws, the parts without OpenGL.
 add_library(strandcast_picture STATIC common/groom/bust_skin.cpp common/groom/mesh.cpp common/math/point_tree.cpp common/replay/strand_fill.cpp common/scene/hair_color.cpp common/scene/scene_desc.cpp)
 foreach(part head_occupancy light_lattice look_lights rest_facts scalp_cover strand_detail strand_style view
-             gl_tiles/tile_block tiles/strand_expansion tiles/strand_shading tiles/tile_bins tiles/tile_raster)
+             gl_tiles/tile_block tiles/strand_expansion tiles/strand_shading tiles/strand_sums tiles/tile_bins tiles/tile_raster)
   target_sources(strandcast_picture PRIVATE common/render/${part}.cpp)
 endforeach()
 target_include_directories(strandcast_picture PRIVATE ${CMAKE_SOURCE_DIR}/shaders)  # the laws of shaders/lib

@@ -311,6 +311,7 @@ void order_segments(StrandPicture& p, const View& view) {
 
 void begin_here(StrandPicture& p, const Turn& turn) {
   p.grid = {glm::uvec2(turn.view.target_px)};
+  p.lattice.hide_from(turn.view.eye_m);
   p.shade = {
       shading_numbers(p.look), p.lights,       p.lattice.view(), turn.view, p.width_m, p.look.tip_scale,
       p.look.style.tip_fade,   DebugView::None};

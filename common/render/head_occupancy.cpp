@@ -311,11 +311,11 @@ HeadOccupancy make_head_occupancy(const Mesh& mesh, const OccupancyRequest& requ
   if (distance.empty() && of_ball == 0) return {};
   head.distance.resize(static_cast<size_t>(head.size.x) * head.size.y * head.size.z);
   // A mesh that leaves most of the ball empty does not hold together.
-  const bool has_ball = 2 * of_both < of_ball;
+  head.has_ball = 2 * of_both < of_ball;
   if (distance.empty()) distance.assign(head.distance.size(), kFarCells);
   bool is_solid = false;
   for_cells([&](size_t i, int x, int y, int z) {
-    const float cells = has_ball ? std::min(distance[i], ball_distance(x, y, z)) : distance[i];
+    const float cells = head.has_ball ? std::min(distance[i], ball_distance(x, y, z)) : distance[i];
     head.distance[i] =
         static_cast<int8_t>(std::lround(std::clamp(cells * kDistanceStepsPerCell, -kMostSteps, kMostSteps)));
     is_solid = is_solid || cells < 0.0f;

@@ -21,6 +21,7 @@ struct HeadOccupancy {
   glm::vec3 origin_m{0.0f};  // middle of the first cell
   float cell_m = 1.0f;
   glm::ivec3 size{0};            // 0: nothing is solid
+  bool has_ball = false;         // is also solid where no mesh is
   std::vector<int8_t> distance;  // (size.z x size.y x size.x) negative inside; see kDistanceStepsPerCell
 
   bool is_empty() const { return distance.empty(); }

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/hash.h"
+#include "common/render/tiles/strand_sums.h"
 #include "common/render/tiles/tile_frame.h"
 #include "common/simd/lanes.h"
 
@@ -25,6 +25,26 @@ constexpr size_t kPointsSeen = 65536;
 // Further out, or no number: says nothing about where the hair is.
 constexpr float kFarLatticeM = 1e4f;
 
+// Depth towards the eye from which on nothing is seen, and the most that counts, so that little of it reaches
+// beside what hides.
+constexpr float kHiding = 6.0f;
+constexpr float kMostHiding = 1.1f * kHiding;
+// Of a halved cell that is all head: some of them hide, so that its edge does not.
+constexpr float kSolidHiding = 0.25f * kHiding;
+
+/// From a cell to the slice in front of it, along a ray to the eye.
+struct RayStep {
+  size_t cell;  // with one of border in front
+  float part;   // towards the next one
+  float slope;
+};
+RayStep step_towards(float eye, int from, int size, float per_slice) {
+  const float slope = (eye - static_cast<float>(from)) * per_slice;
+  const float at = std::clamp(static_cast<float>(from) + slope + 1.0f, 0.0f, static_cast<float>(size + 1));
+  const auto cell = static_cast<size_t>(at);
+  return {cell, at - static_cast<float>(cell), slope};
+}
+
 glm::vec3 any_across(const glm::vec3& axis) {
   const glm::vec3 other = std::abs(axis.y) < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0);
   return glm::normalize(glm::cross(other, axis));
@@ -32,29 +52,6 @@ glm::vec3 any_across(const glm::vec3& axis) {
 
 glm::vec3 along_axes(const glm::vec3& v, const LatticeFrame& view) {
   return {glm::dot(v, view.axis[0]), glm::dot(v, view.axis[1]), glm::dot(v, view.axis[2])};
-}
-
-/// Spreads an amount over the eight cells round a place, in cells.
-inline void add_to_cells(const glm::vec3& place, const glm::ivec3& size, float amount, int32_t* sums) {
-  if (!(place.x >= 0.0f && place.y >= 0.0f && place.z >= 0.0f && place.x < static_cast<float>(size.x - 1) &&
-        place.y < static_cast<float>(size.y - 1) && place.z < static_cast<float>(size.z - 1)))
-    return;
-  const glm::ivec3 low(place);
-  const glm::vec3 f = place - glm::vec3(low);
-  const auto dy = static_cast<size_t>(size.x);
-  const size_t dz = dy * static_cast<size_t>(size.y);
-  int32_t* const cell = sums + (static_cast<size_t>(low.z) * dz + static_cast<size_t>(low.y) * dy + low.x);
-  const float y1 = amount * f.y;
-  const float y0 = amount - y1;
-  const float y1x1 = y1 * f.x;
-  const float y0x1 = y0 * f.x;
-  const float corner[4] = {y0 - y0x1, y0x1, y1 - y1x1, y1x1};
-  const size_t offset[4] = {0, 1, dy, dy + 1};
-  for (int k = 0; k < 4; ++k) {
-    const float far = corner[k] * f.z;
-    cell[offset[k]] += static_cast<int32_t>(corner[k] - far);
-    cell[offset[k] + dz] += static_cast<int32_t>(far);
-  }
 }
 
 /// Along the axes of a lattice.
@@ -127,6 +124,7 @@ float strand_depth_per_m(const LatticeFrame& frame, float width_m) {
 
 uint64_t LightLattice::size_bytes() const {
   uint64_t bytes = key_.capacity() * sizeof(uint16_t) + others_.capacity() * sizeof(uint32_t) +
+                   hidden_.capacity() + eye_depth_.capacity() * sizeof(float) +
                    (halved_.capacity() + halved_solid_.capacity() + rim_depth_.capacity()) * sizeof(float);
   for (const auto& depth : sky_depth_) bytes += depth.capacity() * sizeof(float);
   for (const auto& sums : sums_) bytes += sums.capacity() * sizeof(int32_t);
@@ -151,6 +149,7 @@ void LightLattice::build(const LatticeFrame& frame, const StrandPoints& points, 
   store_others(workers);
   view_.key = key_.data();
   view_.others = others_.data();
+  view_.hidden = nullptr;
 }
 
 // The sky's depth: of what its ways let through together.
@@ -182,45 +181,14 @@ void LightLattice::sum_strands(const StrandPoints& points, const LightStrands& s
   const uint32_t summing = std::min(workers.size(), kMaxSummingWorkers);
   sums_.resize(summing);
   for (auto& sums : sums_) sums.resize(cells);
-  const float per_m = strand_depth_per_m(view_, strands.width_m) / kLightSumUnit;
-  const glm::vec3 u = view_.axis[0] / view_.cell_m;
-  const glm::vec3 v = view_.axis[1] / view_.cell_m;
-  const glm::vec3 w = view_.axis[2] / view_.cell_m;
-  const glm::vec3 origin = view_.origin_m / view_.cell_m;
-  const float fade = 1.0f / std::max(strands.tip_fade, 1e-3f);
-  const float pieces_per_m = kLightPiecesPerCell / view_.cell_m;
   // Cleared by the worker whose they are, once it has something to add.
   std::vector<uint8_t> is_used(summing);
   const auto sum_range = [&](size_t begin, size_t end, uint32_t worker) {
     int32_t* const sums = sums_[worker].data();
     if (is_used[worker] == 0) std::fill_n(sums, cells, 0);
     is_used[worker] = 1;
-    for (size_t strand = begin; strand < end; ++strand) {
-      const uint32_t first = points.first_point[strand];
-      const uint32_t last = points.first_point[strand + 1] - 1;
-      const float along_step = 1.0f / static_cast<float>(std::max(last - first, 1u));
-      // Somewhere within each segment, elsewhere for each strand: roots in a row leave no bands.
-      const float phase = unit_float(mix_u32(points.index[strand]));
-      for (uint32_t i = first; i < last; ++i) {
-        const StrandPoint& a = points.point[i];
-        const StrandPoint& b = points.point[i + 1];
-        const glm::vec3 step(b.x - a.x, b.y - a.y, b.z - a.z);
-        const float length_m = std::sqrt(glm::dot(step, step));
-        if (!(length_m < kFarLatticeM)) continue;
-        const float along = (static_cast<float>(i - first) + 0.5f) * along_step;
-        const float cover = std::min((1.0f - along) * fade + 0.1f, 1.0f);
-        const float amount = per_m * length_m * cover * (1.0f + (strands.tip_scale - 1.0f) * along * along);
-        const int pieces = std::clamp(static_cast<int>(length_m * pieces_per_m), 1, kMaxLightCellsPerAxis);
-        const float share = 1.0f / static_cast<float>(pieces);
-        for (int piece = 0; piece < pieces; ++piece) {
-          const float part = (static_cast<float>(piece) + phase) * share;
-          const glm::vec3 at(a.x + part * step.x, a.y + part * step.y, a.z + part * step.z);
-          const glm::vec3 cell(glm::dot(at, u) - origin.x, glm::dot(at, v) - origin.y,
-                               glm::dot(at, w) - origin.z);
-          add_to_cells(cell, size, amount * share, sums);
-        }
-      }
-    }
+    strandcast::sum_strands(desc_.set, {&view_, &points, strands, static_cast<uint32_t>(begin),
+                                        static_cast<uint32_t>(end), sums});
   };
   workers.at(Priority::Drawing, summing).for_ranges(points.strand_count(), kSplatStrandsPerRange, sum_range);
   summed_.clear();
@@ -389,6 +357,74 @@ void LightLattice::sweep(const glm::vec3& to_light, const std::vector<float>& ha
     }
     std::swap(behind, next);
   }
+}
+
+// Slice by slice away from the eye, as sweep() away from a light, but along rays that meet in the eye.
+void LightLattice::sweep_from_eye(const glm::vec3& eye, int a) {
+  const glm::ivec3 size = view_.half_size;
+  const int u = (a + 1) % 3;
+  const int v = (a + 2) % 3;
+  const glm::ivec3 stride(1, size.x, size.x * size.y);
+  const int first = eye[a] < 0.0f ? 0 : size[a] - 1;
+  const int direction = eye[a] < 0.0f ? 1 : -1;
+  eye_depth_.resize(halved_.size());
+  // Of the slice before, with nothing around it.
+  const auto row = static_cast<size_t>(size[u]) + 3;
+  std::vector<float> behind(row * (static_cast<size_t>(size[v]) + 3), 0.0f);
+  std::vector<float> next = behind;
+  // A ball that stands for what a mesh lacks is not drawn.
+  const std::vector<float> opacity =
+      has_solid() && desc_.solid->has_ball ? halved_ : halved_with(kSolidHiding);
+  std::vector<RayStep> steps(size[u]);
+  for (int slice = 0; slice < size[a]; ++slice) {
+    const int here = first + direction * slice;
+    const float per_slice = 1.0f / std::abs(eye[a] - static_cast<float>(here));
+    for (int i = 0; i < size[u]; ++i) steps[i] = step_towards(eye[u], i, size[u], per_slice);
+    for (int j = 0; j < size[v]; ++j) {
+      const RayStep across = step_towards(eye[v], j, size[v], per_slice);
+      const float* const near = behind.data() + across.cell * row;
+      const float* const far = near + row;
+      float* const out = next.data() + static_cast<size_t>(j + 1) * row + 1;
+      for (int i = 0; i < size[u]; ++i) {
+        const auto cell = static_cast<size_t>(here * stride[a] + j * stride[v] + i * stride[u]);
+        const auto [at, part, slope] = steps[i];
+        const float low = near[at] + part * (near[at + 1] - near[at]);
+        const float high = far[at] + part * (far[at + 1] - far[at]);
+        const float depth = low + across.part * (high - low);
+        eye_depth_[cell] = depth;
+        const float length = std::sqrt(1.0f + slope * slope + across.slope * across.slope);
+        out[i] = std::min(depth + length * opacity[cell], kMostHiding);
+      }
+    }
+    std::swap(behind, next);
+  }
+}
+
+void LightLattice::hide_from(const glm::vec3& eye_m) {
+  view_.hidden = nullptr;
+  const glm::ivec3 size = view_.half_size;
+  // In halved cells from the middle of the first.
+  const glm::vec3 eye = 0.5f * ((along_axes(eye_m, view_) - view_.origin_m) / view_.cell_m - 0.5f);
+  const glm::vec3 beyond = glm::max(-eye, eye - glm::vec3(size - 1));
+  const int axis = beyond.x >= beyond.y && beyond.x >= beyond.z ? 0 : (beyond.y >= beyond.z ? 1 : 2);
+  constexpr float kLeastBeyond = 2.0f;
+  if (!(beyond[axis] > kLeastBeyond && beyond[axis] < kFarLatticeM / view_.cell_m)) return;
+  sweep_from_eye(eye, axis);
+  // Of a place between eight middles all have to be hidden. What is farther out than the lattice is at its
+  // border.
+  hidden_.assign(halved_.size(), 0);
+  const auto dy = static_cast<size_t>(size.x);
+  const size_t dz = dy * static_cast<size_t>(size.y);
+  for (int z = 1; z + 2 < size.z; ++z)
+    for (int y = 1; y + 2 < size.y; ++y) {
+      const size_t row = static_cast<size_t>(z) * dz + static_cast<size_t>(y) * dy;
+      const float* const depth = eye_depth_.data() + row;
+      const auto least = [&](size_t x) {
+        return std::min(std::min(depth[x], depth[x + dy]), std::min(depth[x + dz], depth[x + dz + dy]));
+      };
+      for (size_t x = 1; x + 2 < dy; ++x) hidden_[row + x] = std::min(least(x), least(x + 1)) > kHiding;
+    }
+  view_.hidden = hidden_.data();
 }
 
 }  // namespace strandcast

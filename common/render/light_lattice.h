@@ -16,6 +16,7 @@
 #include "common/math/bust.h"
 #include "common/render/head_occupancy.h"
 #include "common/render/look_lights.h"
+#include "common/simd/variants.h"
 
 namespace strandcast {
 
@@ -32,6 +33,7 @@ struct LightLatticeDesc {
   FittedSphere skull;
   std::shared_ptr<const HeadOccupancy> solid;  // none: nothing but hair casts shadows
   BustRig bust = {};                           // of the head's mesh, as it is at rest in `solid`
+  simd::InstructionSet set = simd::widest_set();
 };
 
 /// Properties of the strands that are summed.
@@ -90,6 +92,9 @@ float strand_depth_per_m(const LatticeFrame& frame, float width_m);
 struct LightLatticeView : LatticeFrame {
   const uint16_t* key = nullptr;     // (size.z x size.y x size.x)
   const uint32_t* others = nullptr;  // (half_size): rim in the low 16 bits, sky in the high ones
+  // (half_size): 1 where the eye sees nothing of what lies between the middles of a cell and of its next
+  // ones.
+  const uint8_t* hidden = nullptr;  // none: everything may be seen
 };
 
 class LightLattice {
@@ -99,6 +104,8 @@ class LightLattice {
   /// Builds the lattice; `frame` must come from fit_lattice() with the same lights.
   void build(const LatticeFrame& frame, const StrandPoints& points, const LightStrands& strands,
              const LightDirections& lights, WorkerPool& workers);
+  /// Finds what head and hair hide from an eye in head space, after build(); nothing where it is among them.
+  void hide_from(const glm::vec3& eye_m);
   /// Sets the rotation of neck and chest from the next build() on.
   void set_bust(const BustTurn& turn) { bust_turn_ = turn; }
   const LightLatticeDesc& desc() const { return desc_; }
@@ -113,6 +120,7 @@ class LightLattice {
   void find_solid(int y, int z, std::vector<float>& share) const;
   /// Sweeps across the lattice of half resolution; the head has this opacity per LatticeFrame::soft_m.
   std::vector<float> halved_with(float solid_depth) const;
+  void sweep_from_eye(const glm::vec3& eye, int axis);
   void sweep(const glm::vec3& to_light, const std::vector<float>& halved, std::vector<float>& depth) const;
 
   LightLatticeDesc desc_;
@@ -126,6 +134,8 @@ class LightLattice {
   std::vector<float> rim_depth_;
   std::array<std::vector<float>, kSkyWays> sky_depth_;  // along each way
   std::vector<uint32_t> others_;
+  std::vector<float> eye_depth_;  // in front of a halved cell
+  std::vector<uint8_t> hidden_;
 };
 
 }  // namespace strandcast

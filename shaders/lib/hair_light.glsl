@@ -6,6 +6,12 @@
 #include "lib/hash.glsl"
 #include "lib/select.glsl"
 
+#ifndef __cplusplus
+// A relative error of 1e-4 is not seen.
+#define light_exp(x) exp(x)
+#define light_log2(x) log2(x)
+#endif
+
 // Of the scene: weights of the terms, and how strands differ.
 // schema begin: shader look
 struct HairLook {
@@ -96,8 +102,8 @@ LAW StrandShares strand_shares(vec3 color, float wetness) {
   const float kSurfaceWet = 0.022;
   const float kLeastColor = 1e-3;
   vec3 least = max(color, vec3(kLeastColor));
-  vec3 root = kPerLog2 * vec3(log2(least.x), log2(least.y), log2(least.z));
-  vec3 passed = exp(-kAbsorbed * root * root);
+  vec3 root = kPerLog2 * vec3(light_log2(least.x), light_log2(least.y), light_log2(least.z));
+  vec3 passed = light_exp(-kAbsorbed * root * root);
   StrandShares shares;
   shares.through = kThrough * passed;
   shares.returned = (kReturned * mix(1.0, kReturnedWet, wetness)) * passed * passed;
@@ -132,22 +138,19 @@ LAW StrandAngles strand_angles(vec3 tangent, vec3 to_light, vec3 to_eye) {
   return angles;
 }
 
-// Of a Gaussian of area 1.
-LAW float longitudinal(float x, float width) {
-  const float kNorm = 0.39894228;
-  float steps = x / width;
-  return exp(-0.5 * steps * steps) * kNorm / width;
-}
+// Height of a Gaussian of area 1, times its width, and the exponent of its fall.
+const float kGaussian = 0.39894228;
+LAW float gaussian_exponent(float x, float per_width) { return -0.5 * (x * per_width) * (x * per_width); }
 
 // Light of one lamp that leaves towards the eye, per unit of light. Where all weights of the look are 1, no more leaves in
 // all directions than came.
 LAW vec3 hair_lobes(HairLook look, float tilt, StrandShares shares, StrandAngles angles, float cos_light_eye) {
   const float kPi = 3.14159265;
   // Longitudinal: Gaussians of the sum of sines, shifted by the tilt of the scales (Karis 2016).
-  float width = 2.0 * look.width * (1.0 - 0.5 * look.wetness);
-  float m_r = longitudinal(angles.sum + 2.0 * tilt, width);
-  float m_tt = longitudinal(angles.sum - tilt, 0.5 * width);
-  float m_trt = longitudinal(angles.sum - 4.0 * tilt, 2.0 * width);
+  float per_width = 1.0 / (2.0 * look.width * (1.0 - 0.5 * look.wetness));
+  float e_r = gaussian_exponent(angles.sum + 2.0 * tilt, per_width);
+  float e_tt = gaussian_exponent(angles.sum - tilt, 2.0 * per_width);
+  float e_trt = gaussian_exponent(angles.sum - 4.0 * tilt, 0.5 * per_width);
 
   // Azimuthal; those of TT and TRT have area 1.
   const float kFresnel = 0.0465;     // at normal incidence, index 1.55
@@ -157,13 +160,13 @@ LAW vec3 hair_lobes(HairLook look, float tilt, StrandShares shares, StrandAngles
   float graze = 1.0 - sqrt(clamp(0.5 + 0.5 * cos_light_eye, 0.0, 1.0));
   float graze2 = graze * graze;
   float n_r = kMirror * sqrt(max(0.5 + 0.5 * angles.cos_phi, 0.0)) * (fresnel + (1.0 - fresnel) * graze2 * graze2 * graze);
-  float n_tt = exp(-3.65 * angles.cos_phi - 3.98);
-  float n_trt = exp(11.5 * angles.cos_phi - 11.209);
+  float r = look.highlight * n_r * light_exp(e_r);
+  float tt = (2.0 * look.transmission) * light_exp(e_tt - 3.65 * angles.cos_phi - 3.98);
+  float trt = (0.5 * look.second_highlight) * light_exp(e_trt + 11.5 * angles.cos_phi - 11.209);
 
   // Gaussians of sines give back more than comes in along the strand.
   float energy = angles.cos_in * inversesqrt(0.22 + 0.75 * angles.cos_in * angles.cos_in);
-  return (kPi * energy) * (vec3(look.highlight * m_r * n_r) + shares.through * (look.transmission * m_tt * n_tt) +
-                           shares.returned * (look.second_highlight * m_trt * n_trt));
+  return (kPi * kGaussian * per_width * energy) * (vec3(r) + shares.through * tt + shares.returned * trt);
 }
 
 // Likewise, with what comes to the strand through others. `depth`: as the lattices have it.
@@ -177,11 +180,12 @@ LAW vec3 hair_lit(HairLook look, float tilt, StrandShares shares, vec3 tangent, 
   const float kBack = 9.3;
   StrandAngles angles = strand_angles(tangent, to_light, to_eye);
   float crossed = kCrossedPerDepth * depth;
-  float direct = exp(-crossed);
+  float direct = light_exp(-crossed);
   // Each strand passed on the way has let through its share, colour by colour.
-  vec3 indirect = max(exp(-crossed * (vec3(1.0) - shares.through)) - vec3(direct), vec3(0.0));
+  vec3 indirect = max(light_exp(-crossed * (vec3(1.0) - shares.through)) - vec3(direct), vec3(0.0));
   vec3 around = shares.around * (look.diffuse * 2.0 * angles.facing * angles.cos_in);
-  float m = longitudinal(angles.sum - tilt, sqrt(kWide2 + kWiden2 * min(crossed, kMostCrossed)));
+  float per_wide = inversesqrt(kWide2 + kWiden2 * min(crossed, kMostCrossed));
+  float m = kGaussian * per_wide * light_exp(gaussian_exponent(angles.sum - tilt, per_wide));
   float back = 0.5 + 0.5 * angles.cos_phi;
   vec3 spread = (look.scatter * m) * (shares.through * (kOnward * (1.0 - back)) + shares.backward * (kBack * back));
   return direct * (hair_lobes(look, tilt, shares, angles, dot(to_light, to_eye)) + around) + indirect * (spread + around);
@@ -225,8 +229,8 @@ LAW vec3 hair_radiance(HairLook look, HairStrand hair, HairLights lights, LightD
   vec3 across = to_eye - tangent * dot(tangent, to_eye);
   float facing = 0.5 + 0.5 * dot(across, lights.up);
   vec3 body = (kSkyColor * mix(1.0, kSkyWet, look.wetness)) * color / (vec3(1.0) + kSkyFull * color);
-  vec3 sky = exp(-(kSkyReach * depth.sky) * (vec3(1.0) - shares.through)) * body +
-             (kSkySheen * exp(-kSheenReach * depth.sky)) * (vec3(1.0) - color);
+  vec3 sky = light_exp(-(kSkyReach * depth.sky) * (vec3(1.0) - shares.through)) * body +
+             (kSkySheen * light_exp(-kSheenReach * depth.sky)) * (vec3(1.0) - color);
   vec3 light = lights.key_color * key + lights.rim_color * rim + (lights.ambient * mix(kGroundLight, 1.0, facing)) * sky;
   return kBySkin * light;
 }

@@ -145,8 +145,11 @@ Result<StageWork> walk_stages(const Case& one, const SceneAsset& asset, const Ti
   timed("render/light", [&] {
     lattice.build(frame, points, {shade.width_m, shade.tip_scale, shade.tip_fade}, shade.lights, workers);
   });
-  shade.lattice = lattice.view();
-  timed("render/shade", [&] { shade_points(shade, workers, options.set, points); });
+  timed("render/shade", [&] {
+    lattice.hide_from(view.eye_m);
+    shade.lattice = lattice.view();
+    shade_points(shade, workers, options.set, points);
+  });
   TileBins bins;
   BinCounts counts;
   timed("render/bin", [&] { counts = bins.bin_segments(points, {size_px}, view.near_m, workers); });

@@ -77,6 +77,15 @@ double reference_share(double color, Lobe lobe) {
   });
 }
 
+TEST(HairLight, ItsExponentialAndLogarithmAreCloseEnough) {
+  for (double x = -80.0; x < 60.0; x += 0.0137)
+    EXPECT_NEAR(law::light_exp(simd::Float(x)).v[0] / std::exp(double{static_cast<float>(x)}), 1.0, 1e-4)
+        << x;
+  EXPECT_LT(law::light_exp(simd::Float(-1e30f)).v[0], 1e-30f);
+  for (double x = 1e-6; x < 1e3; x *= 1.0037)
+    EXPECT_NEAR(law::light_log2(simd::Float(x)).v[0], std::log2(double{static_cast<float>(x)}), 2e-5) << x;
+}
+
 TEST(HairLight, ALobeSendsOnWhatChiangsDoes) {
   for (const double color : {0.0115, 0.0625, 0.094, 0.34, 0.4, 0.7})
     for (const Lobe lobe : {kR, kTt, kTrt}) {

@@ -290,6 +290,67 @@ TEST_F(LightLatticeTest, TheFaceCastsItsShadowOnItself) {
   EXPECT_LT(above.hidden_and_dark, 0.35 * skin.hidden) << "looked up 6 mm further out";
 }
 
+/// Whether nothing is seen of what lies around a point.
+bool is_hidden(const LightLatticeView& view, const glm::vec3& point) {
+  glm::ivec3 cell;
+  for (int a = 0; a < 3; ++a) {
+    const float at = ((glm::dot(point, view.axis[a]) - view.origin_m[a]) / view.cell_m - 0.5f) * 0.5f;
+    cell[a] = std::clamp(static_cast<int>(at), 0, view.half_size[a] - 2);
+  }
+  return view.hidden[(static_cast<size_t>(cell.z) * view.half_size.y + cell.y) * view.half_size.x + cell.x] !=
+         0;
+}
+
+// Straight rays from the eye past a ball, as geometry has them: no place that such a ray reaches is hidden.
+TEST_F(LightLatticeTest, AHeadHidesWhatLiesBehindItAndNothingElse) {
+  constexpr float kRadiusM = 0.08f;
+  LightLattice lattice(with_head(kRadiusM, kLightCells));
+  const LightDirections lights{
+      glm::normalize(glm::vec3(0.3f, 1, 0.2f)), glm::normalize(glm::vec3(-1, 0.3f, 0.5f)), {0, 1, 0}, true};
+  build(lattice, strands_in_box(10, 0.25f), {kWidthM, 1.0f, 0.0f}, lights, workers_);
+  EXPECT_EQ(lattice.view().hidden, nullptr) << "nobody looks";
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> in(-0.12f, 0.12f);
+  for (const glm::vec3 eye : {glm::vec3(0, 0.02f, 0.5f), glm::vec3(0.5f, 0.3f, 0), glm::vec3(-1.5f, 1, -2)}) {
+    lattice.hide_from(eye);
+    ASSERT_NE(lattice.view().hidden, nullptr);
+    int hidden = 0, behind = 0, wrong = 0;
+    for (int i = 0; i < 20'000; ++i) {
+      const glm::vec3 point(in(random), in(random), in(random));
+      // Above the neck and the jaw the head is all that there is.
+      if (point.y < 0.0f) continue;
+      const glm::vec3 way = eye - point;
+      const float part = std::clamp(-glm::dot(point, way) / glm::dot(way, way), 0.0f, 1.0f);
+      const bool is_behind = glm::length(point + part * way) < 0.8f * kRadiusM;
+      const bool is_seen = glm::length(point + part * way) > 1.5f * kRadiusM;
+      const bool is_in_dark = is_hidden(lattice.view(), point);
+      behind += is_behind && part > 0.0f && glm::length(point) > kRadiusM;
+      hidden += is_behind && part > 0.0f && glm::length(point) > kRadiusM && is_in_dark;
+      wrong += is_seen && is_in_dark;
+    }
+    EXPECT_GT(behind, 100);
+    EXPECT_GT(hidden, 0.1 * behind);
+    EXPECT_EQ(wrong, 0);
+  }
+  lattice.hide_from({0.0f, 0.1f, 0.0f});
+  EXPECT_EQ(lattice.view().hidden, nullptr) << "an eye among the hair";
+  lattice.hide_from(glm::vec3(std::nanf("")));
+  EXPECT_EQ(lattice.view().hidden, nullptr) << "an eye that is nowhere";
+}
+
+// Hair hides as deep as it is dense.
+TEST_F(LightLatticeTest, DenseHairHidesAndThinHairDoesNot) {
+  for (const float width_m : {0.1f * kWidthM, kWidthM}) {
+    LightLattice lattice({kSideM, 32, false, {}, nullptr});
+    build(lattice, strands_in_box(kCount, kSideM), {width_m, 1.0f, 0.0f},
+          {{0, 1, 0}, {0, 0, 1}, {0, 1, 0}, true}, workers_);
+    lattice.hide_from({0.0f, 0.0f, 0.6f});
+    ASSERT_NE(lattice.view().hidden, nullptr);
+    EXPECT_FALSE(is_hidden(lattice.view(), {0, 0, 0.045f})) << "the side of the eye";
+    EXPECT_EQ(is_hidden(lattice.view(), {0, 0, -0.035f}), width_m * kPerM / kWidthM * 0.08 > 6.0);
+  }
+}
+
 TEST_F(LightLatticeTest, ShouldersLieInTheShadeOfTheHead) {
   constexpr float kRadiusM = 0.08f;
   LightLattice lattice(with_head(kRadiusM));

@@ -422,6 +422,75 @@ TEST(TileRenderer, ShadowsAreThoseOfAFinerLattice) {
   EXPECT_GT(rmse(48), 0.0075);
 }
 
+// What is left out because head and hair hide it would not be seen, from wherever one looks.
+TEST(TileRenderer, WhatIsHiddenIsNotMissed) {
+  const SceneAsset asset = grown_hair(1000);
+  const RenderSize size{320, 240};
+  CameraDesc camera;
+  uint64_t seen = 0, all_segments = 0;
+  for (const glm::vec3 offset_m :
+       {glm::vec3(0.1f, 0.05f, 0.6f), glm::vec3(0.6f, 0, 0), glm::vec3(0, 0.3f, -0.6f),
+        glm::vec3(0.1f, 0.7f, 0.1f), glm::vec3(0.1f, -0.5f, 0.3f)}) {
+    camera.offset_m = offset_m;
+    Image pictures[2];
+    uint64_t segments[2];
+    for (const bool draws_hidden : {true, false}) {
+      TileOptions options{own_workers(2), simd::widest_set()};
+      options.draws_hidden = draws_hidden;
+      auto renderer = make_tile_renderer(asset, {}, options);
+      ASSERT_TRUE(renderer && (*renderer)->draw({{}, asset.rest_position_m}, camera, size));
+      pictures[draws_hidden ? 1 : 0] = (*renderer)->read_image();
+      segments[draws_hidden ? 1 : 0] = (*renderer)->profile().drawn_segments;
+    }
+    const PictureMask all(size_t{size.width} * size.height, 1);
+    const auto error = picture_error(pictures[0], pictures[1], all);
+    ASSERT_TRUE(error);
+    EXPECT_GE(error->psnr_db, 55.0) << offset_m.x << ", " << offset_m.y;
+    seen += segments[0];
+    all_segments += segments[1];
+  }
+  EXPECT_LT(static_cast<double>(seen), 0.8 * static_cast<double>(all_segments));
+}
+
+// Tiles that shading finds are those of the segments' places.
+TEST(TileBins, ListsAreTheSameWithoutTheTilesThatShadingFound) {
+  const SceneAsset asset = grown_hair();
+  const RenderScene scene(asset, {}, true);
+  StrandExpansion expansion(asset, scene.rest.mean_length_m);
+  expansion.set_look(scene.look);
+  const auto view = make_view({}, {1.0, 0.0, 0.0, 0.0}, {200, 150});
+  ASSERT_TRUE(view);
+  StrandPoints points;
+  DetailFacts facts = detail_facts(scene);
+  facts.max_points = 1 << 20;
+  expansion.expand(asset.rest_position_m, choose_detail(facts, scene.look, *view, {}), *own_workers(2),
+                   simd::widest_set(), points);
+  points.point[100].x = std::nanf("");
+  LightLattice lattice(describe_lattice(asset, scene, 32));
+  ShadeInput shade{};
+  lattice.build(fit_lattice(lattice.desc(), shade.lights, asset.rest_position_m, 0.0f), points,
+                {1e-4f, 1.0f, 0.0f}, shade.lights, *own_workers(2));
+  shade.lattice = lattice.view();
+  shade.view = *view;
+  shade.width_m = 1e-4f;
+  shade_points(shade, *own_workers(2), simd::widest_set(), points);
+  const TileGrid grid{{200, 150}};
+  TileBins known, looked;
+  const BinCounts with = known.bin_segments(points, grid, view->near_m, *own_workers(2));
+  EXPECT_GT(std::count_if(points.tile.begin(), points.tile.end(),
+                          [&](uint32_t tile) { return tile < grid.count(); }),
+            static_cast<ptrdiff_t>(points.tile.size() / 2));
+  points.tile.clear();
+  const BinCounts without = looked.bin_segments(points, grid, view->near_m, *own_workers(2));
+  EXPECT_EQ(with.not_finite, without.not_finite);
+  EXPECT_GT(with.not_finite, 0u);
+  EXPECT_EQ(with.segments, without.segments);
+  EXPECT_EQ(known.segments().first, looked.segments().first);
+  const auto is_same = [](const TileSegment& a, const TileSegment& b) { return a.point == b.point; };
+  EXPECT_TRUE(std::equal(known.segments().item.begin(), known.segments().item.end(),
+                         looked.segments().item.begin(), looked.segments().item.end(), is_same));
+}
+
 // ---- one tile after another, from points made by hand
 
 uint16_t half_of(float x) {

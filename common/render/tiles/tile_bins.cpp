@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/render/tiles/half_float.h"
 
@@ -14,9 +15,6 @@ struct TileRange {
 };
 
 constexpr uint32_t kPartsPerWorker = 4;
-// Instead of the only tile that a segment touches.
-constexpr uint32_t kNoTile = 0xffffffffu;
-constexpr uint32_t kSeveralTiles = 0xfffffffeu;
 constexpr float kPerTile = 1.0f / static_cast<float>(kTilePx);
 
 /// Towards minus infinity, of values that fit.
@@ -72,59 +70,70 @@ bool visit_tiles(const StrandPoint& a, const StrandPoint& b, const TileGrid& gri
   return true;
 }
 
+/// Calls work(part, segment, its tile) for each segment of what is drawn, by parts.
+template <class Work>
+void for_segments(const StrandPoints& points, uint32_t parts, uint32_t drawn, WorkerPool& workers,
+                  Work work) {
+  const uint32_t strands = points.strand_count();
+  workers.at(Priority::Drawing).for_ranges(parts, 1, [&](size_t begin_part, size_t) {
+    const auto part = static_cast<uint32_t>(begin_part);
+    const auto begin = static_cast<uint32_t>(uint64_t{strands} * part / parts);
+    const auto end = static_cast<uint32_t>(uint64_t{strands} * (part + 1) / parts);
+    for (uint32_t strand = begin; strand < end; ++strand) {
+      // Of those that do not all fit every so many-th is left out.
+      if (drawn < strands && (uint64_t{strand} + 1) * drawn / strands == uint64_t{strand} * drawn / strands)
+        continue;
+      for (uint32_t i = points.first_point[strand]; i + 1 < points.first_point[strand + 1]; ++i) {
+        const uint32_t only = points.tile.empty() ? StrandPoints::kSeveralTiles : points.tile[i];
+        if (only != StrandPoints::kNoTile) work(part, i, only);
+      }
+    }
+  });
+}
+
 }  // namespace
 
 uint64_t TileBins::size_bytes() const {
-  return segments_.size_bytes() + boxes_.size_bytes() +
-         (counts_.capacity() + only_tile_.capacity()) * sizeof(uint32_t);
+  return segments_.size_bytes() + boxes_.size_bytes() + counts_.capacity() * sizeof(uint32_t);
+}
+
+size_t TileBins::count_segments(const StrandPoints& points, const Cut& cut, uint32_t drawn,
+                                WorkerPool& workers, std::vector<BinCounts>& counted) {
+  const uint32_t tiles = cut.grid.count();
+  const auto parts = static_cast<uint32_t>(counted.size());
+  counts_.assign(size_t{tiles} * parts, 0);
+  for (BinCounts& counts : counted) counts = {};
+  for_segments(points, parts, drawn, workers, [&](uint32_t part, uint32_t i, uint32_t only) {
+    uint32_t* const counts = counts_.data() + size_t{tiles} * part;
+    BinCounts& sum = counted[part];
+    if (only != StrandPoints::kSeveralTiles) {
+      ++counts[only];
+      ++sum.segments;
+      return;
+    }
+    const StrandPoint& a = points.point[i];
+    const StrandPoint& b = points.point[i + 1];
+    if (visit_tiles(a, b, cut.grid, cut.near_m, [&](uint32_t tile) { ++counts[tile]; }))
+      ++sum.segments;
+    else if (!(std::isfinite(a.x + b.x) && std::isfinite(a.y + b.y) && std::isfinite(a.z + b.z)))
+      ++sum.not_finite;
+  });
+  size_t pairs = 0;
+  for (const uint32_t count : counts_) pairs += count;
+  return pairs;
 }
 
 BinCounts TileBins::bin_segments(const StrandPoints& points, const TileGrid& grid, float near_m,
                                  WorkerPool& workers) {
   const uint32_t tiles = grid.count();
-  // More than threads: who is held up leaves some to the others.
+  // More than threads: who is held up leaves some to the others. Each part is a run of strands, so that the
+  // lists come out in their order.
   const uint32_t parts = workers.size() > 1 ? kPartsPerWorker * workers.size() : 1;
   const uint32_t strands = points.strand_count();
   std::vector<BinCounts> counted(parts);
-  // Each part is a run of strands, so that the lists come out in their order.
-  const auto in_parts = [&](uint32_t drawn, auto work) {
-    workers.at(Priority::Drawing).for_ranges(parts, 1, [&](size_t begin_part, size_t) {
-      const auto part = static_cast<uint32_t>(begin_part);
-      const auto begin = static_cast<uint32_t>(uint64_t{strands} * part / parts);
-      const auto end = static_cast<uint32_t>(uint64_t{strands} * (part + 1) / parts);
-      for (uint32_t strand = begin; strand < end; ++strand) {
-        // Of those that do not all fit every so many-th is left out.
-        if (drawn < strands && (uint64_t{strand} + 1) * drawn / strands == uint64_t{strand} * drawn / strands)
-          continue;
-        for (uint32_t i = points.first_point[strand]; i + 1 < points.first_point[strand + 1]; ++i)
-          work(part, i);
-      }
-    });
-  };
-  only_tile_.resize(points.point.size());
   uint32_t drawn = strands;
-  size_t pairs = 0;
   for (;;) {
-    counts_.assign(size_t{tiles} * parts, 0);
-    for (BinCounts& counts : counted) counts = {};
-    in_parts(drawn, [&](uint32_t part, uint32_t i) {
-      const StrandPoint& a = points.point[i];
-      const StrandPoint& b = points.point[i + 1];
-      uint32_t* const counts = counts_.data() + size_t{tiles} * part;
-      uint32_t only = kNoTile;
-      const auto count = [&](uint32_t tile) {
-        ++counts[tile];
-        only = only == kNoTile ? tile : kSeveralTiles;
-      };
-      const bool is_seen = visit_tiles(a, b, grid, near_m, count);
-      only_tile_[i] = only;
-      if (is_seen)
-        ++counted[part].segments;
-      else if (!(std::isfinite(a.x + b.x) && std::isfinite(a.y + b.y) && std::isfinite(a.z + b.z)))
-        ++counted[part].not_finite;
-    });
-    pairs = 0;
-    for (const uint32_t count : counts_) pairs += count;
+    const size_t pairs = count_segments(points, {grid, near_m}, drawn, workers, counted);
     if (pairs <= kMaxTilePairs || drawn == 0) break;
     drawn = static_cast<uint32_t>(static_cast<double>(drawn) * 0.9 * static_cast<double>(kMaxTilePairs) /
                                   static_cast<double>(pairs));
@@ -133,23 +142,18 @@ BinCounts TileBins::bin_segments(const StrandPoints& points, const TileGrid& gri
   uint32_t next = 0;
   for (uint32_t tile = 0; tile < tiles; ++tile) {
     segments_.first[tile] = next;
-    for (uint32_t part = 0; part < parts; ++part) {
-      const uint32_t count = counts_[size_t{tiles} * part + tile];
-      counts_[size_t{tiles} * part + tile] = next;
-      next += count;
-    }
+    for (uint32_t part = 0; part < parts; ++part)
+      next += std::exchange(counts_[size_t{tiles} * part + tile], next);
   }
   segments_.first[tiles] = next;
   segments_.item.resize(next);
-  in_parts(drawn, [&](uint32_t part, uint32_t i) {
-    const uint32_t only = only_tile_[i];
-    if (only == kNoTile) return;
+  for_segments(points, parts, drawn, workers, [&](uint32_t part, uint32_t i, uint32_t only) {
     uint32_t* const places = counts_.data() + size_t{tiles} * part;
-    const auto put = [&](uint32_t tile) {
-      segments_.item[places[tile]++] = {points.point[i].z + points.point[i + 1].z, i};
-    };
-    if (only != kSeveralTiles) return put(only);
-    visit_tiles(points.point[i], points.point[i + 1], grid, near_m, put);
+    const StrandPoint& a = points.point[i];
+    const StrandPoint& b = points.point[i + 1];
+    const auto put = [&](uint32_t tile) { segments_.item[places[tile]++] = {a.z + b.z, i}; };
+    if (only != StrandPoints::kSeveralTiles) return put(only);
+    visit_tiles(a, b, grid, near_m, put);
   });
   BinCounts sum;
   for (const BinCounts& counts : counted) {

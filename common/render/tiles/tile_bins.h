@@ -56,10 +56,17 @@ class TileBins {
   uint64_t size_bytes() const;
 
  private:
+  struct Cut {
+    const TileGrid& grid;
+    float near_m;
+  };
+  /// Fills counts_ and returns their sum.
+  size_t count_segments(const StrandPoints& points, const Cut& cut, uint32_t drawn, WorkerPool& workers,
+                        std::vector<BinCounts>& counted);
+
   TileLists<TileSegment> segments_;
   TileLists<uint32_t> boxes_;
-  std::vector<uint32_t> counts_;     // (part x tile)
-  std::vector<uint32_t> only_tile_;  // of the segment from each point
+  std::vector<uint32_t> counts_;  // (part x tile)
 };
 
 }  // namespace strandcast

@@ -33,12 +33,17 @@ struct StrandPoints {
   std::vector<uint32_t> index;
   std::vector<uint32_t> lock;
   std::vector<StrandPoint> point;
+  // Once shaded, per point: the only tile that the segment from there touches, or one of these.
+  std::vector<uint32_t> tile;
+  static constexpr uint32_t kNoTile = 0xffffffffu;
+  static constexpr uint32_t kSeveralTiles = 0xfffffffeu;  // or not known
 
   uint32_t strand_count() const {
     return first_point.empty() ? 0 : static_cast<uint32_t>(first_point.size() - 1);
   }
   uint64_t size_bytes() const {
-    return (first_point.capacity() + index.capacity() + lock.capacity()) * sizeof(uint32_t) +
+    return (first_point.capacity() + index.capacity() + lock.capacity() + tile.capacity()) *
+               sizeof(uint32_t) +
            point.capacity() * sizeof(StrandPoint);
   }
 };

@@ -97,31 +97,43 @@ STRANDCAST_LANES int first_sample(int x, int y) {
          sample_y % kBlockRows * kBlockColumns + sample_x % kBlockColumns;
 }
 
+/// Of a block of samples, which is a pixel above another: lanes 0 and 4 become the least, or the sum, of
+/// each.
+template <class Join>
+STRANDCAST_LANES FloatBits joined_pixels(FloatBits samples, Join join) {
+  samples = join(samples, __builtin_shufflevector(samples, samples, 1, 0, 3, 2, 5, 4, 7, 6));
+  return join(samples, __builtin_shufflevector(samples, samples, 2, 3, 0, 1, 6, 7, 4, 5));
+}
+/// Returns the pixels of a block: of its samples upper left and right, lower left and right.
+template <class Join>
+STRANDCAST_LANES Float pixels_of(const FloatBits samples[4], Join join) {
+  FloatBits joined[4];
+  for (int i = 0; i < 4; ++i) joined[i] = joined_pixels(samples[i], join);
+  const FloatBits upper = __builtin_shufflevector(joined[0], joined[1], 0, 8, 4, 12, 0, 8, 4, 12);
+  const FloatBits lower = __builtin_shufflevector(joined[2], joined[3], 0, 8, 4, 12, 0, 8, 4, 12);
+  return __builtin_shufflevector(upper, lower, 0, 1, 2, 3, 8, 9, 10, 11);
+}
+
 /// How far the head is from pixels and how much of each it covers; false where it covers nothing.
 STRANDCAST_LANES bool cover_by_head(const HeadSamples& samples, TileHead& out) {
-  const auto* const depths = reinterpret_cast<const float*>(samples.depth);
-  const auto* const triangles = reinterpret_cast<const uint32_t*>(samples.which);
+  static_assert(kHeadSamples == 2 && kBlockColumns == 2 && kBlockRows == 4);
+  constexpr float kShare = 1.0f / (kHeadSamples * kHeadSamples);
   bool is_there = false;
   for (int y = 0; y < kBlocksDown; ++y)
     for (int x = 0; x < kBlocksAcross; ++x) {
       const int block = y * kBlocksAcross + x;
-      float nearest[kLanes], covered_share[kLanes];
-      for (int lane = 0; lane < static_cast<int>(kLanes); ++lane) {
-        const int first =
-            first_sample(x * kBlockColumns + lane % kBlockColumns, y * kBlockRows + lane / kBlockColumns);
-        int covered = 0;
-        nearest[lane] = kFarDepth;
-        for (int sample = 0; sample < kHeadSamples * kHeadSamples; ++sample) {
-          const int at = first + sample / kHeadSamples * kBlockColumns + sample % kHeadSamples;
-          if (triangles[at] == kNoTriangle) continue;
-          ++covered;
-          nearest[lane] = std::min(nearest[lane], depths[at]);
-        }
-        covered_share[lane] = static_cast<float>(covered) / (kHeadSamples * kHeadSamples);
-        is_there |= covered > 0;
-      }
-      out.depth[block] = simd::load_lanes(nearest);
-      out.seen[block] = simd::load_lanes(covered_share);
+      const Float* const upper = samples.depth + 2 * (y * kHeadRowBlocks + x);
+      const FloatBits depth[4] = {upper[0].v, upper[1].v, upper[kHeadRowBlocks].v,
+                                  upper[kHeadRowBlocks + 1].v};
+      FloatBits share[4];
+      for (int i = 0; i < 4; ++i)
+        share[i] = select(Float(depth[i]) < kFarDepth, Float(kShare), Float(0.0f)).v;
+      out.depth[block] = pixels_of(depth, [](FloatBits a, FloatBits b) STRANDCAST_LANES_LAMBDA {
+        return simd::min(Float(a), Float(b)).v;
+      });
+      out.seen[block] =
+          pixels_of(share, [](FloatBits a, FloatBits b) STRANDCAST_LANES_LAMBDA { return a + b; });
+      is_there |= is_any(out.seen[block] > 0.0f);
     }
   return is_there;
 }
@@ -324,52 +336,68 @@ STRANDCAST_LANES void blend_strands(const TileInput& in, uint32_t tile, TileHead
   }
 }
 
+/// Linear colours of a block as the picture has them.
+STRANDCAST_LANES void pack_pixels(const TileInput& in, const Float color[3], uint32_t packed[kLanes]) {
+  int32_t step[3][kLanes];
+  for (int c = 0; c < 3; ++c) {
+    const IntBits steps = to_integers(simd::clamp(color[c], 0.0f, 1.0f) * static_cast<float>(kSrgbSteps));
+    std::memcpy(step[c], &steps, sizeof steps);
+  }
+  for (uint32_t lane = 0; lane < kLanes; ++lane)
+    packed[lane] = 0xff000000u | uint32_t{in.srgb[step[0][lane]]} | uint32_t{in.srgb[step[1][lane]]} << 8 |
+                   uint32_t{in.srgb[step[2][lane]]} << 16;
+}
+
+/// What is known of a tile when it is written; `head`: null where there is none.
+struct DrawnTile {
+  const TileInput& in;
+  uint32_t tile;
+  const TileHead* head;
+  const HeadSamples& samples;
+  const TilePixels& pixels;
+};
+
+/// Head and strands of a block over what lies behind, which `color` has.
+STRANDCAST_LANES void add_drawn(const DrawnTile& drawn_tile, int x, int y, Float color[3]) {
+  const auto& [in, tile, head, samples, pixels] = drawn_tile;
+  const int block = y * kBlocksAcross + x;
+  Float scene[3] = {pixels.red[block], pixels.green[block], pixels.blue[block]};
+  Float drawn = 1.0f - pixels.passed[block];
+  // Where strands leave less than this of the head nobody sees it.
+  if (head != nullptr && is_any(head->seen[block] > kOpaque)) {
+    const Float seen = head->seen[block];
+    const law::vec3 light = light_head(in, tile, samples, x, y);
+    scene[0] += seen * light.x;
+    scene[1] += seen * light.y;
+    scene[2] += seen * light.z;
+    drawn += seen;
+  }
+  if (!is_any(drawn > 0.0f)) return;
+  const Float per_drawn = 1.0f / simd::max(drawn, 1e-5f);
+  for (int c = 0; c < 3; ++c) color[c] += drawn * (tone_mapped(scene[c] * per_drawn) - color[c]);
+}
+
 /// The picture's pixels of a tile: head and strands over the background, tone curve, sRGB.
-STRANDCAST_LANES void write_pixels(const TileInput& in, uint32_t tile, const TileHead* head,
-                                   const HeadSamples& samples, const TilePixels& pixels) {
-  const uint32_t left = tile % in.grid.columns() * kTilePx;
-  const uint32_t top = tile / in.grid.columns() * kTilePx;
+STRANDCAST_LANES void write_pixels(const DrawnTile& drawn) {
+  const TileInput& in = drawn.in;
+  const uint32_t left = drawn.tile % in.grid.columns() * kTilePx;
+  const uint32_t top = drawn.tile / in.grid.columns() * kTilePx;
   const uint32_t width = std::min(kTilePx, in.grid.size_px.x - left);
   const uint32_t height = std::min(kTilePx, in.grid.size_px.y - top);
-  for (int y = 0; y < kBlocksDown; ++y)
-    for (int x = 0; x < kBlocksAcross; ++x) {
-      const int block = y * kBlocksAcross + x;
-      const Float gradient = background_gradient(
-          in, block_rows() + static_cast<float>(top + static_cast<uint32_t>(y) * kBlockRows));
+  for (uint32_t y = 0; y < height; y += kBlockRows) {
+    const Float gradient = background_gradient(in, block_rows() + static_cast<float>(top + y));
+    for (uint32_t x = 0; x < width; x += kBlockColumns) {
       Float color[3] = {in.background.x * gradient, in.background.y * gradient, in.background.z * gradient};
-      if (in.backdrop != nullptr)
-        read_backdrop(in, left + static_cast<uint32_t>(x) * kBlockColumns,
-                      top + static_cast<uint32_t>(y) * kBlockRows, color);
-      {
-        Float scene[3] = {pixels.red[block], pixels.green[block], pixels.blue[block]};
-        Float drawn = 1.0f - pixels.passed[block];
-        if (head != nullptr) {
-          const Float seen = head->seen[block];
-          if (is_any(seen > 0.0f)) {
-            const law::vec3 light = light_head(in, tile, samples, x, y);
-            scene[0] += seen * light.x;
-            scene[1] += seen * light.y;
-            scene[2] += seen * light.z;
-            drawn += seen;
-          }
-        }
-        const Float per_drawn = 1.0f / simd::max(drawn, 1e-5f);
-        for (int c = 0; c < 3; ++c) color[c] += drawn * (tone_mapped(scene[c] * per_drawn) - color[c]);
-      }
-      uint32_t packed[kLanes] = {};
-      for (int c = 0; c < 3; ++c) {
-        const IntBits step = to_integers(simd::clamp(color[c], 0.0f, 1.0f) * static_cast<float>(kSrgbSteps));
-        for (uint32_t lane = 0; lane < kLanes; ++lane)
-          packed[lane] |= uint32_t{in.srgb[step[lane]]} << (8 * c);
-      }
-      for (uint32_t lane = 0; lane < kLanes; ++lane) {
-        const uint32_t px = static_cast<uint32_t>(x) * kBlockColumns + lane % kBlockColumns;
-        const uint32_t py = static_cast<uint32_t>(y) * kBlockRows + lane / kBlockColumns;
-        if (px >= width || py >= height) continue;
-        const uint32_t value = packed[lane] | 0xff000000u;
-        std::memcpy(in.rgba + 4 * (size_t{top + py} * in.grid.size_px.x + left + px), &value, sizeof value);
-      }
+      if (in.backdrop != nullptr) read_backdrop(in, left + x, top + y, color);
+      add_drawn(drawn, static_cast<int>(x / kBlockColumns), static_cast<int>(y / kBlockRows), color);
+      uint32_t packed[kLanes];
+      pack_pixels(in, color, packed);
+      const size_t columns = std::min<size_t>(kBlockColumns, width - x);
+      for (uint32_t row = 0; row < std::min<uint32_t>(kBlockRows, height - y); ++row)
+        std::memcpy(in.rgba + 4 * (size_t{top + y + row} * in.grid.size_px.x + left + x),
+                    packed + size_t{row} * kBlockColumns, columns * sizeof *packed);
     }
+  }
 }
 
 STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
@@ -388,7 +416,7 @@ STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
     pixels.passed[block] = Float(1.0f);
   }
   blend_strands(in, tile, has_head ? &head : nullptr, *arguments.scratch, pixels);
-  write_pixels(in, tile, has_head ? &head : nullptr, samples, pixels);
+  write_pixels({in, tile, has_head ? &head : nullptr, samples, pixels});
 }
 STRANDCAST_KERNEL(draw_any_tile, TileArguments);
 

@@ -38,6 +38,12 @@ struct HeldImage {
   uint64_t size_bytes() const { return image.rgba.capacity(); }
 };
 
+LightLatticeDesc lattice_desc(const SceneAsset& asset, const RenderScene& scene, const TileOptions& options) {
+  LightLatticeDesc desc = describe_lattice(asset, scene, options.light_cells);
+  desc.set = options.set;
+  return desc;
+}
+
 /// All that the passes of a picture share.
 struct TileState {
   TileState(const SceneAsset& asset, const LookDesc& wanted, const RenderScene& facts,
@@ -46,8 +52,9 @@ struct TileState {
         detail_facts(strandcast::detail_facts(facts)),
         workers(*options.workers),
         set(options.set),
+        draws_hidden(options.draws_hidden),
         expansion(asset, facts.rest.mean_length_m),
-        lattice(describe_lattice(asset, facts, options.light_cells)),
+        lattice(lattice_desc(asset, facts, options)),
         mesh(asset.head),
         skin(asset.head),
         cover(scalp_cover(asset, facts.rest.extent_m * kCoverReach)),
@@ -66,6 +73,7 @@ struct TileState {
   DetailFacts detail_facts;
   WorkerPool& workers;
   simd::InstructionSet set;
+  bool draws_hidden;
   StrandExpansion expansion;
   StrandPoints points;
   LightLattice lattice;
@@ -125,6 +133,8 @@ Status light(TileState& state, RenderTurn& turn) {
 
 Status shade(TileState& state, RenderTurn& turn) {
   state.shade.look = shading_numbers(state.look);
+  if (!state.draws_hidden && turn.terms.debug_view != DebugView::Overdraw)
+    state.lattice.hide_from(turn.view.eye_m);
   state.shade.lattice = state.lattice.view();
   state.shade.view = turn.view;
   state.shade.debug_view = turn.terms.debug_view;

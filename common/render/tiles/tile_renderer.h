@@ -16,7 +16,8 @@ struct TileOptions {
   WorkerPool* workers = &shared_workers();
   simd::InstructionSet set = simd::widest_set();
   uint32_t light_cells = kLightCells;  // along the hair's largest side
-  bool is_finest = false;  // all followers and segments of the look, whatever the size of the picture
+  bool is_finest = false;     // all followers and segments of the look, whatever the size of the picture
+  bool draws_hidden = false;  // also strands of which nothing is seen: the same picture, but for rounding
 };
 
 /// Makes a renderer; BadInput for an inconsistent asset.
