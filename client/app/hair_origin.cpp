@@ -6,9 +6,9 @@
 #include <string>
 #include <utility>
 
-#include "client/app/attempts.h"
 #include "client/app/save_scene.h"
 #include "common/base/profile.h"
+#include "common/client/attempts.h"
 #include "common/scene/file_groom.h"
 
 namespace strandcast {

@@ -21,7 +21,10 @@ std::unique_ptr<LiveConnection> LiveConnection::begin(const ClientConfig& config
 
 LiveConnection::LiveConnection(const ClientConfig& config)
     : modes_(std::make_shared<ModeControl>(config.hello.mode)),
-      attempts_(config, [](const ClientConfig& one) { return ViewerSession::open(one); }) {}
+      attempts_(config, [modes = modes_](ClientConfig one) {
+        one.hello.mode = modes->look().wanted;
+        return ViewerSession::open(one);
+      }) {}
 
 void LiveConnection::set_trace(std::shared_ptr<FrameTrace> trace) {
   trace_ = std::move(trace);
@@ -43,11 +46,14 @@ bool LiveConnection::pump(std::chrono::milliseconds timeout) {
     if (!pumped) {
       is_open_ = false;
       attempts_.lose(pumped.error(), session_->client().heard_ns());
+      return false;
     }
     tell_silence();
-    return false;
+    auto next = attempts_.pump_beside(session_->client().heard_ns());
+    if (next == nullptr) return false;
+    take(std::move(next));
+    return true;
   }
-  attempts_.config().hello.mode = modes_->look().wanted;
   auto session = attempts_.pump(timeout);
   if (session == nullptr) return false;
   take(std::move(session));
@@ -79,8 +85,7 @@ std::string LiveConnection::help() const {
 }
 
 std::string LiveConnection::doing() const {
-  if (is_connected()) return {};
-  return is_silent() ? "waiting for a word, then connecting anew" : attempts_.doing();
+  return is_connected() ? std::string() : attempts_.doing();
 }
 
 }  // namespace strandcast

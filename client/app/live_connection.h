@@ -7,8 +7,8 @@
 #include <optional>
 #include <string>
 
-#include "client/app/attempts.h"
 #include "client/app/viewer_session.h"
+#include "common/client/attempts.h"
 
 namespace strandcast {
 

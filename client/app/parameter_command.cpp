@@ -5,10 +5,10 @@
 #include <optional>
 #include <utility>
 
-#include "client/app/attempts.h"
 #include "client/app/ctl_commands.h"
 #include "client/app/notice_list.h"
 #include "common/base/profile.h"
+#include "common/client/attempts.h"
 
 namespace strandcast {
 namespace {

@@ -25,6 +25,10 @@ Status SteadyClient::pump(std::chrono::milliseconds timeout, const OnEvent& on_e
     on_event(event);
   }
   tell_silence();
+  if (auto next = attempts_.pump_beside(client_->heard_ns())) {
+    client_ = std::move(next);
+    welcome_ = client_->welcome();
+  }
   return {};
 }
 

@@ -7,7 +7,7 @@
 #include <functional>
 #include <memory>
 
-#include "client/app/attempts.h"
+#include "common/client/attempts.h"
 
 namespace strandcast {
 

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <iostream>
 
-#include "client/app/attempts.h"
 #include "common/base/profile.h"
 #include "common/base/units.h"
+#include "common/client/attempts.h"
 
 namespace strandcast {
 namespace {

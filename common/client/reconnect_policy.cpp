@@ -65,6 +65,10 @@ bool is_silent(int64_t heard_ns, int64_t time_ns) {
   return time_ns - heard_ns >= std::chrono::nanoseconds(kSilentServer).count();
 }
 
+bool is_doubted(int64_t heard_ns, int64_t time_ns) {
+  return time_ns - heard_ns >= std::chrono::nanoseconds(kDoubtedServer).count();
+}
+
 std::string silence_text(const std::string& server, int64_t heard_ns, int64_t time_ns) {
   return fmt::format("{}: not connected: nothing has come for {:.0f} s", server,
                      static_cast<double>(time_ns - heard_ns) / kNsPerS);
@@ -84,15 +88,20 @@ std::optional<std::chrono::milliseconds> ReconnectPolicy::on_lost(const Error& e
     const int64_t lived_ns = time_ns - std::exchange(welcome_ns_, 0);
     if (lived_ns >= std::chrono::nanoseconds(kStableConnection).count()) doublings_ = 0;
   }
+  return on_failed(error);
+}
+
+std::optional<std::chrono::milliseconds> ReconnectPolicy::on_failed(const Error& error) {
   if (is_final(error, standing())) return std::nullopt;
   constexpr uint32_t kMaxDoublings = 16;
   const double doubled = static_cast<double>(kFirstReconnectDelay.count()) *
                          static_cast<double>(1u << std::min(doublings_, kMaxDoublings));
+  const auto longest = doublings_ < kUrgentAttempts ? std::min(longest_, kLongestUrgentDelay) : longest_;
   ++doublings_;
   ++attempts_;
   random_ = mix_u32(random_ + doublings_);
   const double jitter = 1.0 + kReconnectJitter * (2.0 * static_cast<double>(unit_float(random_)) - 1.0);
-  const double delay_ms = std::min(doubled, static_cast<double>(longest_.count())) * jitter;
+  const double delay_ms = std::min(doubled, static_cast<double>(longest.count())) * jitter;
   return std::chrono::milliseconds(static_cast<int64_t>(delay_ms));
 }
 

@@ -16,11 +16,16 @@ namespace strandcast {
 /// Between two attempts, growing from the first to the longest.
 inline constexpr std::chrono::milliseconds kFirstReconnectDelay{250};
 inline constexpr std::chrono::milliseconds kLongestReconnectDelay{5000};
-/// Longest delay of a relay and of the commands of strandcast-ctl, since others wait for them.
+/// Longest delay of a relay and of the commands of strandcast-ctl, since others wait for them, and of all
+/// others in their first attempts: most servers are away for seconds.
 inline constexpr std::chrono::milliseconds kLongestUrgentDelay{1000};
+inline constexpr uint32_t kUrgentAttempts = 30;
 inline constexpr double kReconnectJitter = 0.25;  // relative, +-
 /// A connection that lived this long: start from the first delay.
 inline constexpr std::chrono::milliseconds kStableConnection{10'000};
+/// Nothing heard for so long, where a Pong and a status are due each second: a new connection is tried beside
+/// this one, and takes its place unless it speaks first.
+inline constexpr std::chrono::milliseconds kDoubtedServer{1500};
 /// Nothing heard for so long: "not connected" is shown. The connection itself waits for idle_timeout.
 inline constexpr std::chrono::milliseconds kSilentServer{3000};
 /// A command of strandcast-ctl tries to connect for so long.
@@ -43,6 +48,8 @@ inline constexpr std::string_view kClosedByServer = "the server closed the conne
 
 /// Whether a connection on which something came last at `heard_ns` is to be shown as none; by now_ns().
 bool is_silent(int64_t heard_ns, int64_t time_ns);
+/// Whether it may be dead.
+bool is_doubted(int64_t heard_ns, int64_t time_ns);
 /// For a person.
 std::string silence_text(const std::string& server, int64_t heard_ns, int64_t time_ns);
 
@@ -57,6 +64,8 @@ class ReconnectPolicy {
   /// An attempt failed, or the connection ended whose last byte came at `heard_ns` (0: now). Delay before the
   /// next attempt, or nothing when the error is final.
   std::optional<std::chrono::milliseconds> on_lost(const Error& error, int64_t time_ns, int64_t heard_ns = 0);
+  /// An attempt beside a connection that there still is failed; as on_lost().
+  std::optional<std::chrono::milliseconds> on_failed(const Error& error);
 
   Standing standing() const { return welcomes_ > 0 ? Standing::Member : Standing::Newcomer; }
   /// Since the last Welcome.

@@ -287,7 +287,6 @@ Error ViewerClient::Connection::error_from_stream(const error_code& failure) {
 }
 
 Status ViewerClient::Connection::handle(std::span<const std::byte> bytes) {
-  heard_ns_ = now_ns();
   {
     const std::lock_guard lock(mutex_);
     counters_.received_bytes += bytes.size();
@@ -388,9 +387,6 @@ void ViewerClient::Connection::write_next() {
 void ViewerClient::Connection::ping_next() {
   if (is_finished_) return;
   const int64_t time_ns = now_ns();
-  // A long message is heard before it is whole.
-  if (const auto since = ws_.next_layer().since_received(); since < kSilentServer)
-    heard_ns_ = std::max<int64_t>(heard_ns_, time_ns - std::chrono::nanoseconds(since).count());
   outstanding_pings_.push_back(time_ns);
   if (outstanding_pings_.size() > kMaxOutstandingPings) outstanding_pings_.pop_front();
   // A probe that does not fit is lost like one on the network; the next one follows soon.
@@ -413,7 +409,7 @@ void ViewerClient::Connection::finish(Error error, websocket::close_code code) {
   const std::string reason = code == websocket::close_code::normal ? "" : error.message;
   publish_end(std::move(error));
   deadline_.cancel();
-  if (!is_open_ || !ws_.is_open()) return hard_close();
+  if (!is_open_ || !ws_.is_open() || is_doubted(heard_ns(), now_ns())) return hard_close();
   // A peer that never answers the close frame must not keep this thread.
   deadline_.expires_after(kCloseTimeout);
   deadline_.async_wait([this](error_code failure) {

@@ -3,7 +3,6 @@
 // own network thread.
 #pragma once
 
-#include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -38,7 +37,7 @@ class ViewerClient::Connection {
   size_t queued_messages() const { return outbox_.message_count(); }
   ClockOffset clock() const;
   ConnectionCounters counters() const;
-  int64_t heard_ns() const { return heard_ns_; }
+  int64_t heard_ns() const { return ws_.next_layer().received_ns(); }
   Mailbox& mailbox() { return mailbox_; }
   const Welcome& welcome() const { return welcome_; }
 
@@ -85,8 +84,7 @@ class ViewerClient::Connection {
   boost::beast::flat_buffer buffer_{kMaxMessageBytes};
   std::deque<int64_t> outstanding_pings_;
   int ping_count_ = 0;
-  std::atomic<int64_t> heard_ns_{0};  // when something came last
-  bool is_open_ = false;              // the WebSocket handshake is done
+  bool is_open_ = false;  // the WebSocket handshake is done
   bool is_welcome_ = false;
   bool is_writing_ = false;
   bool is_finished_ = false;

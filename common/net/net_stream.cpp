@@ -1,9 +1,9 @@
 #include <linux/sockios.h>
-#include <netinet/tcp.h>
 #include <openssl/ssl.h>
 #include <openssl/x509v3.h>
 #include <sys/ioctl.h>
 
+#include <atomic>
 #include <boost/asio/ip/address.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/ssl/error.hpp>
@@ -12,6 +12,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/base/profile.h"
 #include "common/net/net_stream_private.h"
 #include "common/net/tls_private.h"
 
@@ -40,6 +41,8 @@ struct NetStream::State {
   std::optional<asio::ssl::stream<Socket&>> tls;
   std::vector<std::byte> put_back;
   std::shared_ptr<uint64_t> read_left;  // null: no limit
+  // Shared with reads under way, which may outlive the stream.
+  const std::shared_ptr<std::atomic<int64_t>> received_ns = std::make_shared<std::atomic<int64_t>>(0);
 };
 
 NetStream::NetStream(Socket socket) : state_(std::make_unique<State>(std::move(socket))) {}
@@ -59,11 +62,8 @@ size_t NetStream::untaken_bytes() {
   int bytes = 0;
   return ioctl(state_->socket.native_handle(), SIOCOUTQ, &bytes) == 0 ? static_cast<size_t>(bytes) : 0;
 }
-std::chrono::milliseconds NetStream::since_received() {
-  tcp_info info{};
-  socklen_t size = sizeof(info);
-  const bool is_told = getsockopt(state_->socket.native_handle(), IPPROTO_TCP, TCP_INFO, &info, &size) == 0;
-  return is_told ? std::chrono::milliseconds(info.tcpi_last_data_recv) : std::chrono::milliseconds::max();
+int64_t NetStream::received_ns() const {
+  return *state_->received_ns;
 }
 void NetStream::close() {
   error_code ignored;
@@ -170,8 +170,13 @@ void NetStream::read_some(const MutableBuffers& buffers, Transferred done) {
 }
 
 void NetStream::read_fresh(const MutableBuffers& buffers, Transferred done) {
-  if (state_->tls) return state_->tls->async_read_some(buffers, plain(std::move(done)));
-  state_->socket.async_read_some(buffers, plain(std::move(done)));
+  auto noting = [received = state_->received_ns, done = std::move(done)](const error_code& error,
+                                                                         size_t size) mutable {
+    if (size > 0) *received = now_ns();
+    std::move(done)(error, size);
+  };
+  if (state_->tls) return state_->tls->async_read_some(buffers, std::move(noting));
+  state_->socket.async_read_some(buffers, std::move(noting));
 }
 
 void NetStream::write_some(const ConstBuffers& buffers, Transferred done) {

@@ -9,7 +9,6 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/core/role.hpp>
 #include <boost/container/static_vector.hpp>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -38,8 +37,8 @@ class NetStream {
   bool is_tls() const;
   /// What was written and the other side's kernel has not taken yet; its getting less shows a link at work.
   size_t untaken_bytes();
-  /// How long ago the kernel got bytes from the other side last; its largest value where it does not tell.
-  std::chrono::milliseconds since_received();
+  /// When bytes of the other side were read last, by now_ns(); 0 before the first. Any thread.
+  int64_t received_ns() const;
   /// Closes at once.
   void close();
 

@@ -61,7 +61,7 @@ class MemorySource : public ByteSource {
 }  // namespace
 
 Result<std::unique_ptr<ByteSource>> open_byte_source(const std::filesystem::path& path) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // a pipe opens, and is refused
   if (file < 0)
     return at(path.string(), make_error(ErrorCode::NotFound, "cannot be opened: {}", std::strerror(errno)));
   struct stat info {};

@@ -80,15 +80,38 @@ void Context::note(const std::string& line, LogLevel level) {
   if (verdict.is_written) log_line(level, "net", line);
 }
 
-bool Context::has_room(const std::string& peer_key) const {
+Context::Room Context::look_for_room(const std::string& peer_key) const {
+  const int64_t time_ns = now_ns();
   size_t all = 0;
   size_t of_peer = 0;
+  Session* doubted = nullptr;
+  Session* doubted_of_peer = nullptr;
+  const auto choose = [](Session*& chosen, Session& one) {
+    if (chosen == nullptr || one.received_ns() < chosen->received_ns()) chosen = &one;
+  };
   for (const auto& [id, session] : sessions) {
     if (session->state() != Session::State::Joined) continue;
+    const bool is_of_peer = session->peer().key == peer_key;
     ++all;
-    if (session->peer().key == peer_key) ++of_peer;
+    if (is_of_peer) ++of_peer;
+    if (!session->is_doubted(time_ns)) continue;
+    choose(doubted, *session);
+    if (is_of_peer) choose(doubted_of_peer, *session);
   }
-  return all < config.limits.sessions && of_peer < config.limits.sessions_per_address;
+  if (of_peer >= config.limits.sessions_per_address) return {false, doubted_of_peer};
+  return all < config.limits.sessions ? Room{true, nullptr} : Room{false, doubted};
+}
+
+bool Context::has_room(const std::string& peer_key) const {
+  const Room room = look_for_room(peer_key);
+  return room.is_free || room.doubted != nullptr;
+}
+
+bool Context::make_room(const std::string& peer_key) {
+  const Room room = look_for_room(peer_key);
+  if (room.doubted != nullptr)
+    room.doubted->shared_from_this()->give_way();  // it leaves the list of sessions
+  return room.is_free || room.doubted != nullptr;
 }
 
 size_t Context::waiting_of(const std::string& peer_key) const {

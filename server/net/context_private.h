@@ -91,8 +91,11 @@ struct Context {
   void refuse(Refusal why, const Peer& peer, std::string_view detail);
   /// A line about a session while there is room for it.
   void note(const std::string& line, LogLevel level = LogLevel::Info);
-  /// True while another session of this peer fits; only those that joined count.
+  /// True while another session of this peer fits, or would in the place of one that may be dead; only those
+  /// that joined count.
   bool has_room(const std::string& peer_key) const;
+  /// Ends the one that may be dead; false when there is no room.
+  bool make_room(const std::string& peer_key);
   /// How many of this peer have no Hello that was accepted.
   size_t waiting_of(const std::string& peer_key) const;
   /// True when one more may wait for its Hello. One between two requests gives its place first; among
@@ -128,6 +131,12 @@ struct Context {
   int64_t clock_offset_ns = 0;  // of the clock that frames are stamped with, against ours
 
  private:
+  struct Room {
+    bool is_free = false;
+    Session* doubted = nullptr;  // silent for longest of those that may be dead, and whose end makes room
+  };
+  Room look_for_room(const std::string& peer_key) const;
+
   mutable std::mutex mutex;
   NetCounters counters;
 };

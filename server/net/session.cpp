@@ -15,6 +15,8 @@ namespace {
 /// How much waits unsent in the kernel, so that a late frame is dropped here and not queued there.
 constexpr int kUnsentBytes = 128 << 10;
 constexpr int64_t kProbeIntervalNs = 1'000 * kMsInNs;
+/// So long after a ping that nothing answers, whoever needs the place gets it.
+constexpr int64_t kDoubtedNs = 1'500 * kMsInNs;
 /// Between two messages about the state to a hidden window: one a second, however unevenly they come.
 constexpr int64_t kHiddenStatusIntervalNs = 950 * kMsInNs;
 /// Longest sentence of ours put into a Goodbye.
@@ -176,9 +178,22 @@ std::string Session::stall_reason(int64_t time_ns) const {
   const int64_t heard_ns = std::max({due_ns, received_ns_, is_writing_ ? progress_ns_ : 0});
   if (due_ns != 0 && is_past(heard_ns, limits.stalled_ms))
     return fmt::format("says nothing for {} ms although an acknowledgement is due", limits.stalled_ms);
-  if (is_probe_under_way_ && is_past(std::max(probe_sent_ns_, heard_ns), limits.stalled_ms))
+  if (is_probe_under_way_ && !subscription_.is_empty() &&
+      is_past(std::max(probe_sent_ns_, heard_ns), limits.stalled_ms))
     return fmt::format("answers no ping for {} ms", limits.stalled_ms);
   return {};
+}
+
+bool Session::is_doubted(int64_t time_ns) const {
+  return is_probe_under_way_ && time_ns - std::max(probe_sent_ns_, received_ns_) >= kDoubtedNs;
+}
+
+void Session::give_way() {
+  context_.count(&NetCounters::stalled);
+  context_.note(
+      fmt::format("session {} from {} answers no ping, and its place is needed", id_, peer_.address),
+      LogLevel::Warn);
+  abort();
 }
 
 void Session::pump() {
@@ -280,7 +295,7 @@ void Session::check_deadlines(int64_t time_ns) {
   if (state_ != State::Joined) return;
   if (token_expires_unix_s_ != 0 && unix_time_s() >= token_expires_unix_s_) return check_stay();
   guarded([&] {
-    if (!subscription_.is_empty()) probe(time_ns);
+    probe(time_ns);
     adapt(time_ns);
     report_link(time_ns);
     ask_for_keyframe(time_ns);

@@ -88,7 +88,7 @@ void Session::check_stay() {
 
 void Session::join(const Hello& hello) {
   if (!check_token(hello)) return;
-  if (!context_.has_room(peer_.key)) return close_as_full();
+  if (!context_.make_room(peer_.key)) return close_as_full();
   const Result<size_t> found = context_.find_head(hello.head);
   if (!found) return close(close_code_for(found.error()), found.error().message);
   head_ = *found;

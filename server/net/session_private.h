@@ -54,6 +54,11 @@ class Session : public std::enable_shared_from_this<Session> {
   /// For an admin's list.
   SessionInfo info(int64_t time_ns) const;
   const Peer& peer() const { return peer_; }
+  int64_t received_ns() const { return received_ns_; }
+  /// Whether a ping of ours has had no answer for kDoubtedNs, and nothing else came either.
+  bool is_doubted(int64_t time_ns) const;
+  /// Ends, since somebody else needs the place.
+  void give_way();
 
  private:
   Head& head() const { return context_.heads[head_]; }

@@ -80,25 +80,32 @@ void UpstreamLink::run() {
     const Error error = serve(policy);
     if (is_stopping_ || !hooks_.on_lost(error)) return;
     const auto delay = policy.on_lost(error, now_ns());
+    if (next_ != nullptr) continue;
     std::unique_lock lock(mutex_);
     stopped_.wait_for(lock, delay.value_or(kLongestUrgentDelay), [this] { return is_stopping_.load(); });
   }
 }
 
+Status UpstreamLink::connect() {
+  if (next_ != nullptr) return {};
+  ASSIGN_OR_RETURN(next_, ViewerClient::connect(config_));
+  return {};
+}
+
 /// One session, from the connection to its end.
 Error UpstreamLink::serve(ReconnectPolicy& policy) {
-  const auto client = ViewerClient::connect(config_);
-  if (!client) return client.error();
+  if (const Status connected = connect(); !connected) return connected.error();
+  const std::unique_ptr<ViewerClient> client = std::move(next_);
   policy.on_welcome(now_ns());
-  if (const Status welcome = hooks_.on_welcome((*client)->welcome()); !welcome)
+  if (const Status welcome = hooks_.on_welcome(client->welcome()); !welcome)
     return at(config_.address.to_string(), welcome.error());
   {
     const std::lock_guard lock(mutex_);
-    client_ = client->get();
+    client_ = client.get();
     lost_for_.reset();
     for (const ClientMessage& message : std::exchange(waiting_, {})) (void)client_->send(message);
   }
-  Error error = hear(**client);
+  Error error = hear(*client);
   const std::lock_guard lock(mutex_);
   earlier_bytes_ += client_->counters().received_bytes;
   client_ = nullptr;
@@ -112,6 +119,7 @@ void UpstreamLink::lose(Error error) {
 
 Error UpstreamLink::hear(ViewerClient& client) {
   bool was_silent = false;
+  Attempts<ViewerClient> beside(config_, &ViewerClient::connect, kLongestUrgentDelay);
   while (!is_stopping_) {
     std::optional<ClientEvent> event = client.next(kLinkLookInterval);
     const bool is_quiet = is_silent(client.heard_ns(), now_ns());
@@ -120,6 +128,11 @@ Error UpstreamLink::hear(ViewerClient& client) {
       const std::lock_guard lock(mutex_);
       if (lost_for_) return *std::exchange(lost_for_, std::nullopt);
     }
+    next_ = beside.pump_beside(client.heard_ns());
+    if (next_ != nullptr)
+      return at(config_.address.to_string(),
+                make_error(ErrorCode::Timeout, "nothing has come for {} ms, and a new connection takes over",
+                           kDoubtedServer.count()));
     if (!event) continue;
     if (const auto* closed = std::get_if<ClosedEvent>(&*event)) return closed->error;
     hooks_.on_event(std::move(*event));

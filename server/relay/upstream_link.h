@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "common/base/result.h"
-#include "common/client/reconnect_policy.h"
+#include "common/client/attempts.h"
 #include "common/client/viewer_client.h"
 
 namespace strandcast {
@@ -64,10 +64,12 @@ class UpstreamLink {
  private:
   void run();
   Error serve(ReconnectPolicy& policy);
+  Status connect();
   Error hear(ViewerClient& client);
 
   ClientConfig config_;
   const Hooks hooks_;
+  std::unique_ptr<ViewerClient> next_;  // of the thread; takes the place of one that fell silent
   std::atomic<bool> is_stopping_{false};
   mutable std::mutex mutex_;  // guards the block below
   std::condition_variable stopped_;

@@ -283,26 +283,78 @@ TEST(ComingBack, NotFoundIsFinalToWhoNeverWasInAlone) {
   EXPECT_EQ(wrong.count(), 1u);
 }
 
-// A laptop that slept: nothing comes any more, no end either, and a new connection works.
+/// Lets the client in, and says nothing any more.
+void fall_silent(FakePeer& peer) {
+  if (!peer.welcome(make_welcome(kStrands, kVertices))) return;
+  peer.send(stream_list());
+  peer.send(*asset_frame());
+  peer.send(*keyframe(1));
+  if (const auto ping = peer.read_until<Ping>()) peer.send(Pong{ping->client_time_ns, now_ns(), now_ns()});
+  peer.wait_for_test_end();
+}
+
+// A laptop that slept: nothing comes any more, no end either, and after a while a new connection works.
 TEST(ComingBack, ASilentLinkIsShownAndLeft) {
-  const Door door({[](FakePeer& peer) {
-                     peer.welcome(make_welcome(kStrands, kVertices));
-                     peer.send(*asset_frame());
-                     peer.send(*keyframe(1));
-                     peer.wait_for_test_end();
-                   },
-                   [](FakePeer& peer) { serve(peer, 2); }});
-  ClientConfig config = config_for(door.port());
-  config.idle_timeout = kSilentServer + milliseconds(1500);
-  const auto live = LiveConnection::begin(config);
+  std::vector<FakeServer::Script> scripts = {fall_silent};
+  for (int i = 0; i < 4; ++i)  // at least 2.1 s of attempts
+    scripts.emplace_back([](FakePeer& peer) { peer.answer_http(503, "not yet"); });
+  scripts.emplace_back([](FakePeer& peer) { serve(peer, 2); });
+  const Door door(scripts);
+  const auto live = LiveConnection::begin(config_for(door.port()));
   ASSERT_TRUE(eventually([&] { return live->pump(milliseconds(2)), live->is_connected(); }));
   ASSERT_TRUE(eventually([&] { return live->pump(milliseconds(2)), !live->is_connected(); }));
   EXPECT_THAT(live->trouble(), HasSubstr("not connected")) << "while the connection is still open";
-  EXPECT_EQ(door.count(), 1u);
   ASSERT_TRUE(eventually([&] { return live->pump(milliseconds(2)), live->is_connected(); }));
   EXPECT_EQ(live->trouble(), "");
   EXPECT_EQ(live->reconnects(), 1u);
   EXPECT_GE(live->outage_s(), std::chrono::duration<double>(kSilentServer).count());
+  EXPECT_EQ(door.count(), scripts.size());
+}
+
+// Long before the connection itself is given up; the motion's source and whoever looks on alike.
+TEST(ComingBack, ANewConnectionTakesThePlaceOfASilentOne) {
+  const Door door({fall_silent, [](FakePeer& peer) { serve(peer, 2); }});
+  SteadyClient steady(config_for(door.port()));
+  const auto begin = std::chrono::steady_clock::now();
+  ASSERT_TRUE(eventually([&] {
+    EXPECT_TRUE(steady.pump(milliseconds(2), [](ClientEvent&) {}));
+    return steady.policy().reconnects() == 1;
+  }));
+  const auto took = std::chrono::steady_clock::now() - begin;
+  EXPECT_GE(took, kDoubtedServer);
+  EXPECT_LT(took, config_for(door.port()).idle_timeout);
+  EXPECT_TRUE(steady.is_connected());
+  EXPECT_GE(steady.policy().outage_s(now_ns()), std::chrono::duration<double>(kDoubtedServer).count());
+
+  const Door above({fall_silent, [](FakePeer& peer) { serve(peer, 2); }});
+  RelayConfig config;
+  config.net.port = 0;
+  config.upstream.address = {"127.0.0.1", above.port()};
+  const auto relay = Relay::start(config);
+  ASSERT_TRUE(relay) << relay.error().to_string();
+  EXPECT_TRUE(eventually([&] { return above.count() == 2 && (*relay)->readiness().ok(); }));
+}
+
+TEST(ComingBack, ASilentConnectionThatSpeaksFirstStays) {
+  std::atomic<bool> has_spoken{false};
+  const Door door({[&](FakePeer& peer) {
+                     peer.welcome(make_welcome(kStrands, kVertices));
+                     std::this_thread::sleep_for(kDoubtedServer + milliseconds(500));
+                     peer.send(*asset_frame());
+                     has_spoken = true;
+                     while (const auto ping = peer.read_until<Ping>())
+                       if (!peer.send(Pong{ping->client_time_ns, now_ns(), now_ns()})) return;
+                   },
+                   [](FakePeer& peer) {  // no Welcome meanwhile
+                     peer.upgrade();
+                     peer.read_to_end();
+                   }});
+  const auto live = LiveConnection::begin(config_for(door.port()));
+  ASSERT_TRUE(eventually([&] { return live->pump(milliseconds(2)), has_spoken && door.count() == 2; }));
+  const auto end = std::chrono::steady_clock::now() + milliseconds(300);
+  while (std::chrono::steady_clock::now() < end) live->pump(milliseconds(2));
+  EXPECT_TRUE(live->is_connected());
+  EXPECT_EQ(live->reconnects(), 0u);
 }
 
 std::string text_in(const ViewReport& report, const std::string& key) {

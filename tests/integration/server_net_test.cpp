@@ -383,6 +383,35 @@ TEST_F(ServerNet, FullServerSaysSoAndHasRoomAgainLater) {
   EXPECT_NE(join(), nullptr);
 }
 
+// Its link died without a word, and it comes back by a new one.
+TEST_F(ServerNet, WhoAnswersNoPingGivesItsPlaceToANewcomer) {
+  NetConfig config;
+  config.limits.sessions_per_address = 2;
+  start(config);
+  Hello commanding;
+  commanding.gets_no_stream = true;
+  commanding.role = Role::Controller;
+  auto dead = join(commanding);
+  auto living = join();
+  const auto asks = [&] {
+    living->send(Ping{1});
+    return living->read_control<Pong>().has_value();  // and answers the server's pings meanwhile
+  };
+  RawClient early(server_->port());
+  ASSERT_TRUE(early.handshake());
+  EXPECT_EQ(early.read_end().close_code, code(CloseCode::Full)) << "nobody is doubted yet";
+  EXPECT_TRUE(eventually([&] {
+    EXPECT_TRUE(asks());
+    RawClient newcomer(server_->port());
+    if (!newcomer.handshake()) return false;
+    newcomer.send(Hello{});
+    return newcomer.read_control<Welcome>().has_value();
+  }));
+  EXPECT_TRUE(asks()) << "who answers keeps its place";
+  EXPECT_EQ(dead->read_end().close_code, 0);
+  EXPECT_EQ(server_->counters().stalled, 1u);
+}
+
 TEST_F(ServerNet, SilentConnectionsAreEndedInTime) {
   NetConfig config;
   config.limits.handshake_ms = 200;

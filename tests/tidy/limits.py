@@ -45,7 +45,7 @@ OF_HEADER = {"server/relay/voices.h": {
     "kIdleVoiceNs": "90 s"}}
 # Structs, or of two values in two places: their tests have them (PictureViews, LiveMocap, SnapshotTimeline, ClientHostile and the like).
 ELSEWHERE = {"kHardwareBudget", "kSoftwareBudget", "kReservedPictureClasses", "kLiveLines", "kMaxDatagramBytes", "kMaxMessageBytes", "kKeptSnapshots",
-             "kMaxShownChars", "kStopGrace", "kFarewellTimeout"}
+             "kMaxShownChars", "kStopGrace", "kFarewellTimeout", "kDoubtedServer"}
 MULTIPLES = {"KiB": 1 << 10, "MiB": 1 << 20, "GiB": 1 << 30, "million": 10**6}
 # Units by the end of a name: what a second, or a millisecond, is of them.
 TIMES = {"Ns": {"s": 1e9, "ms": 1e6}, "_ms": {"s": 1e3, "ms": 1}}

@@ -8,6 +8,7 @@
 
 #include "common/base/crc32.h"
 #include "common/base/file.h"
+#include "common/record/byte_source.h"
 #include "common/record/chunk_list.h"
 #include "common/record/record_file.h"
 #include "common/record/recording_check.h"
@@ -611,6 +612,10 @@ TEST(RecordFile, WaitsForNoPipeAndTakesNoDevice) {
       ASSERT_FALSE(refused);
       EXPECT_THAT(refused.error().to_string(), HasSubstr("not a regular file"));
     }
+  // Nor does a reader: it would wait until somebody writes, whatever signal comes meanwhile.
+  const auto source = open_byte_source(pipe);
+  ASSERT_FALSE(source);
+  EXPECT_THAT(source.error().to_string(), HasSubstr("not a regular file"));
 }
 
 TEST(RecordFile, IsWrittenByOneProgramOnly) {

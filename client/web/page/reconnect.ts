@@ -2,6 +2,9 @@
 // (tests/unit/client_net_test.cpp) compares them with these, and what close codes mean (proto/WIRE.md, section 9).
 const FIRST_MS = 250;
 const LONGEST_MS = 5000;
+/** Longest delay of the first attempts. */
+const URGENT_MS = 1000;
+const URGENT_ATTEMPTS = 30;
 const JITTER = 0.25;
 const STABLE_MS = 10_000;
 /** Nothing heard for so long: "not connected" is shown. */
@@ -57,7 +60,8 @@ export class ReconnectPolicy {
   constructor(private readonly random: () => number = Math.random) {}
   nextDelayMs(connectedForMs: number): number {
     if (connectedForMs >= STABLE_MS) this.attempts = 0;
+    const longestMs = this.attempts < URGENT_ATTEMPTS ? URGENT_MS : LONGEST_MS;
     const doubled = FIRST_MS * 2 ** Math.min(this.attempts++, 16);
-    return Math.min(doubled, LONGEST_MS) * (1 + JITTER * (2 * this.random() - 1));
+    return Math.min(doubled, longestMs) * (1 + JITTER * (2 * this.random() - 1));
   }
 }

@@ -1,4 +1,4 @@
-#include "client/app/attempts.h"
+#include "common/client/attempts.h"
 
 namespace strandcast {
 

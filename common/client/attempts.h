@@ -32,11 +32,12 @@ class Attempts {
   using Open = std::function<Result<std::unique_ptr<Session>>(const ClientConfig&)>;
 
   /// Nothing is tried before pump().
-  Attempts(const ClientConfig& config, Open open)
-      : config_(config), open_(std::move(open)), policy_(static_cast<uint32_t>(now_ns())) {
+  Attempts(const ClientConfig& config, Open open, std::chrono::milliseconds longest = kLongestReconnectDelay)
+      : config_(config), open_(std::move(open)), policy_(static_cast<uint32_t>(now_ns()), longest) {
     config_.on_step = [this](ConnectStep step) { step_ = step; };
     config_.cancel = [this, cancel = config.cancel]() -> std::optional<Error> {
       if (is_leaving_) return make_error(ErrorCode::Unavailable, "this program is leaving");
+      if (is_unneeded_) return make_error(ErrorCode::Unavailable, "the connection of before speaks again");
       return cancel ? cancel() : std::nullopt;
     };
   }
@@ -47,9 +48,10 @@ class Attempts {
 
   /// Where there is no session: waits up to `timeout`, begins what is due, and gives what has come of it.
   std::unique_ptr<Session> pump(std::chrono::milliseconds timeout) {
+    is_unneeded_ = false;
     if (!attempt_.valid()) {
       if (!final_error_ && now_ns() >= next_ns_)
-        attempt_ = std::async(std::launch::async, [open = open_, config = config_] { return open(config); });
+        begin();
       else
         std::this_thread::sleep_for(timeout);
       return nullptr;
@@ -62,6 +64,31 @@ class Attempts {
     }
     note_welcome();
     log_info("net", "connected to {}", config_.address.to_string());
+    return std::move(opened).value();
+  }
+  /// Where there is one on which something came last at `heard_ns`: as pump(), without waiting, while that is
+  /// doubted. Call it often: who stood still itself has heard nothing meanwhile.
+  std::unique_ptr<Session> pump_beside(int64_t heard_ns) {
+    const int64_t time_ns = now_ns();
+    const bool was_awake = !is_doubted(std::exchange(looked_ns_, time_ns), time_ns);
+    is_unneeded_ = !is_doubted(heard_ns, time_ns);
+    if (!attempt_.valid()) {
+      if (!is_unneeded_ && was_awake && time_ns >= next_ns_) begin();
+      return nullptr;
+    }
+    if (attempt_.wait_for(std::chrono::milliseconds(0)) != std::future_status::ready) return nullptr;
+    auto opened = attempt_.get();
+    if (is_unneeded_) return nullptr;
+    if (!opened) {
+      const auto delay = policy_.on_failed(opened.error());
+      // What is final is told once nothing else is left.
+      next_ns_ = time_ns + std::chrono::nanoseconds(delay.value_or(kLongestReconnectDelay)).count();
+      log_debug("net", "beside a silent connection: {}", opened.error().to_string());
+      return nullptr;
+    }
+    policy_.on_lost(make_error(ErrorCode::Timeout, "silent"), time_ns, heard_ns);
+    note_welcome();
+    log_info("net", "connected to {} anew, since nothing came any more", config_.address.to_string());
     return std::move(opened).value();
   }
   /// A session was opened without this one.
@@ -103,12 +130,18 @@ class Attempts {
   }
 
  private:
+  void begin() {
+    attempt_ = std::async(std::launch::async, [open = open_, config = config_] { return open(config); });
+  }
+
   std::atomic<bool> is_leaving_{false};
+  std::atomic<bool> is_unneeded_{false};
   std::atomic<ConnectStep> step_{ConnectStep::FindHost};
   ClientConfig config_;
   const Open open_;
   ReconnectPolicy policy_;
   int64_t next_ns_ = 0;
+  int64_t looked_ns_ = 0;  // by pump_beside()
   std::optional<Error> last_error_;
   std::optional<Error> final_error_;
   // Last: its end waits for what is under way, which reads the others.
