@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <span>
 #include <string>
 
 #include "common/base/text.h"
@@ -181,6 +182,36 @@ std::string unlikely_unit(float unit_m, const glm::vec3& size) {
   return sentence;
 }
 
+/// A simulation pins all strands alike: at each end as many vertices as all of them pin. Returns what to say
+/// of strands that pinned more; empty if there are none.
+std::string pin_alike(Groom& groom) {
+  const auto pins_of = [&](uint32_t strand) {
+    return std::span(groom.pinned).subspan(groom.offset[strand], groom.vertex_count(strand));
+  };
+  const auto is_free = [](uint8_t pin) { return pin == 0; };
+  const size_t count = pins_of(0).size();
+  size_t root = count, tip = count;
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
+    const auto pins = pins_of(strand);
+    root =
+        std::min(root, static_cast<size_t>(std::find_if(pins.begin(), pins.end(), is_free) - pins.begin()));
+    tip =
+        std::min(tip, static_cast<size_t>(std::find_if(pins.rbegin(), pins.rend(), is_free) - pins.rbegin()));
+  }
+  size_t freed = 0;
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
+    const auto pins = pins_of(strand);
+    const auto between = pins.subspan(root, root + tip < count ? count - root - tip : 0);
+    freed += std::all_of(between.begin(), between.end(), is_free) ? 0 : 1;
+    std::fill(between.begin(), between.end(), uint8_t{0});
+  }
+  if (freed == 0) return {};
+  return fmt::format(
+      "{} of {} strands hold other vertices than the {} at the root and {} at the tip that all hold: "
+      "these are free (groom.file.pinning states what all hold)",
+      freed, groom.strand_count(), root, tip);
+}
+
 std::string size_text(const Groom& groom) {
   const glm::vec3 size_m = size_of(groom);
   return fmt::format("{:.2f} x {:.2f} x {:.2f} m", size_m.x, size_m.y, size_m.z);
@@ -267,6 +298,7 @@ Result<PlacedGroom> load_placed_groom(const GroomFileOptions& options) {
     placed.groom = resample(placed.groom, vertex_count);
   }
   if (options.pinning) placed.groom = with_pinning(std::move(placed.groom), *options.pinning);
+  if (std::string freed = pin_alike(placed.groom); !freed.empty()) placed.notes.push_back(std::move(freed));
   placed.notes.push_back(fmt::format("{} strands x {} vertices, {}", placed.groom.strand_count(),
                                      placed.groom.uniform_vertex_count(), size_text(placed.groom)));
   return placed;

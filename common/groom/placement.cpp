@@ -37,7 +37,9 @@ constexpr size_t kSectors = 8;
 constexpr double kHairlineShare = 0.05;
 /// A hairline that rises and falls by less, in head radii, has no front.
 constexpr double kMinHairlineSwing = 0.15;
-constexpr int kQuarterTurn_deg = 90;
+constexpr double kQuarterTurnDeg = 90.0;
+/// A face nearer than this to a quarter turn is there: parts of a head of hair are up to 29 degrees off.
+constexpr double kSnapDeg = 32.0;
 
 double angle_of(const glm::dvec3& direction) {
   return std::atan2(direction.x, direction.z);
@@ -124,11 +126,16 @@ Guess<float> guess_yaw_deg(const Groom& groom) {
   }
   if (!(glm::length(rise) >= kMinHairlineSwing)) return {};
   const double face_deg = angle_of(rise) * 180.0 / std::numbers::pi;
-  const int quarters = static_cast<int>(std::lround(face_deg / kQuarterTurn_deg));
+  const double quarter_deg = kQuarterTurnDeg * std::round(face_deg / kQuarterTurnDeg);
+  if (std::abs(face_deg - quarter_deg) > kSnapDeg) {
+    const double whole_deg = std::round(face_deg);
+    return {static_cast<float>(-whole_deg),
+            fmt::format("the hairline is highest {} degrees from +Z towards +X", whole_deg)};
+  }
   constexpr std::array kNames = {"-Z", "-X", "+Z", "+X", "-Z"};
-  const int yaw_deg = -quarters * kQuarterTurn_deg;
-  return {static_cast<float>(yaw_deg == -180 ? 180 : yaw_deg),
-          fmt::format("the hairline is highest at {}", kNames[static_cast<size_t>(quarters + 2)])};
+  const auto quarters = static_cast<size_t>(quarter_deg / kQuarterTurnDeg + 2.5);
+  return {static_cast<float>(quarter_deg == 180.0 ? 180.0 : 0.0 - quarter_deg),
+          fmt::format("the hairline is highest at {}", kNames[quarters])};
 }
 
 Guess<float> guess_unit(const Groom& groom) {

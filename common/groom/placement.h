@@ -35,8 +35,8 @@ struct Guess {
 /// Any units.
 Guess<bool> guess_z_up(const Groom& groom);
 
-/// Guesses the rotation about +Y, a multiple of 90 degrees, that turns the face to +Z. The face is where the
-/// lowest roots are highest. `groom` is upright (+Y), in any unit.
+/// Guesses the rotation about +Y, in degrees, that turns the face to +Z; nearly a quarter turn counts as one.
+/// The face is where the lowest roots are highest. `groom` is upright (+Y), in any unit.
 Guess<float> guess_yaw_deg(const Groom& groom);
 
 /// Guesses the unit: the first of metre, centimetre, millimetre and inch that gives the sphere through the

@@ -176,15 +176,13 @@ Status read_pins(const ByteView& file, const TfxHeader& header, Groom& groom) {
   return {};
 }
 
-Status read_root_uv(const ByteView& file, const TfxHeader& header, Groom& groom) {
-  if (header.strand_uv().offset == 0) return {};
+void read_root_uv(const ByteView& file, const TfxHeader& header, Groom& groom) {
+  if (header.strand_uv().offset == 0) return;
   groom.root_uv.resize(header.strand_count);
   for (uint64_t i = 0; i < header.strand_count; ++i) {
     const uint64_t offset = header.strand_uv().offset + i * header.strand_uv().item_bytes;
-    ASSIGN_OR_RETURN(groom.root_uv[i].x, read_float(file, offset, i, 1, "texture coordinate"));
-    ASSIGN_OR_RETURN(groom.root_uv[i].y, read_float(file, offset + kFloatBytes, i, 1, "texture coordinate"));
+    groom.root_uv[i] = {file.get<float>(offset), file.get<float>(offset + kFloatBytes)};
   }
-  return {};
 }
 
 }  // namespace
@@ -203,7 +201,7 @@ Result<Groom> read_tfx_binary(const ByteView& file) {
     groom.offset[strand] = strand * header.vertex_count;
   }
   read_positions(file, header, groom);
-  RETURN_IF_ERROR(read_root_uv(file, header, groom));
+  read_root_uv(file, header, groom);
   if (header.has_pin_flags) {
     RETURN_IF_ERROR(read_pins(file, header, groom));
     return groom;

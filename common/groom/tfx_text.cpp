@@ -112,8 +112,6 @@ Status read_strand(TextScan& scan, uint32_t strand, Groom& groom) {
   ASSIGN_OR_RETURN(uv.x, read_coordinate(scan, "texcoord"));
   ASSIGN_OR_RETURN(uv.y, read_coordinate(scan, "texcoord"));
   RETURN_IF_ERROR(expect_line_end(scan));
-  if (!std::isfinite(uv.x + uv.y))
-    return line_error(scan, ErrorCode::BadInput, "texcoord is {} {}, finite numbers are needed", uv.x, uv.y);
   groom.root_uv.push_back(uv);
   for (uint32_t vertex = 0; vertex < count; ++vertex) {
     if (!scan.next_filled_line()) {

@@ -7,12 +7,43 @@
 #include <vector>
 
 #include "common/base/mercy.h"
+#include "common/math/point_tree.h"
 
 namespace strandcast {
 namespace {
 
 bool is_finite(const glm::vec3& point) {
   return std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z);
+}
+
+/// Gives strands without a usable coordinate that of the nearest root which has one; all go where more than a
+/// tenth is bad. Returns what to say of it.
+std::string bridge_root_uv(Groom& groom) {
+  const auto is_good = [](const glm::vec2& uv) { return std::isfinite(uv.x) && std::isfinite(uv.y); };
+  std::vector<uint32_t> good, bad;
+  for (uint32_t strand = 0; strand < groom.root_uv.size(); ++strand)
+    (is_good(groom.root_uv[strand]) ? good : bad).push_back(strand);
+  if (bad.empty()) return {};
+  const std::string count =
+      fmt::format("{} of {} root coordinates cannot be used, the first that of strand {}:", bad.size(),
+                  groom.root_uv.size(), bad.front());
+  if (good.empty() || bad.size() * kMostBadShare > groom.root_uv.size()) {
+    groom.root_uv.clear();
+    return count + " all are left out";
+  }
+  const auto root = [&](uint32_t strand) { return groom.rest_position_m[groom.offset[strand]]; };
+  std::vector<glm::vec3> roots;
+  for (const uint32_t strand : good) roots.push_back(root(strand));
+  const PointTree tree(roots);
+  for (const uint32_t strand : bad)
+    groom.root_uv[strand] = groom.root_uv[good[tree.nearest(root(strand), 1).front().index]];
+  return count + " those are as of the nearest root";
+}
+
+/// With what is said of coordinates of roots, which come last: roots are finite by then.
+StatedGroom with_usable_uv(StatedGroom stated) {
+  if (std::string note = bridge_root_uv(stated.groom); !note.empty()) stated.notes.push_back(std::move(note));
+  return stated;
 }
 
 }  // namespace
@@ -80,7 +111,7 @@ Result<StatedGroom> with_usable_strands(StatedGroom stated) {
     if (is_broken || is_empty) is_kept[strand] = 0;
   }
   RETURN_IF_ERROR(broken.judge(strand_count, "strands"));
-  if (broken.count() + empty_count == 0) return stated;
+  if (broken.count() + empty_count == 0) return with_usable_uv(std::move(stated));
   if (broken.count() + empty_count == strand_count)
     return make_error(ErrorCode::BadInput, "no strand has {} points and a length", kMinVertexCount);
   keep_strands(groom, stated.labels, is_kept);
@@ -89,7 +120,7 @@ Result<StatedGroom> with_usable_strands(StatedGroom stated) {
   if (empty_count > 0)
     stated.notes.push_back(fmt::format("{} strands of fewer than {} points or no length are left out",
                                        empty_count, kMinVertexCount));
-  return stated;
+  return with_usable_uv(std::move(stated));
 }
 
 }  // namespace strandcast

@@ -9,6 +9,7 @@
 #include "common/groom/groom_file.h"
 #include "common/groom/hair_loader.h"
 #include "common/groom/tfx_loader.h"
+#include "common/groom/usable_strands.h"
 #include "tests/support/groom_files.h"
 #include "tests/support/largest_allocation.h"
 #include "tests/support/temporary_folder.h"
@@ -180,9 +181,6 @@ TEST(BrokenTfx, NonFiniteValuesNameStrandAndVertex) {
     broken = small_v4();
     EXPECT_THAT(refusal(folder, broken.patch(160 + 6 * 16 + 12, value), "broken.tfx"),
                 HasSubstr(fmt::format("has the inverse mass {}", value)));
-    broken = small_v4();
-    EXPECT_THAT(refusal(folder, broken.patch(160 + 8 * 16 + 8, value), "broken.tfx"),
-                HasSubstr(fmt::format("has the texture coordinate {}", value)));
   }
   ByteFile broken = small_v4();
   EXPECT_THAT(refusal(folder, broken.patch(160 + 12, -1.0f), "broken.tfx"), HasSubstr("inverse mass -1"));
@@ -190,6 +188,52 @@ TEST(BrokenTfx, NonFiniteValuesNameStrandAndVertex) {
   broken = small_v4();
   EXPECT_THAT(refusal(folder, broken.patch(160 + 2 * 16, 3e38f), "broken.tfx"),
               AllOf(HasSubstr("strand 0 vertex 2"), HasSubstr("check the unit")));
+}
+
+TEST(BrokenTfx, CoordinatesOfRootsAreNoReasonToRefuseHair) {
+  StatedGroom hair;
+  hair.groom.offset = {0};
+  for (int strand = 0; strand < 20; ++strand) {
+    const auto x = static_cast<float>(strand);
+    hair.groom.rest_position_m.insert(hair.groom.rest_position_m.end(), {{x, 0, 0}, {x, 1, 0}});
+    hair.groom.offset.push_back(static_cast<uint32_t>(hair.groom.rest_position_m.size()));
+    hair.groom.root_uv.emplace_back(0.01f * x, 0.5f);
+  }
+  hair.groom = with_pinning(std::move(hair.groom), Pinning::Root);
+  hair.groom.root_uv[19].x = kNan;
+  hair.groom.root_uv[3].y = HUGE_VALF;
+  const auto bridged = with_usable_strands(hair);
+  ASSERT_TRUE(bridged) << bridged.error().to_string();
+  EXPECT_EQ(bridged->groom.root_uv[19], glm::vec2(0.01f * 18.0f, 0.5f)) << "of the nearest root";
+  EXPECT_THAT(bridged->groom.root_uv[3].x, ::testing::AnyOf(0.02f, 0.04f));
+  EXPECT_THAT(bridged->notes,
+              Contains(HasSubstr("2 of 20 root coordinates cannot be used, the first that of strand 3")));
+  hair.groom.root_uv[7].x = kNan;
+  const auto without = with_usable_strands(hair);
+  ASSERT_TRUE(without) << without.error().to_string();
+  EXPECT_TRUE(without->groom.root_uv.empty()) << "more than a tenth";
+  const TemporaryFolder folder;
+  EXPECT_EQ(refusal(folder, small_v4().patch(160 + 8 * 16 + 8, kNan), "uv.tfx"), "accepted");
+}
+
+// Parts of one head of hair, of which some are held at their tips too.
+TEST(BrokenTfx, PartsThatAreHeldOtherwiseStartAllTheSame) {
+  const TemporaryFolder folder;
+  GroomFileOptions options;
+  options.unit_m = 0.01f;
+  options.path = folder.write("both_ends.tfx", small_v3(6, 1).text());
+  EXPECT_EQ(load_groom(options)->pinned, (std::vector<uint8_t>{1, 1, 0, 0, 1, 1, 1, 1, 0, 0, 1, 1}));
+  options.more_paths = {folder.write("free_tips.tfx", small_v3(6, 0).text())};
+  const auto placed = load_placed_groom(options);
+  ASSERT_TRUE(placed) << placed.error().to_string();
+  for (uint32_t strand = 0; strand < 4; ++strand)
+    for (uint32_t vertex = 0; vertex < 6; ++vertex)
+      EXPECT_EQ(placed->groom.pinned[6 * strand + vertex], vertex < 2 ? 1 : 0) << strand << ' ' << vertex;
+  EXPECT_THAT(placed->notes,
+              Contains(HasSubstr("2 of 4 strands hold other vertices than the 2 at the root and 0 at "
+                                 "the tip that all hold")));
+  options.pinning = Pinning::BothEnds;
+  EXPECT_EQ(load_groom(options)->pinned[6 * 3 + 5], 1) << "stated";
 }
 
 TEST(BrokenTfx, ARootIsPinnedWhateverItsFlagSays) {

@@ -291,6 +291,16 @@ TEST(Placement, EveryQuarterTurnIsFoundAgain) {
   }
 }
 
+TEST(Placement, AFaceBetweenTwoQuarterTurnsIsFound) {
+  const Groom groom = full_head();
+  for (const float yaw_deg : {45.0f, -45.0f, 135.0f, -135.0f}) {
+    GroomPlacement turn;
+    turn.yaw_deg = yaw_deg;
+    const Groom turned = moved(groom, [&](const glm::vec3& p) { return turn.place(p); });
+    EXPECT_NEAR(guess_yaw_deg(turned).value, -yaw_deg, 6.0f);
+  }
+}
+
 TEST(Placement, QuarterTurnsAgreeWithAnyOtherAngle) {
   GroomPlacement quarter, nearly;
   for (const float yaw_deg : {90.0f, 180.0f, -180.0f, -90.0f}) {
