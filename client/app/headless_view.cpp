@@ -351,7 +351,7 @@ Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bo
       device = std::move(made).value();
     } else {
       config.hello.mode = StreamMode::Frames;
-      own_reason = "frames: strands cannot be drawn here: " + made.error().to_string();
+      own_reason = "pictures: strands cannot be drawn here: " + made.error().to_string();
     }
   }
   const TimeLimit limit(options.seconds);

@@ -173,7 +173,7 @@ class WindowedView {
       if (options_.mode == StreamMode::Strands)
         return make_error(why.code, "{}; --mode frames shows the server's pictures", why.to_string());
       config_.hello.mode = StreamMode::Frames;
-      own_reason_ = "frames: strands cannot be drawn here: " + why.to_string();
+      own_reason_ = "pictures: strands cannot be drawn here: " + why.to_string();
       log_warn("render", "{}", own_reason_);
     }
     auto live = LiveConnection::begin(config_);
@@ -208,7 +208,7 @@ class WindowedView {
   /// This scene cannot be drawn here; somebody else can draw it.
   Status leave_strands() {
     if (viewer_->wanted_mode() == StreamMode::Strands) return *drawn_.trouble;
-    own_reason_ = "frames: strands cannot be drawn here: " + drawn_.trouble->to_string();
+    own_reason_ = "pictures: strands cannot be drawn here: " + drawn_.trouble->to_string();
     show_message(own_reason_);
     viewer_->request_mode(StreamMode::Frames);
     return {};

@@ -142,7 +142,7 @@ MakePicturePainter heads_picture_painter(PainterConfig config, const CameraDesc&
   return [config = std::move(config), scene_camera, others = std::move(others),
           on_news = std::move(on_news)]() -> Result<std::unique_ptr<PicturePainter>> {
     ASSIGN_OR_RETURN(auto device, RenderDevice::open(config.device));
-    log_info("render", "frames of all heads are drawn by {}", device->info().name);
+    log_info("render", "pictures of all heads are drawn by {}", device->info().name);
     auto painter = std::make_unique<HeadsPainter>(config.asset, scene_camera, std::move(device));
     RETURN_IF_ERROR(painter->begin(config.look, others(), on_news));
     return std::unique_ptr<PicturePainter>(std::move(painter));

@@ -57,9 +57,9 @@ std::string what_limits_strands(const ModeFacts& facts, const ModePrediction& st
 }
 
 std::string reason_for_frames(const ModeFacts& facts) {
-  if (facts.device == DrawingDevice::None) return "frames: this machine cannot draw strands";
+  if (facts.device == DrawingDevice::None) return "pictures: this machine cannot draw strands";
   const ModePrediction frames = predict_frames(facts);
-  return fmt::format("frames: {}, the server {:.1f}", what_limits_strands(facts, predict_strands(facts)),
+  return fmt::format("pictures: {}, the server {:.1f}", what_limits_strands(facts, predict_strands(facts)),
                      frames.rate_hz);
 }
 

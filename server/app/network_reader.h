@@ -49,7 +49,7 @@ class NetworkReader : public StreamReader {
   }
   void on_look_change(const LookChange& look) override { net_.broadcast(look, head_); }
   void on_pictures_failed(const Error& error) override {
-    net_.broadcast(Notice{true, "No frames can be drawn: " + error.to_string()}, head_);
+    net_.broadcast(Notice{true, "No pictures can be drawn: " + error.to_string()}, head_);
   }
   /// The network thread tells every viewer before the new classes are used.
   void on_stream_change(const std::vector<StrandClass>& classes, std::shared_ptr<void> until_told) override {

@@ -26,7 +26,7 @@ gl::PassReports join_passes(ThreadPasses threads, bool is_watched_as_pictures) {
   for (gl::PassReport& pass : threads.pictures) {
     if (!is_watched_as_pictures && pass.fate == gl::PassFate::Kept) {
       pass.fate = gl::PassFate::Unread;
-      pass.reason = "no viewer receives rendered frames";
+      pass.reason = "no viewer receives pictures";
     }
     passes.push_back(std::move(pass));
   }

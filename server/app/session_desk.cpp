@@ -95,7 +95,7 @@ void SessionDesk::connect(NetServer& net) {
 Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hello) {
   if (hello.mode == StreamMode::Frames && !visitor.subscription.is_empty())
     if (const std::optional<Error> error = parts_.hub.picture_failure())
-      return make_error(ErrorCode::Unavailable, "no frames can be drawn here: {}", error->to_string());
+      return make_error(ErrorCode::Unavailable, "no pictures can be drawn here: {}", error->to_string());
   const bool is_controller = hello.role == Role::Controller || hello.role == Role::Admin;
   const bool is_relay = !hello.relay_id.empty();
   if (is_relay && hello.strand_class >= parts_.hub.strand_classes().size())

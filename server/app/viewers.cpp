@@ -109,7 +109,7 @@ Result<Viewers::Place> Viewers::add(SessionId session, ReaderId reader, Subscrip
     place.reason = hello.gets_no_stream ? "no stream was asked for" : "a source gets no stream";
   } else if (hello.mode == StreamMode::Frames) {
     wanted.start_with(StreamMode::Frames);
-    place.reason = "frames were asked for";
+    place.reason = "pictures were asked for";
     place.reason += fitted_text(wished, place.size);
   } else {
     place.reason = hello.mode == StreamMode::Strands
@@ -247,7 +247,7 @@ ModeChoice Viewers::choose(Viewer& viewer, const ModeFacts& facts, int64_t time_
   if (viewer.wanted == StreamMode::Auto)
     return viewer.policy.choose(present.next().value_or(present.mode()), facts, time_ns);
   if (viewer.wanted == StreamMode::Frames && !facts.paint_trouble.empty())
-    return {StreamMode::Strands, "strands: no frames can be drawn here: " + facts.paint_trouble, 0};
+    return {StreamMode::Strands, "strands: no pictures can be drawn here: " + facts.paint_trouble, 0};
   return {viewer.wanted, fmt::format("{} were asked for", to_string(viewer.wanted)),
           predict_strands(facts).strand_class};
 }
@@ -261,7 +261,7 @@ ModeChange Viewers::begin_change(Viewer& viewer, const ModeChoice& choice, int64
   if (const Status usable = change(viewer, wanted, viewer.view); !usable) {
     viewer.policy.note_failure(time_ns);
     if (viewer.wanted == StreamMode::Frames) viewer.wanted = viewer.subscription->mode();
-    return stay(viewer, "strands: no frames: " + usable.error().to_string());
+    return stay(viewer, "strands: no pictures: " + usable.error().to_string());
   }
   viewer.is_answer_due = false;
   return {choice.mode, choice.reason, viewer.view.size.width, viewer.view.size.height};
@@ -287,7 +287,7 @@ Result<Viewers::Pictures> Viewers::set_picture_step(SessionId session, size_t st
   const auto found = viewers_.find(session);
   if (found == viewers_.end() || !found->second.gets(StreamMode::Frames) ||
       step >= found->second.ladder.size())
-    return make_error(ErrorCode::NotFound, "only viewers of frames have a quality of pictures");
+    return make_error(ErrorCode::NotFound, "only viewers of pictures have a quality of them");
   Viewer& viewer = found->second;
   const PictureStep& row = viewer.ladder[step];
   PictureView view = viewer.view;

@@ -535,7 +535,7 @@ void FrameWorker::fail(const Error& error) {
     const std::lock_guard lock(mutex_);
     failure_ = error;
   }
-  log_error("render", "no frames from now on: {}", error.to_string());
+  log_error("render", "no pictures from now on: {}", error.to_string());
   if (hooks_.on_failure) hooks_.on_failure(error);
 }
 

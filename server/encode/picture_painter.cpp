@@ -61,7 +61,7 @@ MakePicturePainter device_picture_painter(PainterConfig config) {
   return [config = std::move(config)]() -> Result<std::unique_ptr<PicturePainter>> {
     ASSIGN_OR_RETURN(auto device, RenderDevice::open(config.device));
     ASSIGN_OR_RETURN(auto renderer, device->make_renderer(*config.asset, config.look));
-    log_info("render", "frames are drawn by {}", device->info().name);
+    log_info("render", "pictures are drawn by {}", device->info().name);
     return std::unique_ptr<PicturePainter>(
         std::make_unique<DevicePicturePainter>(config.asset, std::move(device), std::move(renderer)));
   };

@@ -98,7 +98,7 @@ Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello
     subscription.pictures.picture_class = static_cast<PictureClass>(visitor.session);
     if (hello.frame_width > 0) welcome.frame_width = hello.frame_width;
     if (hello.frame_height > 0) welcome.frame_height = hello.frame_height;
-    welcome.mode_reason = "frames were asked for, and come through a relay";
+    welcome.mode_reason = "pictures were asked for, and come through a relay";
     parts_.voices.open_pictures({visitor.session, viewer, visitor.peer}, number_);
   } else {
     admission.asset = relayed->asset;

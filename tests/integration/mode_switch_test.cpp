@@ -91,7 +91,7 @@ TEST_F(ModeSwitching, APersonSwitchesThereAndBackWithoutABlankFrame) {
   for (int round = 0; round < 2; ++round) {
     viewer_->request_mode(StreamMode::Frames);
     ASSERT_TRUE(pump_to(StreamMode::Frames));
-    EXPECT_THAT(viewer_->mode_reason(), HasSubstr("frames were asked for"));
+    EXPECT_THAT(viewer_->mode_reason(), HasSubstr("pictures were asked for"));
     EXPECT_TRUE(eventually([&] { return server_->counters().strand_viewers == 0; }));
     viewer_->request_mode(StreamMode::Strands);
     ASSERT_TRUE(pump_to(StreamMode::Strands));

@@ -257,7 +257,7 @@ TEST(Viewers, WithoutAGpuALargePictureIsDrawnSmallerAndThatIsSaid) {
   const auto whole = fast.add(1, large);
   ASSERT_TRUE(whole.ok());
   EXPECT_EQ(whole->size.width, 3840u);
-  EXPECT_EQ(whole->reason, "frames were asked for");
+  EXPECT_EQ(whole->reason, "pictures were asked for");
 }
 
 /// Facts under which both modes work and strands are the better ones.
