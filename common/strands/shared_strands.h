@@ -37,6 +37,9 @@ class SharedStrands {
   virtual void read(StrandBlocks& position_m, StrandBlocks& velocity_mps) const = 0;
 };
 
+/// Returns whether a frame has nothing but what steps cannot foretell (WIRE.md, exact frames).
+bool is_exact(const EncodedFrame& frame);
+
 /// What an encoder tells the simulation.
 struct SharedUpdate {
   uint64_t number = 0;                     // counts the encoder's updates from 1

@@ -9,6 +9,7 @@
 #include "common/base/thread_name.h"
 #include "common/base/units.h"
 #include "common/log/log.h"
+#include "common/strands/shared_strands.h"
 #include "common/strands/strand_codec.h"
 #include "server/record/recorded_step.h"
 
@@ -222,11 +223,11 @@ void Recorder::write_frame(int64_t time_ns, const EncodedFramePtr& frame) {
   if (is_keyframe) {
     is_chain_broken_ = false;
     keyframe_sim_ns_ = header.sim_time_ns;
-    vertices_since_keyframe_ = 0;
-    keyframe_tick_ = tick_;
+    seek_cost_ = SeekCost(is_predicted_);
+    decoded_tick_ = tick_;
     // Whoever begins here knows how it looks.
     writer_->add(time_ns, header.sim_time_ns, hub_->look());
-  } else if (vertices_since_keyframe_ += vertex_count_; is_keyframe_due(header)) {
+  } else if (is_keyframe_due(*frame)) {
     keyframe_sim_ns_ = kNever;
     hub_->request_keyframe(stream_id_);
   }
@@ -234,16 +235,29 @@ void Recorder::write_frame(int64_t time_ns, const EncodedFramePtr& frame) {
   held_frame_ = Item{time_ns, frame};
 }
 
-bool Recorder::is_keyframe_due(const FrameHeader& delta) const {
-  if (keyframe_sim_ns_ == kNever || delta.sim_time_ns - keyframe_sim_ns_ < kRecordKeyframeNs) return false;
-  if (delta.sim_time_ns - keyframe_sim_ns_ >= kRecordMostKeyframeNs) return true;
-  const auto steps = static_cast<double>(tick_ - std::min(keyframe_tick_, tick_));
-  const auto frame_vertices = static_cast<double>(vertices_since_keyframe_);
-  const double stepped_vertices = step_cost_ * steps * static_cast<double>(vertex_count_);
-  const double decode_ns = is_predicted_
-                               ? kRecordPredictedNs * frame_vertices + kRecordStepNs * stepped_vertices
-                               : kRecordDecodeNs * frame_vertices;
-  return decode_ns * kMsPerNs >= kRecordSeekMs;
+void SeekCost::add(const Delta& delta) {
+  const auto vertices = static_cast<double>(delta.vertex_count);
+  const double step_ns = is_predicted_ ? kRecordStepNs * delta.step_cost * vertices : 0.0;
+  const double frame_ns = (is_predicted_ ? kRecordPredictedNs : kRecordDecodeNs) * vertices;
+  usual_ns_ += step_ns + frame_ns;
+  exact_ns_ += step_ns + (delta.is_exact ? 0.0 : frame_ns);
+}
+
+bool SeekCost::is_keyframe_due(int64_t passed_ns) const {
+  if (passed_ns < kRecordKeyframeNs) return false;
+  if (passed_ns >= kRecordMostKeyframeNs) return true;
+  const double shortest_ns =
+      usual_ns_ * static_cast<double>(kRecordKeyframeNs) / static_cast<double>(passed_ns);
+  return exact_ns_ >= std::max(shortest_ns, kRecordSeekMs / kMsPerNs);
+}
+
+/// The delta is the newest.
+bool Recorder::is_keyframe_due(const EncodedFrame& delta) {
+  const auto steps = static_cast<double>(tick_ - std::min(decoded_tick_, tick_));
+  decoded_tick_ = tick_;
+  seek_cost_.add({is_exact(delta), vertex_count_, steps * step_cost_});
+  return keyframe_sim_ns_ != kNever &&
+         seek_cost_.is_keyframe_due(delta.header.sim_time_ns - keyframe_sim_ns_);
 }
 
 void Recorder::write_held_frame() {

@@ -28,18 +28,39 @@ inline constexpr uint64_t kMaxRecorderBytes = 64u << 20;
 inline constexpr size_t kMaxRecorderItems = 1u << 16;
 inline constexpr int64_t kRecordFlushNs = 1'000'000'000;
 /// Intervals of keyframes. The first is the shortest, in simulated time. The second is the processor time
-/// that decoding up to any moment may take; it bounds the longest interval. A keyframe takes as many bytes as
-/// many seconds of deltas.
+/// that decoding up to any moment may take, unless frames of the first interval take longer. A keyframe takes
+/// as many bytes as many seconds of deltas.
 inline constexpr int64_t kRecordKeyframeNs = 2'000'000'000;
 inline constexpr double kRecordSeekMs = 170.0;
 /// A keyframe is requested after this time whatever decoding takes, and comes within a second: damage to one
 /// frame costs at most 5 s.
 inline constexpr int64_t kRecordMostKeyframeNs = 4'000'000'000;
 /// Decoding costs per vertex: of a frame without prediction, of a predicted frame without its steps, and of a
-/// step of dftl. Measured by scrub_bench.
+/// step of dftl. Measured by scrub_bench. Exact frames cost their steps alone.
 inline constexpr double kRecordDecodeNs = 36.0;
 inline constexpr double kRecordPredictedNs = 21.0;
 inline constexpr double kRecordStepNs = 10.0;
+
+/// Estimates what decoding from the last keyframe on takes. Pure.
+class SeekCost {
+ public:
+  /// A delta, and the steps that led to it.
+  struct Delta {
+    bool is_exact = false;
+    uint64_t vertex_count = 0;
+    double step_cost = 0.0;  // of all of them, relative to one of dftl
+  };
+  /// `is_predicted`: by the codec.
+  explicit SeekCost(bool is_predicted = false) : is_predicted_(is_predicted) {}
+  void add(const Delta& delta);
+  /// Returns whether it is time for a keyframe, so long after the last one, in simulated time.
+  bool is_keyframe_due(int64_t passed_ns) const;
+
+ private:
+  bool is_predicted_;
+  double exact_ns_ = 0.0;
+  double usual_ns_ = 0.0;  // if no frame were exact
+};
 
 struct RecordConfig {
   std::filesystem::path path;
@@ -118,7 +139,7 @@ class Recorder : public StreamReader, public StepTap {
   void write(const Item& item);
   void write_frame(int64_t time_ns, const EncodedFramePtr& frame);
   void write_held_frame();
-  bool is_keyframe_due(const FrameHeader& delta) const;
+  bool is_keyframe_due(const EncodedFrame& delta);
   void watch_losses();
   void end_early();
 
@@ -151,8 +172,8 @@ class Recorder : public StreamReader, public StepTap {
   bool is_chain_broken_ = true;
   bool is_predicted_ = false;  // by the codec
   int64_t keyframe_sim_ns_ = 0;
-  uint64_t vertices_since_keyframe_ = 0;  // of all deltas
-  uint64_t keyframe_tick_ = 0;
+  SeekCost seek_cost_;
+  uint64_t decoded_tick_ = 0;  // of the newest frame
   uint64_t vertex_count_ = 0;  // of the newest state
   uint64_t tick_ = 0;          // likewise
   int64_t sim_time_ns_ = 0;

@@ -1,7 +1,8 @@
 // What the codec "step" takes beside "tangent" on the same frames of the server's own solvers, told all of
 // the wind, its mean or nothing: bits a vertex, CPU milliseconds of both sides, and the largest error. One
 // thread per side. --classes yes: what every class of strands takes against the first, by both codecs.
-// --shared yes: what an encoder takes while the simulation goes on from its viewers' strands.
+// --shared yes: what an encoder takes while the simulation goes on from its viewers' strands. --recorded yes:
+// what a second of it takes in a recording, and how long its slowest moment takes to show.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -11,14 +12,17 @@
 #include <string_view>
 
 #include "common/base/profile.h"
+#include "common/base/units.h"
 #include "common/strands/shared_strands.h"
 #include "common/strands/strand_codec.h"
 #include "common/strands/strand_prefix.h"
 #include "server/encode/strand_encode_worker.h"
 #include "server/net/strand_class.h"
+#include "server/record/recorder.h"
 #include "server/report/stream_codec.h"
 #include "server/report/stream_recording.h"
 #include "server/scene/shared_hair.h"
+#include "server/scene/step_log.h"
 #include "server/sim/executor/lanes_executor.h"
 
 namespace strandcast {
@@ -33,6 +37,7 @@ struct Options {
   MotionPart part = MotionPart::Median;
   bool has_classes = false;
   bool has_shared = false;
+  bool has_recorded = false;
 };
 
 constexpr size_t kStart = 9;
@@ -112,7 +117,101 @@ Status compare_classes(const StreamRecording& recording, double bound_m) {
   return {};
 }
 
-/// Strands that go on from those of the encoder's viewers, whatever the recording has.
+/// Strands that go on from those of an encoder's viewers, whatever the recording has.
+class SharedRun {
+ public:
+  explicit SharedRun(float quantum_m) : quantum_m_(quantum_m) {}
+  bool is_active() const { return hair_.is_active(); }
+  void step(const Snapshot& state) {
+    if (is_active()) hair_.step(state.trail->ticks.back(), *state.trail->scene, 1.0 / kStreamFrameS);
+  }
+  std::shared_ptr<const SharedState> copy() const { return is_active() ? hair_.state() : nullptr; }
+  /// The recording's state with these strands.
+  Snapshot published(const StreamFrame& frame) {
+    Snapshot state = on_lattice(frame, quantum_m_);
+    // As the simulation counts it.
+    state.sim_time_ns = std::llround(static_cast<double>(state.tick) * kStreamFrameS * kNsPerS);
+    auto trail = std::make_shared<StepTrail>(*state.trail);
+    trail->shared = hair_.number();
+    state.trail = trail;
+    return state;
+  }
+  void put_strands(Snapshot& state) {
+    if (!is_active()) return;
+    QuantiseInput input;
+    static_cast<SnapshotInfo&>(input) = state;
+    std::vector<glm::vec3> in_head_m;
+    for (const glm::vec3& point : state_of(hair_.read_blocks()).position_m)
+      in_head_m.emplace_back(glm::conjugate(state.world_from_head.rotation) * glm::dvec3(point));
+    input.position_in_head_m = in_head_m;
+    state = quantise(input).snapshot;
+  }
+  void follow(const std::shared_ptr<SharedUpdate>& update, const Snapshot& state) {
+    if (update != nullptr) hair_.follow(*update, *state.trail, 1.0 / kStreamFrameS);
+  }
+
+ private:
+  float quantum_m_;
+  SharedHair hair_;
+};
+
+/// As a recorder asks for keyframes, of strands that are shared or not.
+Status measure_recorded(const StreamRecording& recording, double bound_m, bool shares) {
+  const StreamShape& shape = recording.shape;
+  ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m("step", static_cast<float>(bound_m)));
+  ASSIGN_OR_RETURN(const auto encoder, make_strand_encoder("step"));
+  ASSIGN_OR_RETURN(const auto decoder, make_strand_decoder("step", {shape.strand_count, shape.vertex_count}));
+  encoder->set_rest_shape(shape.rest_in_head_m);
+  decoder->set_rest_shape(shape.rest_in_head_m);
+  SharedRun shared(quantum_m);
+  StepLog costs;
+  SeekCost cost(true);
+  double keyframe_bytes = 0.0, delta_bytes = 0.0, keyframes = 0.0, exact = 0.0;
+  int64_t seek_ns = 0, longest_ns = 0, keyframe_ns = 0, begin_ns = 0;
+  bool is_due = false;
+  for (const StreamFrame& frame : recording.frames) {
+    Snapshot state = shared.published(frame);
+    shared.step(state);
+    encoder->set_state(shared.copy());
+    shared.put_strands(state);
+    EncodedFramePtr written = is_due ? encoder->encode_for_join(state).keyframe : encoder->encode(state);
+    const auto update = encoder->take_shared(SharedStates::Told);
+    if (shares) shared.follow(update, state);
+    const int64_t decode_ns = cpu_ns();
+    ASSIGN_OR_RETURN(const auto decoded, decoder->decode(written->message));
+    seek_ns += cpu_ns() - decode_ns;
+    const bool is_keyframe = written->header.opcode == Opcode::StrandKeyframe;
+    (is_keyframe ? keyframe_bytes : delta_bytes) += static_cast<double>(written->message.size());
+    keyframes += is_keyframe ? 1.0 : 0.0;
+    exact += is_exact(*written) ? 1.0 : 0.0;
+    if (is_keyframe) {
+      cost = SeekCost(true);
+      seek_ns = 0;
+      keyframe_ns = state.sim_time_ns;
+      if (keyframes == 2.0) {  // the first was before any step
+        begin_ns = keyframe_ns;
+        keyframe_bytes = delta_bytes = exact = 0.0;
+        longest_ns = 0;
+      }
+    } else {
+      costs.set_model(state.trail->model);
+      costs.set_scene(*state.trail->scene);
+      cost.add({is_exact(*written), decoded->plane_size(), costs.step_cost() * state.trail->scene->substeps});
+    }
+    longest_ns = std::max(longest_ns, seek_ns);
+    is_due = cost.is_keyframe_due(state.sim_time_ns - keyframe_ns);
+  }
+  const double seconds =
+      static_cast<double>(recording.frames.back().published.sim_time_ns - begin_ns) / kNsPerS;
+  fmt::print(
+      "{}: {:.1f} s, {:.0f} exact frames; a second: {:.1f} kB of keyframes (each {:.1f} kB), {:.1f} kB of "
+      "deltas; the slowest moment takes {:.0f} ms of processor time\n",
+      shares ? "shared" : "apart", seconds, exact, 1e-3 * keyframe_bytes / seconds,
+      1e-3 * keyframe_bytes / std::max(keyframes - 2.0, 1.0), 1e-3 * delta_bytes / seconds,
+      static_cast<double>(longest_ns) * 1e-6);
+  return {};
+}
+
 Status measure_shared(const StreamRecording& recording, double bound_m) {
   const StreamShape& shape = recording.shape;
   ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m("step", static_cast<float>(bound_m)));
@@ -120,31 +219,18 @@ Status measure_shared(const StreamRecording& recording, double bound_m) {
   ASSIGN_OR_RETURN(const auto alone, make_strand_encoder("step"));
   told->set_rest_shape(shape.rest_in_head_m);
   alone->set_rest_shape(shape.rest_in_head_m);
-  SharedHair shared;
+  SharedRun shared(quantum_m);
   int64_t told_ns = 0, alone_ns = 0, copy_ns = 0, step_ns = 0;
   double frames = 0.0;
   for (const StreamFrame& frame : recording.frames) {
-    Snapshot state = on_lattice(frame, quantum_m);
+    Snapshot state = shared.published(frame);
     const bool is_shared = shared.is_active();
     const int64_t begin_ns = cpu_ns();
-    if (is_shared) shared.step(state.trail->ticks.back(), *state.trail->scene, 1.0 / kStreamFrameS);
+    shared.step(state);
     const int64_t stepped_ns = cpu_ns();
-    auto trail = std::make_shared<StepTrail>(*state.trail);
-    trail->shared = shared.number();
-    const auto copy = is_shared ? shared.state() : nullptr;
+    told->set_state(shared.copy());
     const int64_t copied_ns = cpu_ns();
-    if (is_shared) {
-      const SolverState strands = state_of(shared.read_blocks());
-      QuantiseInput input;
-      static_cast<SnapshotInfo&>(input) = state;
-      std::vector<glm::vec3> in_head_m;
-      for (const glm::vec3& point : strands.position_m)
-        in_head_m.emplace_back(glm::conjugate(state.world_from_head.rotation) * glm::dvec3(point));
-      input.position_in_head_m = in_head_m;
-      state = quantise(input).snapshot;
-    }
-    state.trail = trail;
-    told->set_state(copy);
+    shared.put_strands(state);
     const int64_t told_begin_ns = cpu_ns();
     const EncodedFramePtr by_told = told->encode(state);
     const int64_t alone_begin_ns = cpu_ns();
@@ -153,7 +239,7 @@ Status measure_shared(const StreamRecording& recording, double bound_m) {
     if (by_told->message != by_alone->message) return make_error(ErrorCode::Internal, "frames differ");
     const auto update = told->take_shared();
     alone->take_shared();
-    if (update != nullptr) shared.follow(*update, *trail, 1.0 / kStreamFrameS);
+    shared.follow(update, state);
     if (!is_shared || update != nullptr) continue;
     frames += 1.0;
     step_ns += stepped_ns - begin_ns;
@@ -184,6 +270,10 @@ Status run(const Options& options) {
     ASSIGN_OR_RETURN(desc.motion, load_stream_motion(options.motion, {}));
   }
   ASSIGN_OR_RETURN(const StreamRecording recording, record_strands(desc));
+  if (options.has_recorded) {
+    RETURN_IF_ERROR(measure_recorded(recording, options.bound_m, false));
+    return measure_recorded(recording, options.bound_m, true);
+  }
   if (options.has_shared) return measure_shared(recording, options.bound_m);
   if (options.has_classes) return compare_classes(recording, options.bound_m);
   for (const StreamCodecRow& row : own_stream_codecs(options.bound_m)) {
@@ -240,6 +330,7 @@ int main(int argc, char** argv) {
     if (name == "--bound-mm") options.bound_m = 1e-3 * std::stod(value);
     if (name == "--classes") options.has_classes = value == "yes";
     if (name == "--shared") options.has_shared = value == "yes";
+    if (name == "--recorded") options.has_recorded = value == "yes";
     if (name == "--part" && value == "wildest") options.part = MotionPart::Wildest;
     if (name == "--size" &&
         std::sscanf(value.c_str(), "%ux%u", &options.size.strand_count, &options.size.vertex_count) != 2)

@@ -42,10 +42,6 @@ inline SceneDesc stepped_scene(uint32_t strand_count, uint32_t vertex_count, std
   return scene;
 }
 
-/// Whether a frame of "step" has nothing but its head (proto/WIRE.md, exact frames).
-inline bool is_exact(const EncodedFrame& frame) {
-  return (frame.message[kFrameHeaderBytes] & std::byte{0x80}) != std::byte{0};
-}
 /// Where the state hash of a frame stands.
 inline size_t state_hash_at(const EncodedFrame& frame) {
   return kFrameHeaderBytes + (is_exact(frame) ? 1 : 88);

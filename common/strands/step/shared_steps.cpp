@@ -5,6 +5,7 @@
 
 #include "common/base/hash.h"
 #include "common/base/units.h"
+#include "common/strands/step/exact_head.h"
 
 namespace strandcast::step {
 
@@ -104,3 +105,12 @@ void SharedSteps::read(StrandBlocks& position_m, StrandBlocks& velocity_mps) con
 }
 
 }  // namespace strandcast::step
+
+namespace strandcast {
+
+bool is_exact(const EncodedFrame& frame) {
+  return frame.header.opcode == Opcode::StrandDelta && frame.message.size() > kFrameHeaderBytes &&
+         (frame.message[kFrameHeaderBytes] & std::byte{step::kExactBit}) != std::byte{0};
+}
+
+}  // namespace strandcast
