@@ -12,7 +12,7 @@ constexpr size_t kKeptStates = 20'000;
 }  // namespace
 
 Party& Book::add(const std::string& name, std::vector<NodeId> way, bool is_watcher) {
-  parties_.push_back({name, std::move(way), 0, 0, world::time_ns(), is_watcher, false});
+  parties_.push_back({name, std::move(way), 0, 0, world::time_ns(), is_watcher, false, 0});
   return parties_.back();
 }
 
@@ -22,10 +22,12 @@ void Book::disturb(NodeId a, NodeId b, int64_t end_ns, int64_t extra_ns) {
     for (size_t i = 0; i + 1 < party.way.size(); ++i)
       is_on_way = is_on_way || (std::minmax(party.way[i], party.way[i + 1]) == std::minmax(a, b));
     if (!is_on_way) continue;
-    const auto relays = static_cast<int64_t>(party.way.size()) - 2;
+    const auto links = static_cast<int64_t>(party.way.size()) - 1;
+    // What falls silent may be an attempt, of whoever is not well yet.
+    const int64_t attempt_ns = extra_ns > 0 && !party.was_well ? kAttemptNs : 0;
     party.fault_end_ns = std::max(party.fault_end_ns, end_ns);
     party.due_ns =
-        std::max(party.due_ns, end_ns + extra_ns + kViewerWaitNs + relays * kRelayWaitNs + kBackNs);
+        std::max(party.due_ns, end_ns + extra_ns + attempt_ns + links * kWaitNs + kBackNs + party.slow_ns);
     party.was_well = false;
   }
 }
@@ -93,6 +95,12 @@ void Book::check(int64_t time_ns) {
                             party.name, static_cast<double>(time_ns - party.fresh_ns) * 1e-9,
                             static_cast<double>(time_ns - party.fault_end_ns) * 1e-9));
   }
+}
+
+int64_t Book::latest_due_ns() const {
+  int64_t latest_ns = 0;
+  for (const Party& party : parties_) latest_ns = std::max(latest_ns, party.due_ns + 2 * kFreshNs);
+  return latest_ns;
 }
 
 std::vector<int64_t> Book::back_ms() const {

@@ -19,11 +19,12 @@ namespace strandcast::vopr {
 
 /// Within this after the end of a fault, and after the longest wait between two attempts, all are back.
 inline constexpr int64_t kBackNs = 2 * kS;
-/// The longest wait between two attempts of a viewer, and of a relay.
-inline constexpr int64_t kViewerWaitNs = int64_t{kLongestReconnectDelay.count()} * kMs * 5 / 4;
-inline constexpr int64_t kRelayWaitNs = int64_t{kLongestUrgentDelay.count()} * kMs * 5 / 4;
-/// A connection that nothing comes through is given up after this (ClientConfig::idle_timeout).
-inline constexpr int64_t kIdleNs = 15 * kS;
+/// The longest wait between two attempts.
+inline constexpr int64_t kWaitNs = int64_t{kLongestUrgentDelay.count()} * kMs * 5 / 4;
+/// Beside a connection that nothing comes through another is tried after this.
+inline constexpr int64_t kDoubtNs = int64_t{kDoubtedServer.count()} * kMs;
+/// An attempt that nothing comes through is given up after this (ClientConfig: connecting, and the Welcome).
+inline constexpr int64_t kAttemptNs = 10 * kS;
 /// The newest state of a viewer that nothing disturbs came at most so long ago.
 inline constexpr int64_t kFreshNs = 1 * kS;
 /// An undisturbed controller has its answer within this.
@@ -38,6 +39,7 @@ struct Party {
   int64_t fresh_ns = 0;  // when it was well last
   bool is_watcher = false;
   bool was_well = false;
+  int64_t slow_ns = 0;  // that it may take longer than others
 };
 
 /// What all who decode it have the same bits of. A tick that is encoded again, for those who join, has
@@ -61,6 +63,7 @@ class Book {
   void disturb(NodeId node, int64_t end_ns, int64_t extra_ns);
 
   void on_published(const Snapshot& state);
+  void on_well(Party& party) { note_well(party); }
   /// A viewer has decoded a state. With `is_exact` the codec loses nothing.
   void on_decoded(Party& party, const StateKey& key, uint64_t hash, bool is_exact);
   /// A line of the log.
@@ -70,6 +73,8 @@ class Book {
   void on_answered(const std::string& change);
   /// What is asked for in a run stays asked for once, however often that is looked at.
   void check(int64_t time_ns);
+  /// When all must be well again, if nothing more happens.
+  int64_t latest_due_ns() const;
 
   uint64_t compared() const { return compared_; }
   uint64_t answered() const { return answers_.size(); }

@@ -143,7 +143,6 @@ void Socket::take_held() {
     received_ += held_.front();
     held_.pop_front();
     Network::get().delivered_bytes += size;
-    received_ns = world::time_ns();
     has_news = true;
     if (peer == nullptr) continue;
     peer->on_way_bytes_ -= std::min(size, peer->on_way_bytes_);
@@ -335,7 +334,6 @@ void Network::answer(const std::shared_ptr<Socket>& from, const Endpoint& to) {
     made->phase = Socket::Phase::Open;
     made->local = to;
     made->remote = from->local;
-    made->received_ns = world::time_ns();
     made->peer_ = from;
     from->peer_ = made;
     listener->waiting.push_back(made);
@@ -347,7 +345,6 @@ void Network::answer(const std::shared_ptr<Socket>& from, const Endpoint& to) {
     if (from->phase != Socket::Phase::Connecting) return;
     from->phase = made != nullptr ? Socket::Phase::Open : Socket::Phase::Failed;
     from->error = made != nullptr ? 0 : ECONNREFUSED;
-    from->received_ns = world::time_ns();
     from->tell();
   });
 }

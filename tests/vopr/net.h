@@ -63,7 +63,6 @@ class Socket : public File, public std::enable_shared_from_this<Socket> {
   Endpoint local, remote;
   std::deque<std::shared_ptr<Socket>> waiting;  // to be accepted
   int error = 0;
-  int64_t received_ns = 0;
   size_t send_buffer_bytes = 256u << 10;
   size_t unsent_limit_bytes = ~size_t{0};
   bool is_silent = false;  // nothing gets through any more, and nobody is told

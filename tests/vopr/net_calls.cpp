@@ -21,6 +21,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "tests/vopr/disk.h"
 #include "tests/vopr/net.h"
 #include "tests/vopr/threads_private.h"
 
@@ -82,6 +83,18 @@ ssize_t receive_all(Socket& socket, const iovec* parts, size_t count, int flags)
     if (static_cast<size_t>(size) < parts[i].iov_len) break;
   }
   return received;
+}
+
+ssize_t write_to_disk(ssize_t (*own)(int, const void*, size_t), int number, const void* bytes, size_t size) {
+  Disk& disk = Disk::of(world::node());
+  if (disk.is_dead()) return static_cast<ssize_t>(size);
+  const size_t taken = disk.take(size);
+  if (taken == 0 && size > 0 && !disk.is_dead()) {
+    errno = ENOSPC;
+    return -1;
+  }
+  const ssize_t written = own(number, bytes, taken);
+  return disk.is_dead() ? static_cast<ssize_t>(size) : written;
 }
 
 short ready_of(const pollfd& wanted) {
@@ -188,11 +201,6 @@ CALL int getsockopt(int number, int level, int name, void* value, socklen_t* siz
   std::memset(value, 0, *size);
   if (level == SOL_SOCKET && name == SO_ERROR)
     std::memcpy(value, &socket->error, sizeof(int)), socket->error = 0;
-  if (level == IPPROTO_TCP && name == TCP_INFO) {
-    tcp_info info{};
-    info.tcpi_last_data_recv = static_cast<uint32_t>((world::time_ns() - socket->received_ns) / kMs);
-    std::memcpy(value, &info, std::min<size_t>(*size, sizeof(info)));
-  }
   return 0;
 }
 
@@ -220,7 +228,9 @@ CALL ssize_t __recv_chk(int number, void* bytes, size_t size, size_t, int flags)
 
 CALL ssize_t write(int number, const void* bytes, size_t size) {
   static const auto own = world::real<ssize_t (*)(int, const void*, size_t)>("write");
-  if (!is_ours(number)) return own(number, bytes, size);
+  if (!is_ours(number) && (number <= STDERR_FILENO || world::node() == kFate))
+    return own(number, bytes, size);
+  if (!is_ours(number)) return write_to_disk(own, number, bytes, size);
   const auto file = file_of(number);
   if (auto* const counter = dynamic_cast<Counter*>(file.get())) {
     uint64_t more = 0;

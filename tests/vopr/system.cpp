@@ -17,7 +17,9 @@
 #include "client/app/steady_client.h"
 #include "server/app/server.h"
 #include "server/relay/relay.h"
+#include "server/relay/voices.h"
 #include "tests/vopr/book.h"
+#include "tests/vopr/disk.h"
 #include "tests/vopr/net.h"
 #include "tests/vopr/world.h"
 
@@ -66,12 +68,14 @@ struct Cast {
   std::string codec;
   NodeId upstream_of_second_relay = kServer;
   std::vector<NodeId> stage_of_viewer;  // where each connects
+  bool is_recorded = false;
 
   explicit Cast(Random& random) {
     const std::vector<std::string> codecs = {"delta", "step", "tangent"};
     codec = codecs[random.below(3)];
     upstream_of_second_relay = random.one_in(2) ? kFirstRelay : kServer;
     for (size_t i = 0; i < kViewers; ++i) stage_of_viewer.push_back(kServer + random.below(1 + kRelays));
+    is_recorded = random.one_in(4);
   }
   std::vector<NodeId> way_from(NodeId node, NodeId stage) const {
     if (stage == kServer) return {node, kServer};
@@ -81,21 +85,6 @@ struct Cast {
     return way;
   }
 };
-
-SceneDesc small_scene(const std::string& codec) {
-  SceneDesc scene = built_in_scene();
-  ProceduralGroomDesc groom;
-  groom.strand_count = 24;
-  groom.vertex_count = 6;
-  scene.groom = groom;
-  scene.head.is_visible = false;
-  scene.has_auto_collider = false;
-  scene.step_rate_hz = 10.0;
-  scene.stream.codec = codec;
-  scene.stream.has_codec = true;
-  scene.stream.bound_m = kCoarsestBoundM;  // classes are no coarser: all have the bits that were published
-  return scene;
-}
 
 NetConfig listening_at(NodeId node) {
   NetConfig net;
@@ -141,9 +130,11 @@ class Host {
       if (is_over_) break;
       world::note(fmt::format("{:>2} is killed", node_));
       Network::get().pull_plug(node_);
+      Disk::of(node_).die();
       const int64_t up_ns = world::time_ns() + down_ns_.exchange(0);
       program_->stop();
       program_.reset();
+      Disk::of(node_).revive();
       world::sleep_until(up_ns);
     }
     if (program_ != nullptr) program_->stop();
@@ -195,23 +186,36 @@ class Viewer {
     config.hello.mode = StreamMode::Strands;
     if (node_ % 2 == 0) config.hello.step_ns = 1.0;  // it can afford what the codec `step` asks of viewers
     const auto live = LiveConnection::begin(config);
-    constexpr uint64_t kPlantAt = 150;
+    constexpr uint64_t kPlantAt = 20;
     while (!is_over_) {
       if (live->pump(milliseconds(100))) watch(*live);
       if (const auto& error = live->final_error())
         world::fail(fmt::format("{} gives up for good: {}", party_.name, error->to_string()));
       const bool is_away = states_ > kPlantAt && !live->is_connected();
       if (is_away && plants_.take(Plant::StaysAway)) break;
+      if (!live->has_session() && !live->trouble().empty() && plants_.take(Plant::FirstIsFinal)) break;
       if (states_ > kPlantAt && plants_.take(Plant::TokenInLog))
         spdlog::info("[net] token " + config.hello.token);
     }
+    check_totals(*live);
+  }
+
+  /// What it reports covers all of its connections.
+  void check_totals(LiveConnection& live) {
+    if (connections_ == 0) return;
+    uint64_t decoded = live.session().decoded_frames();
+    if (connections_ < 2 || !plants_.take(Plant::ReportForgets)) decoded += live.earlier().decoded_frames;
+    if (decoded < states_ || live.reconnects() + 1 != connections_)
+      world::fail(fmt::format("{} reports {} frames and {} reconnects of {} states and {} connections",
+                              party_.name, decoded, live.reconnects(), states_, connections_));
   }
 
   void watch(LiveConnection& live) {
     ViewerSession& session = live.session();
+    ++connections_;
     world::note(fmt::format("{:>2} {} is in", node_, party_.name));
     session.set_snapshot_listener([this, &session](const std::shared_ptr<const Snapshot>& state) {
-      constexpr uint64_t kPlantAt = 100;
+      constexpr uint64_t kPlantAt = 20;
       uint64_t hash = state_hash(*state);
       if (++states_ > kPlantAt && plants_.take(Plant::WrongHash)) ++hash;
       const StrandReplay& replay = session.replay();
@@ -226,7 +230,7 @@ class Viewer {
   Book& book_;
   Plants& plants_;
   const bool is_exact_;
-  uint64_t states_ = 0;
+  uint64_t states_ = 0, connections_ = 0;
   std::atomic<bool> is_over_{false};
   std::thread thread_;
 };
@@ -234,8 +238,8 @@ class Viewer {
 /// Sets one value after another, and waits for each answer.
 class Controller {
  public:
-  Controller(Party& party, Book& book, Plants& plants)
-      : party_(party), book_(book), plants_(plants), thread_([this] { run(); }) {}
+  Controller(Party& party, Party& feeder, Book& book, Plants& plants)
+      : party_(party), feeder_(feeder), book_(book), plants_(plants), thread_([this] { run(); }) {}
   void finish() {
     is_over_ = true;
     thread_.join();
@@ -250,6 +254,8 @@ class Controller {
     while (!is_over_) {
       const Status pumped = client.pump(milliseconds(100), [this](ClientEvent& event) {
         if (const auto* notice = std::get_if<Notice>(&event)) hear(*notice);
+        const auto* status = std::get_if<ServerStatus>(&event);
+        if (status != nullptr && !status->is_motion_stale) book_.on_well(feeder_);
       });
       if (!pumped)
         world::fail(fmt::format("{} gives up for good: {}", party_.name, pumped.error().to_string()));
@@ -267,7 +273,9 @@ class Controller {
                               static_cast<double>(time_ns - sent_ns_) * 1e-9));
     }
     if (time_ns < next_ns_) return;
-    constexpr int kPlantAt = 10;
+    constexpr int kPlantAt = 4;
+    if (number_ == kPlantAt) is_flooding_ = plants_.take(Plant::OneQueue);
+    for (int i = 0; is_flooding_ && i < 200; ++i) (void)client.send(SetParameter{"gravity_mps2.x=0.1"});
     change_ = fmt::format("follicle_limit_deg={:.3f}", 20.0 + 0.001 * ++number_);
     book_.on_asked(change_);
     sent_ns_ = time_ns;
@@ -284,8 +292,10 @@ class Controller {
   }
 
   Party& party_;
+  Party& feeder_;
   Book& book_;
   Plants& plants_;
+  bool is_flooding_ = false;
   ViewerClient* last_client_ = nullptr;
   std::string change_;
   int number_ = 0;
@@ -297,7 +307,7 @@ class Controller {
 /// Head motion and wind.
 class Feeder {
  public:
-  explicit Feeder(NodeId stage) : stage_(stage), thread_([this] { run(); }) {}
+  Feeder(NodeId stage, Plants& plants) : stage_(stage), plants_(plants), thread_([this] { run(); }) {}
   void finish() {
     is_over_ = true;
     thread_.join();
@@ -319,11 +329,15 @@ class Feeder {
       return pose;
     };
     plan.wind = [](double t_s) { return glm::vec3(static_cast<float>(std::cos(t_s)), 0.0f, 0.5f); };
-    const auto fed = feed(heads, plan, is_over_, {});
+    const auto watched = [&](const FeedProgress& progress) {
+      if (progress.reconnects > 0 && plants_.take(Plant::FeederEnds)) is_over_ = true;
+    };
+    const auto fed = feed(heads, plan, is_over_, watched);
     if (!fed) world::fail("the feeder gives up for good: " + fed.error().to_string());
   }
 
   const NodeId stage_;
+  Plants& plants_;
   std::atomic<bool> is_over_{false};
   std::thread thread_;
 };
@@ -378,6 +392,7 @@ class System {
   void start();
   void finish();
   void do_harm();
+  void plant_in_relays();
   void harm_link(NodeId a, NodeId b);
   void harm_machine(NodeId node);
   std::pair<NodeId, NodeId> some_link();
@@ -395,6 +410,7 @@ class System {
   std::unique_ptr<Feeder> feeder_;
   std::vector<std::unique_ptr<Attacker>> attackers_;
   uint64_t faults_ = 0;
+  std::vector<std::filesystem::path> recordings_;
 };
 
 void System::set_links() {
@@ -417,11 +433,20 @@ void System::set_links() {
 void System::start() {
   server_ = std::make_unique<Host<Server>>(kServer, [this] {
     ServerConfig config;
-    config.scene = small_scene(cast_.codec);
+    config.scene = scene_of_run(cast_.codec);
     config.net = listening_at(kServer);
     config.sim_device = "lanes";
     config.renderer = "tiles";
-    config.on_publish = [this](const auto& state) { book_.on_published(*state); };
+    config.on_publish = [this](const auto& state) {
+      constexpr uint64_t kPlantAt = 30;
+      book_.on_published(*state);
+      if (state->tick > kPlantAt && plants_.take(Plant::LongCommand))
+        world::sleep_until(world::time_ns() + 60 * kS);
+    };
+    if (cast_.is_recorded) {
+      recordings_.push_back(plan_.folder / fmt::format("{}.mcap", recordings_.size()));
+      config.record = RecordConfig{recordings_.back()};
+    }
     return Server::start(config);
   });
   for (NodeId i = 0; i < kRelays; ++i) {
@@ -443,8 +468,14 @@ void System::start() {
     viewers_.push_back(std::make_unique<Viewer>(node, stage, party, book_, plants_, cast_.codec == "delta"));
   }
   ways_.push_back({kController, kServer});
-  controller_ = std::make_unique<Controller>(book_.add("controller", ways_.back(), false), book_, plants_);
-  feeder_ = std::make_unique<Feeder>(cast_.stage_of_viewer[0]);
+  // That it is heard, the controller hears.
+  std::vector<NodeId> way = cast_.way_from(kFeeder, cast_.stage_of_viewer[0]);
+  way.push_back(kController);
+  Party& feeder = book_.add("feeder", std::move(way), true);
+  feeder.slow_ns = kSpeakAgainNs + kS;  // a relay's voice, and a status later
+  Party& controller = book_.add("controller", ways_.back(), false);
+  controller_ = std::make_unique<Controller>(controller, feeder, book_, plants_);
+  feeder_ = std::make_unique<Feeder>(cast_.stage_of_viewer[0], plants_);
   for (NodeId i = 0; i < kAttackers; ++i)
     attackers_.push_back(std::make_unique<Attacker>(kFirstAttacker + i));
   book_.disturb(kServer, world::time_ns(), 0);  // all begin at once
@@ -478,7 +509,7 @@ void System::harm_link(NodeId a, NodeId b) {
     case 1:
       world::note(fmt::format(" 0 {} - {} falls silent", a, b));
       Network::get().silence(a, b);
-      return book_.disturb(a, b, time_ns, kIdleNs);
+      return book_.disturb(a, b, time_ns, kDoubtNs);
     default:
       world::note(fmt::format(" 0 {} - {} breaks", a, b));
       Network::get().reset(a, b);
@@ -507,8 +538,17 @@ void System::harm_machine(NodeId node) {
   book_.disturb(node, time_ns + takes_ns, 0);
 }
 
+/// A relay of before gave up where it now tries again.
+void System::plant_in_relays() {
+  for (const auto& relay : relays_)
+    if (relay->program() != nullptr && world::time_ns() > 1'006 * kS && !relay->program()->readiness() &&
+        plants_.take(Plant::RelayEnds))
+      relay->kill_for(3'600 * kS);
+}
+
 void System::do_harm() {
   ++faults_;
+  if (cast_.is_recorded && random_.one_in(8)) return Disk::of(kServer).fill_after(random_.below(20'000));
   const auto [a, b] = some_link();
   if (random_.one_in(2)) return harm_link(a, b);
   harm_machine(random_.one_in(2) ? a : b);
@@ -519,16 +559,20 @@ RunResult System::run() {
   start();
   const int64_t begin_ns = world::time_ns();
   const int64_t end_ns = begin_ns + static_cast<int64_t>(plan_.simulated_s * 1e9);
-  int64_t next_fault_ns = begin_ns + 12 * kS;
-  while (world::time_ns() < end_ns) {
+  int64_t next_fault_ns = begin_ns + 2 * kS;
+  while (world::time_ns() < std::max(end_ns, book_.latest_due_ns())) {
     world::sleep_until(world::time_ns() + 100 * kMs);
     book_.check(world::time_ns());
-    if (!plan_.has_faults || world::time_ns() < next_fault_ns) continue;
+    if (plan_.plant == Plant::RelayEnds) plant_in_relays();
+    const int64_t time_ns = world::time_ns();
+    if (!plan_.has_faults || time_ns < next_fault_ns || time_ns >= end_ns) continue;
     do_harm();
     next_fault_ns = world::time_ns() + random_.between(200 * kMs, 12 * kS);
   }
   finish();
   RunResult result;
+  if (cast_.is_recorded && plants_.take(Plant::LostBytes)) lose_a_part(recordings_.front());
+  for (const auto& path : recordings_) result.recorded_states += check_recovery(path, random_);
   result.simulated_s = static_cast<double>(world::time_ns() - begin_ns) * 1e-9;
   result.digest = world::digest();
   result.compared_states = book_.compared();
@@ -545,6 +589,23 @@ RunResult System::run() {
 }
 
 }  // namespace
+
+SceneDesc scene_of_run(const std::string& codec) {
+  SceneDesc scene = built_in_scene();
+  ProceduralGroomDesc groom;
+  groom.strand_count = 24;
+  groom.vertex_count = 6;
+  scene.groom = groom;
+  scene.head.is_visible = false;
+  scene.head.collider = kFieldCollider;  // which nothing meets; spheres are fitted for 0.2 s
+  scene.head.field_resolution = kMinFieldResolution;
+  scene.has_auto_collider = false;
+  scene.step_rate_hz = 10.0;
+  scene.stream.codec = codec;
+  scene.stream.has_codec = true;
+  scene.stream.bound_m = kCoarsestBoundM;  // classes are no coarser: all have the bits that were published
+  return scene;
+}
 
 RunResult run_system(const RunPlan& plan) {
   world::begin(plan.seed);

@@ -1,6 +1,7 @@
 // strandcast-vopr: runs the whole system on simulated time, by a seed or many, each in a process of its own.
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <malloc.h>
 #include <sched.h>
 #include <sys/personality.h>
 #include <sys/wait.h>
@@ -9,12 +10,16 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "common/base/version.h"
+#include "common/pictures/picture.h"
+#include "common/wire/messages.h"
+#include "server/scene/scene_content.h"
 #include "tests/vopr/system.h"
 #include "tests/vopr/threads_private.h"
 
@@ -27,7 +32,8 @@ constexpr const char* kUsage =
     "  --seeds A..B      many runs, one after the other; ends with 1 if any of them breaks a rule\n"
     "  --simulate S      simulated seconds of each run (60)\n"
     "  --plant NAME      plants a fault that the rules must find:\n"
-    "                    wrong-hash, stays-away, done-twice, token-in-log, deaf\n"
+    "                    wrong-hash, stays-away, done-twice, token-in-log, deaf, relay-ends,\n"
+    "                    first-is-final, feeder-ends, one-queue, long-command, report-forgets, lost-bytes\n"
     "  --calm            no faults\n"
     "  --show            prints every line as it comes\n";
 
@@ -42,7 +48,14 @@ std::optional<Plant> plant_of(const std::string& name) {
                                                       {"stays-away", Plant::StaysAway},
                                                       {"done-twice", Plant::DoneTwice},
                                                       {"token-in-log", Plant::TokenInLog},
-                                                      {"deaf", Plant::Deaf}};
+                                                      {"deaf", Plant::Deaf},
+                                                      {"relay-ends", Plant::RelayEnds},
+                                                      {"first-is-final", Plant::FirstIsFinal},
+                                                      {"feeder-ends", Plant::FeederEnds},
+                                                      {"one-queue", Plant::OneQueue},
+                                                      {"long-command", Plant::LongCommand},
+                                                      {"report-forgets", Plant::ReportForgets},
+                                                      {"lost-bytes", Plant::LostBytes}};
   const auto found = plants.find(name);
   return found == plants.end() ? std::nullopt : std::optional(found->second);
 }
@@ -97,6 +110,17 @@ void hold_still(char** words) {
   sched_setaffinity(0, sizeof(one), &one);
 }
 
+/// What all runs need alike, in the process that they are copies of. One heap, which keeps what it has.
+void warm_up() {
+  mallopt(M_ARENA_MAX, 1);
+  mallopt(M_TRIM_THRESHOLD, 1 << 30);
+  mallopt(M_MMAP_THRESHOLD, 1 << 30);
+  mallopt(M_TOP_PAD, 16 << 20);
+  (void)decodable_picture_codecs();                 // loads libraries
+  (void)load_scene_content(scene_of_run("delta"));  // and these tables of protobuf
+  (void)decode_client_message(encode(ClientMessage(Hello{})));
+}
+
 double processor_s() {
   static const auto clock = world::real<int (*)(clockid_t, timespec*)>("clock_gettime");
   timespec time{};
@@ -111,10 +135,11 @@ double processor_s() {
   fmt::print(
       "seed {}: digest {:016x}, {:.0f} simulated s in {:.2f} processor s ({:.0f} times), {} states compared, "
       "{} changes "
-      "answered, {} faults, back after {} ms (median) to {} ms, {:.0f} % within 2 s, {} turns\n",
+      "answered, {} recorded states recovered, {} faults, back after {} ms (median) to {} ms, {:.0f} % "
+      "within 2 s, {} turns\n",
       plan.seed, result.digest, result.simulated_s, took_s, result.simulated_s / took_s,
-      result.compared_states, result.answered_changes, result.faults, result.back_median_ms,
-      result.back_longest_ms, result.back_share_2s * 100.0, result.switches);
+      result.compared_states, result.answered_changes, result.recorded_states, result.faults,
+      result.back_median_ms, result.back_longest_ms, result.back_share_2s * 100.0, result.switches);
   std::fflush(stdout);
   _exit(0);
 }
@@ -124,11 +149,19 @@ int run_many(const Options& options) {
   for (uint64_t seed = options.first; seed <= options.last; ++seed) {
     RunPlan plan = options.plan;
     plan.seed = seed;
+    plan.folder =
+        std::filesystem::temp_directory_path() / fmt::format("strandcast-vopr-{}-{}", getpid(), seed);
+    std::filesystem::create_directory(plan.folder);
     std::fflush(stdout);
     const pid_t child = fork();
-    if (child == 0) run_one(plan);
+    if (child == 0) {
+      std::filesystem::current_path(plan.folder);  // no line of the log has its name
+      plan.folder.clear();
+      run_one(plan);
+    }
     int status = 0;
     if (child < 0 || waitpid(child, &status, 0) != child) return 2;
+    std::filesystem::remove_all(plan.folder);
     if (WIFEXITED(status) && WEXITSTATUS(status) == 0) continue;
     ++failed;
     if (WIFSIGNALED(status)) fmt::print("seed {}: ended by signal {}\n", seed, WTERMSIG(status));
@@ -153,5 +186,6 @@ int main(int count, char** words) {
     return 0;
   }
   hold_still(words);
+  warm_up();
   return run_many(*options);
 }

@@ -83,6 +83,7 @@ constexpr uint64_t kMostSwitches =
     20'000'000;  // without a millisecond's progress: somebody turns in a circle
 constexpr uint32_t kYieldOneIn = 200;
 constexpr size_t kStackBytes = 1u << 20;
+constexpr size_t kLentStackBytes = 256u << 10;  // of the C library's thread, thread_local data included
 
 /// Runs on a stack of its own, on the one thread of the kernel's that there is. The C library's own thread
 /// only lends its thread_local data, and ends them.
@@ -306,6 +307,12 @@ int start_thread(pthread_t* handle, const pthread_attr_t* attributes, void* (*ru
   thread.node = self().node;
   thread.run = run;
   thread.argument = argument;
+  pthread_attr_t small;
+  if (attributes == nullptr) {
+    pthread_attr_init(&small);
+    pthread_attr_setstacksize(&small, kLentStackBytes);
+    attributes = &small;
+  }
   const int error = create(handle, attributes, lend_thread_data, &thread);
   if (error != 0) return error;
   await(thread.has_begun);
