@@ -248,7 +248,8 @@ ModeChoice Viewers::choose(Viewer& viewer, const ModeFacts& facts, int64_t time_
     return viewer.policy.choose(present.next().value_or(present.mode()), facts, time_ns);
   if (viewer.wanted == StreamMode::Frames && !facts.paint_trouble.empty())
     return {StreamMode::Strands, "strands: no pictures can be drawn here: " + facts.paint_trouble, 0};
-  return {viewer.wanted, fmt::format("{} were asked for", to_string(viewer.wanted)),
+  return {viewer.wanted,
+          viewer.wanted == StreamMode::Frames ? "pictures were asked for" : "strands were asked for",
           predict_strands(facts).strand_class};
 }
 
