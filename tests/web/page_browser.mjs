@@ -161,7 +161,7 @@ const all = {
       await sleep(500);
       const tab = await browser.open(`http://${listen}/#mode=strands`);
       const first = await tab.until((now) => now.states > 3, 'states');
-      const later = await tab.until((now) => now.states > first.states + 10, 'more states', 5_000);
+      const later = await tab.until((now) => now.states > first.states + 10, 'more states', 3_000);
       assert.ok(later.isConnected && later.hash_ok, JSON.stringify(later));
       await tab.close();
     } finally {
