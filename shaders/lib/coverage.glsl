@@ -8,7 +8,8 @@
 // of two boxes, whose area is the line's width. Of the square of a pixel and the line's own width, seen across the line,
 // the three boxes max(|x|, |y|), min(|x|, |y|) and w (x, y: the line's direction), the larger two are kept apart and the
 // smallest widens one. Summed over the pixels across a line it gives the width for every offset where offsets repeat:
-// along rows, columns and diagonals.
+// along rows, columns and diagonals. The wider of both is a pixel at least: a thin upright line would jump from one column
+// to the next, and hair in motion flicker.
 struct LineFilter {
   float base;   // cover = min(base - slope * distance, peak), where that is positive
   float slope;  // per pixel
@@ -20,7 +21,8 @@ LAW LineFilter line_filter(float width_px, vec2 direction) {
   float across = max(abs(direction.x), abs(direction.y));
   float aslant = min(abs(direction.x), abs(direction.y));
   float wide = max(across, width_px);
-  float ramp = aslant + max(min(across, width_px), 1e-4);
+  const float kLeastRampPx = 1.0;
+  float ramp = max(aslant + min(across, width_px), kLeastRampPx);
   LineFilter f;
   f.reach = 0.5 * (wide + ramp);
   f.slope = width_px / (wide * ramp);

@@ -1,7 +1,7 @@
 // Light that a strand sends to the eye: R from its surface, TT through it, TRT back from its far side, with the shapes of
-// Karis 2016 (Physically based hair shading in Unreal) and the energy of Chiang et al. 2016 for its colour; and light that
-// other strands sent on (Zinke et al. 2008). No inverse trigonometry, no branches: also compiled for the CPU, over lanes
-// (common/simd). Directions are unit vectors away from the strand.
+// d'Eon et al. 2011 along it and of Karis 2016 (Physically based hair shading in Unreal) across, and the energy of Chiang
+// et al. 2016 for its colour; and light that other strands sent on (Zinke et al. 2008). No inverse trigonometry, no
+// branches: also compiled for the CPU, over lanes (common/simd). Directions are unit vectors away from the strand.
 #pragma once
 #include "lib/hash.glsl"
 #include "lib/select.glsl"
@@ -119,54 +119,76 @@ LAW StrandShares strand_shares(vec3 color, float wetness) {
 
 // How a strand lies between light and eye.
 struct StrandAngles {
-  float sum;      // of the sines of both inclinations
-  float cos_in;   // of the light's inclination
+  float sin_in;   // of the light's inclination
+  float cos_in;
+  float sin_out;  // of the eye's
+  float cos_out;
   float cos_phi;  // of the azimuth between both
   float facing;   // 0 away from the light .. 1 towards it, across the strand
 };
 
 LAW StrandAngles strand_angles(vec3 tangent, vec3 to_light, vec3 to_eye) {
-  float sin_in = clamp(dot(tangent, to_light), -1.0, 1.0);
-  float sin_out = clamp(dot(tangent, to_eye), -1.0, 1.0);
   StrandAngles angles;
-  angles.sum = sin_in + sin_out;
-  angles.cos_in = sqrt(max(1.0 - sin_in * sin_in, 1e-4));
-  float cos_out = sqrt(max(1.0 - sin_out * sin_out, 1e-4));
-  float across = dot(to_light, to_eye) - sin_in * sin_out;
-  angles.cos_phi = clamp(across / (angles.cos_in * cos_out), -1.0, 1.0);
-  angles.facing = 0.5 + 0.5 * across / cos_out;
+  angles.sin_in = clamp(dot(tangent, to_light), -1.0, 1.0);
+  angles.sin_out = clamp(dot(tangent, to_eye), -1.0, 1.0);
+  angles.cos_in = sqrt(max(1.0 - angles.sin_in * angles.sin_in, 1e-4));
+  angles.cos_out = sqrt(max(1.0 - angles.sin_out * angles.sin_out, 1e-4));
+  float across = dot(to_light, to_eye) - angles.sin_in * angles.sin_out;
+  angles.cos_phi = clamp(across / (angles.cos_in * angles.cos_out), -1.0, 1.0);
+  angles.facing = 0.5 + 0.5 * across / angles.cos_out;
   return angles;
 }
 
-// Height of a Gaussian of area 1, times its width, and the exponent of its fall.
-const float kGaussian = 0.39894228;
-LAW float gaussian_exponent(float x, float per_width) { return -0.5 * (x * per_width) * (x * per_width); }
+// The longitudinal law of d'Eon et al. 2011, equation 7, as a height times an exponential. Along a strand it is narrow and
+// high, where a Gaussian of sines would be too dark.
+struct Cone {
+  float height;
+  float exponent;
+};
+
+// Of light that is turned by `tilt` rad, which is small. The root stands for I0(x) exp(-x), x = cosines / variance, and is
+// within 7 % of it.
+LAW Cone light_cone(StrandAngles angles, float tilt, float variance) {
+  const float kTwoPi = 6.2831853;
+  float cos_tilt = 1.0 - 0.5 * tilt * tilt;
+  float cosines = abs(angles.cos_in * cos_tilt - angles.sin_in * tilt) * angles.cos_out;
+  float sines = (angles.sin_in * cos_tilt + angles.cos_in * tilt) * angles.sin_out;
+  float per_variance = 1.0 / variance;
+  Cone cone;
+  cone.height = inversesqrt(variance * max(variance + 2.6 * cosines, kTwoPi * cosines - 1.6 * variance));
+  cone.exponent = (cosines - sines - 1.0) * per_variance;
+  return cone;
+}
 
 // Light of one lamp that leaves towards the eye, per unit of light. Where all weights of the look are 1, no more leaves in
 // all directions than came.
 LAW vec3 hair_lobes(HairLook look, float tilt, StrandShares shares, StrandAngles angles, float cos_light_eye) {
   const float kPi = 3.14159265;
-  // Longitudinal: Gaussians of the sum of sines, shifted by the tilt of the scales (Karis 2016).
-  float per_width = 1.0 / (2.0 * look.width * (1.0 - 0.5 * look.wetness));
-  float e_r = gaussian_exponent(angles.sum + 2.0 * tilt, per_width);
-  float e_tt = gaussian_exponent(angles.sum - tilt, 2.0 * per_width);
-  float e_trt = gaussian_exponent(angles.sum - 4.0 * tilt, 0.5 * per_width);
+  float width = 2.0 * look.width * (1.0 - 0.5 * look.wetness);
+  float variance = width * width;
+  Cone cone_r = light_cone(angles, 2.0 * tilt, variance);
+  Cone cone_tt = light_cone(angles, -tilt, 0.25 * variance);
+  Cone cone_trt = light_cone(angles, -4.0 * tilt, 4.0 * variance);
 
   // Azimuthal; those of TT and TRT have area 1.
   const float kFresnel = 0.0465;     // at normal incidence, index 1.55
   const float kFresnelWet = 0.0201;  // of water's surface, index 1.33
-  const float kMirror = 0.30;        // 1/4, and what wide lobes lose at their ends
+  const float kMirror = 0.30;        // 1/4, and what Schlick's law leaves out at middle angles
   float fresnel = mix(kFresnel, kFresnelWet, look.wetness);
   float graze = 1.0 - sqrt(clamp(0.5 + 0.5 * cos_light_eye, 0.0, 1.0));
   float graze2 = graze * graze;
   float n_r = kMirror * sqrt(max(0.5 + 0.5 * angles.cos_phi, 0.0)) * (fresnel + (1.0 - fresnel) * graze2 * graze2 * graze);
-  float r = look.highlight * n_r * light_exp(e_r);
-  float tt = (2.0 * look.transmission) * light_exp(e_tt - 3.65 * angles.cos_phi - 3.98);
-  float trt = (0.5 * look.second_highlight) * light_exp(e_trt + 11.5 * angles.cos_phi - 11.209);
+  float r = look.highlight * cone_r.height * n_r * light_exp(cone_r.exponent);
+  float tt = look.transmission * cone_tt.height * light_exp(cone_tt.exponent - 3.65 * angles.cos_phi - 3.98);
+  float trt = look.second_highlight * cone_trt.height * light_exp(cone_trt.exponent + 11.5 * angles.cos_phi - 11.209);
 
-  // Gaussians of sines give back more than comes in along the strand.
-  float energy = angles.cos_in * inversesqrt(0.22 + 0.75 * angles.cos_in * angles.cos_in);
-  return (kPi * kGaussian * per_width * energy) * (vec3(r) + shares.through * tt + shares.returned * trt);
+  // What the surface reflects does not enter; more where light comes along the strand. And wide lobes of such light would
+  // give back more than it gets.
+  float into = 1.0 - 0.8 * angles.cos_in;
+  float into2 = into * into;
+  float entering = 1.0 - into2 * into2 * into;
+  float energy = min(angles.cos_in / angles.cos_out, 1.0);
+  return (kPi * energy) * (vec3(r) + (entering * entering) * (shares.through * tt + shares.returned * trt));
 }
 
 // Likewise, with what comes to the strand through others. `depth`: as the lattices have it.
@@ -174,18 +196,18 @@ LAW vec3 hair_lit(HairLook look, float tilt, StrandShares shares, vec3 tangent, 
   const float kCrossedPerDepth = 1.25;
   // Of scattered light: how wide its lobe is at the surface and how it widens on its way, and what goes on and comes back.
   const float kWide2 = 0.04;
-  const float kWiden2 = 0.76;
+  const float kWiden2 = 0.86;
   const float kMostCrossed = 8.0;
-  const float kOnward = 1.95;
-  const float kBack = 9.3;
+  const float kOnward = 1.8;
+  const float kBack = 6.8;
   StrandAngles angles = strand_angles(tangent, to_light, to_eye);
   float crossed = kCrossedPerDepth * depth;
   float direct = light_exp(-crossed);
   // Each strand passed on the way has let through its share, colour by colour.
   vec3 indirect = max(light_exp(-crossed * (vec3(1.0) - shares.through)) - vec3(direct), vec3(0.0));
   vec3 around = shares.around * (look.diffuse * 2.0 * angles.facing * angles.cos_in);
-  float per_wide = inversesqrt(kWide2 + kWiden2 * min(crossed, kMostCrossed));
-  float m = kGaussian * per_wide * light_exp(gaussian_exponent(angles.sum - tilt, per_wide));
+  Cone cone = light_cone(angles, -tilt, kWide2 + kWiden2 * min(crossed, kMostCrossed));
+  float m = cone.height * light_exp(cone.exponent);
   float back = 0.5 + 0.5 * angles.cos_phi;
   vec3 spread = (look.scatter * m) * (shares.through * (kOnward * (1.0 - back)) + shares.backward * (kBack * back));
   return direct * (hair_lobes(look, tilt, shares, angles, dot(to_light, to_eye)) + around) + indirect * (spread + around);
@@ -214,11 +236,14 @@ LAW vec3 hair_radiance(HairLook look, HairStrand hair, HairLights lights, LightD
   const vec3 kBySkin = vec3(1.06, 0.985, 0.965);  // some light comes by way of skin, which sends back red
   const float kGroundLight = 0.52;
   const float kSkyReach = 0.55;
-  // Of the sky: hair's colour, brighter where it is dark, and a sheen in the sky's own colour.
+  // Of the sky: hair's colour, brighter where it is dark, and a sheen in the sky's own colour. It grows where one looks
+  // along the strand, as what a surface reflects does.
   const float kSkyColor = 2.5;
   const float kSkyFull = 1.5;
   const float kSkyWet = 0.55;
-  const float kSkySheen = 0.18;
+  const float kSkySheen = 0.16;
+  const float kSkyAlong = 2.0;
+  const float kMostSheen = 0.9;
   const float kSheenReach = 0.48;
   vec3 color = hair_color(look, hair, along);
   StrandShares shares = strand_shares(color, look.wetness);
@@ -227,10 +252,12 @@ LAW vec3 hair_radiance(HairLook look, HairStrand hair, HairLights lights, LightD
   vec3 rim = vec3(0.0);
   if (lights.has_rim) rim = hair_lit(look, tilt, shares, tangent, lights.to_rim, to_eye, rim_depth_of_seen(depth.rim));
   vec3 across = to_eye - tangent * dot(tangent, to_eye);
-  float facing = 0.5 + 0.5 * dot(across, lights.up);
   vec3 body = (kSkyColor * mix(1.0, kSkyWet, look.wetness)) * color / (vec3(1.0) + kSkyFull * color);
-  vec3 sky = light_exp(-(kSkyReach * depth.sky) * (vec3(1.0) - shares.through)) * body +
-             (kSkySheen * light_exp(-kSheenReach * depth.sky)) * (vec3(1.0) - color);
+  float facing = 0.5 + 0.5 * dot(across, lights.up);
+  float along_eye = 1.0 - sqrt(min(dot(across, across), 1.0));
+  float more_sheen = min(kSkyAlong * along_eye * along_eye, kMostSheen - kSkySheen);
+  vec3 sky = light_exp(-(kSkyReach * depth.sky) * (vec3(1.0) - shares.through)) * (1.0 - more_sheen) * body +
+             ((kSkySheen + more_sheen) * light_exp(-kSheenReach * depth.sky)) * (vec3(1.0) - color);
   vec3 light = lights.key_color * key + lights.rim_color * rim + (lights.ambient * mix(kGroundLight, 1.0, facing)) * sky;
   return kBySkin * light;
 }

@@ -113,6 +113,49 @@ TEST(HairLight, NoFibreGivesBackMoreThanItGets) {
   EXPECT_GT(share_sent_on({1.0, 7.5, 3.5, 0.0f, {4.0f, 2.0f, 4.0f}}, 0.0), 1.5);
 }
 
+// d'Eon et al. 2011, equation 7, in double precision: also where both light and eye look along the strand.
+TEST(HairLight, LobesAreAsHighAsTheirConeSays) {
+  const auto direction = [](double theta) {
+    return law::vec3(static_cast<float>(std::cos(theta)), static_cast<float>(std::sin(theta)), 0.0f);
+  };
+  for (const double variance : {0.017, 0.0685, 0.274})
+    for (const double theta_deg : {0.0, 30.0, 60.0, 75.0})
+      for (const double off_deg : {0.0, -6.0, 6.0}) {
+        const double theta = theta_deg * kPi / 180.0, other = -(theta_deg - off_deg) * kPi / 180.0;
+        const law::StrandAngles angles =
+            law::strand_angles(law::vec3(0.0f, 1.0f, 0.0f), direction(theta), direction(other));
+        const law::Cone cone = law::light_cone(angles, 0.0f, static_cast<float>(variance));
+        const double height = double{cone.height.v[0]} * std::exp(double{cone.exponent.v[0]});
+        const double expected = scatter::rough_longitudinal(variance, theta, other);
+        EXPECT_NEAR(height, expected, 0.1 * expected)
+            << variance << ", " << theta_deg << " " << off_deg << " deg";
+      }
+}
+
+TEST(HairLight, HairUnderAnEvenSkyIsNoBrighterThanTheSky) {
+  constexpr float kWarmest = 1.06f;  // red comes by way of skin
+  for (const float color : {0.001f, 0.05f, 0.2f, 0.5f, 0.8f, 1.0f})
+    for (int degrees = 0; degrees < 90; degrees += 5) {
+      law::HairLook look{};
+      look.root_color = look.tip_color = law::vec3(color);
+      look.width = 0.13f;
+      const law::HairLights lights{law::vec3(0.0f, 0.0f, 1.0f),
+                                   law::vec3(0.0f),
+                                   law::vec3(0.0f, 0.0f, 1.0f),
+                                   law::vec3(0.0f),
+                                   false,
+                                   law::vec3(0.0f, 0.0f, 1.0f),
+                                   1.0f};
+      const double theta = degrees * kPi / 180.0;
+      const law::vec3 to_eye(0.0f, static_cast<float>(std::sin(theta)), static_cast<float>(std::cos(theta)));
+      law::HairStrand hair{};
+      hair.brightness = 1.0f;
+      const law::vec3 seen = law::hair_radiance(look, hair, lights, {0.0f, 0.0f, 0.0f}, 0.5f,
+                                                law::vec3(0.0f, 1.0f, 0.0f), to_eye);
+      EXPECT_LE(seen.x.v[0], kWarmest) << color << ", seen at " << degrees << " deg";
+    }
+}
+
 /// What is left of light that has crossed so many depths of hair, by colour.
 law::vec3 lit_at(const law::vec3& color, float depth) {
   law::HairLook look{};
