@@ -95,7 +95,8 @@ Status BakedStates::connect() {
   ASSIGN_OR_RETURN(ClientConfig admin, client_config_for(target, Role::Admin));
   admin.hello.gets_no_stream = true;
   ASSIGN_OR_RETURN(client_, ViewerClient::connect(admin));
-  ASSIGN_OR_RETURN(const ClientConfig viewer, client_config_for(target, Role::Viewer));
+  ASSIGN_OR_RETURN(ClientConfig viewer, client_config_for(target, Role::Viewer));
+  viewer.keeps_all_strands = true;  // steps wait for states, however long those take
   ASSIGN_OR_RETURN(session_, ViewerSession::open(viewer));
   session_->set_snapshot_listener([this](const std::shared_ptr<const Snapshot>& state) {
     seen_tick_ = state->tick;

@@ -58,11 +58,12 @@ SessionTotals totals_of(ViewerSession& session) {
 
 Result<std::unique_ptr<ViewerSession>> ViewerSession::open(const ClientConfig& config) {
   ClientConfig acknowledging = config;
-  acknowledging.hello.acknowledges = true;
+  acknowledging.hello.acknowledges = !config.keeps_all_strands;
   if (acknowledging.hello.picture_codecs == 0)
     acknowledging.hello.picture_codecs = decodable_picture_codecs();
   ASSIGN_OR_RETURN(auto client, ViewerClient::connect(acknowledging));
   std::unique_ptr<ViewerSession> session(new ViewerSession(std::move(client)));
+  session->acknowledges_ = acknowledging.hello.acknowledges;
   ViewerClient* requester = session->client_.get();
   const Welcome& welcome = session->welcome();
   auto replay = StrandReplay::make(welcome.codec, {welcome.strand_count, welcome.vertex_count},
@@ -302,6 +303,7 @@ void ViewerSession::tell_times(const MediaEvent& event, const Snapshot* snapshot
 
 void ViewerSession::acknowledge(const MediaEvent& event, int64_t decode_begin_ns) {
   const auto decode_us = static_cast<uint32_t>((now_ns() - decode_begin_ns) / 1000);
+  if (!acknowledges_) return;
   // An acknowledgement that does not fit is not needed: the server drops frames for this client already.
   const auto sent = client_->send(
       FrameAck{event.header.sequence, event.receive_time_ns, decode_us, event.header.stream_id});

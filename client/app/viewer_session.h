@@ -201,6 +201,7 @@ class ViewerSession {
   SnapshotListener listener_;
   std::shared_ptr<FrameTrace> trace_;  // null: none
   bool has_asked_states_ = false;      // the server is to tell of its states
+  bool acknowledges_ = true;
   int64_t opened_ns_ = 0;
 };
 

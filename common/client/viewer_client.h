@@ -35,6 +35,9 @@ struct ClientConfig {
   std::filesystem::path tls_authorities;  // PEM, for an address with TLS; empty: the system's
   std::string path = "/v1";
   Hello hello;
+  /// Of a ViewerSession: a slow link delays and drops states, and never thins them. It acknowledges nothing
+  /// then.
+  bool keeps_all_strands = false;
   std::chrono::milliseconds connect_timeout{5000};  // name, TCP and WebSocket handshake together
   std::chrono::milliseconds welcome_timeout{5000};  // from the handshake to the Welcome
   std::chrono::milliseconds idle_timeout{15'000};   // nothing received for this long: the server is gone

@@ -206,6 +206,20 @@ TEST_F(StreamFaults, SlowLinkGetsFewerStrandsFirst) {
   EXPECT_EQ(wrong, 0u);
   EXPECT_EQ(viewer.replay().stats().rejected_frames, 0u) << viewer.replay().stats().last_error;
   expect_undisturbed();
+
+  // Who insists on all of them gets fewer states instead.
+  config.keeps_all_strands = true;
+  auto insisting = ViewerSession::open(config);
+  ASSERT_TRUE(insisting) << insisting.error().to_string();
+  uint64_t whole = 0, thin = 0;
+  (*insisting)->set_snapshot_listener([&](const auto& snapshot) {
+    ++(snapshot->strand_count < kStrands ? thin : whole);
+  });
+  EXPECT_TRUE(sees([&] {
+    EXPECT_TRUE((*insisting)->pump(std::chrono::milliseconds(5)));
+    return whole >= 60;
+  }));
+  EXPECT_EQ(thin, 0u);
 }
 
 TEST_F(StreamFaults, OneEncodeServesEveryViewer) {
