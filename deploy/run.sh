@@ -20,6 +20,7 @@ usage: bash deploy/run.sh [options]
   --wind FILE          wind to feed: CSV                                        (default: built-in gusts)
   --record FILE        records the run as MCAP, into a new file: strandcast-view FILE plays it
   --scene FILE         scene as protobuf text, see deploy/scenes
+  --quality NAME       auto, fast or full: how hair is simulated               (default: auto)
   --set PATH=VALUE     overrides one field of the scene; may be repeated
   --seconds N          stop after N seconds; headless, what came is drawn then  (default: 6 headless, else never)
   --out DIR            where picture, clip, report and logs go                  (default: out)
@@ -39,7 +40,7 @@ while [ $# -gt 0 ]; do
     --headless) headless=1; shift; continue ;;
     --web) web=1; shift; continue ;;
     --filter-glitches) motion_options+=(--filter-glitches); shift; continue ;;
-    --groom|--motion|--mocap|--motion-unit|--motion-up|--motion-fps|--joint|--wind|--record|--scene|--set|--seconds|--out) ;;
+    --groom|--motion|--mocap|--motion-unit|--motion-up|--motion-fps|--joint|--wind|--record|--scene|--quality|--set|--seconds|--out) ;;
     *) usage >&2; fail "unknown option: $1" ;;
   esac
   [ $# -ge 2 ] || fail "$1 needs a value"
@@ -48,6 +49,7 @@ while [ $# -gt 0 ]; do
       if [ -f "$2" ]; then files=("$2"); else IFS=, read -r -a files <<<"$2"; fi
       for file in "${files[@]}"; do need_file "$1" "$file"; server_options+=(--groom "$(realpath "$file")"); done ;;
     --scene) need_file "$1" "$2"; server_options+=(--scene "$(realpath "$2")") ;;
+    --quality) server_options+=(--set "quality=$2") ;;
     --set) server_options+=(--set "$2") ;;
     --motion) need_file "$1" "$2"; motion=$(realpath "$2") ;;
     --mocap) motion=none; server_options+=(--mocap "$2") ;;

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "common/base/profile.h"
+#include "common/base/quantile.h"
 #include "common/groom/groom_asset.h"
 #include "common/render/render_device.h"
 #include "common/strands/strand_codec.h"
@@ -13,6 +14,7 @@
 #include "server/sim/executor/executor.h"
 #include "server/sim/followed_solver.h"
 #include "server/sim/solver_registry.h"
+#include "server/source/auto_quality.h"
 #include "server/source/scene_change.h"
 #include "server/source/sim_stages.h"
 
@@ -38,7 +40,8 @@ struct Bench {
   const RuntimeFacts& facts;
   Executor& executor;
   RenderDeviceConfig render;
-  ThreadPasses passes;                  // measured so far
+  ThreadPasses passes;  // measured so far
+  std::vector<double> step_ms;
   std::vector<EncodedFramePtr> frames;  // of the strands
 };
 
@@ -77,7 +80,9 @@ Status measure_strands(Bench& bench, const SceneContent& content) {
     StageTurn turn(builder, *solver, publisher);
     turn.end_time_s = step / scene.step_rate_hz;
     turn.publish.tick = static_cast<uint64_t>(step);
+    const int64_t begin_ns = now_ns();
     RETURN_IF_ERROR(stages.step(turn, bench.executor.timer()));
+    bench.step_ms.push_back(static_cast<double>(now_ns() - begin_ns) / kMsInNs);
     RETURN_IF_ERROR(stages.publish(turn));
     if (!is_watched(bench.facts)) continue;
     const ScopedStage stage(encode_timer);
@@ -119,6 +124,15 @@ Status measure_pictures(Bench& bench) {
   return {};
 }
 
+/// As a server in real time chooses; what is printed besides is of the scene as it is.
+std::string quality_text(const SceneDesc& scene, double step_ms) {
+  if (scene.quality != kAutoQuality) return fmt::format("Quality: {}\n", scene.quality);
+  if (step_ms <= 0.0) return "Quality: auto\n";
+  const AutoQuality judged = auto_quality(step_ms, scene.step_rate_hz);
+  return fmt::format("Quality: auto, {} here, as {}\n", judged.is_full ? kFullQuality : kFastQuality,
+                     judged.reason);
+}
+
 std::string to_text(const gl::PassReports& passes) {
   std::string text;
   for (const gl::PassReport& pass : passes)
@@ -149,7 +163,7 @@ Result<Measured> measure_passes(const SceneDesc& scene, const SceneContent& cont
                    open_executor({config.sim_device, config.gl_device, config.shader_folder}));
   const SceneAsset asset = make_scene_asset(content.groom, content.head);
   Bench bench{scene, asset, facts, *executor, {config.renderer, config.gl_device, config.shader_folder},
-              {},    {}};
+              {},    {},    {}};
   RETURN_IF_ERROR(measure_strands(bench, content));
   if (facts.frame_viewers > 0) {
     RETURN_IF_ERROR(measure_pictures(bench));
@@ -157,7 +171,8 @@ Result<Measured> measure_passes(const SceneDesc& scene, const SceneContent& cont
     ASSIGN_OR_RETURN(bench.passes.pictures,
                      plan_picture_passes(asset, scene.look, likely_renderer(config.renderer, scene.look), 0));
   }
-  return Measured{executor->info().name, join_passes(std::move(bench.passes), facts.frame_viewers > 0)};
+  return Measured{executor->info().name, join_passes(std::move(bench.passes), facts.frame_viewers > 0),
+                  median(bench.step_ms)};
 }
 
 Result<std::vector<std::string>> explain_groom(const SceneDesc& scene, const Groom& groom) {
@@ -170,6 +185,7 @@ Result<std::string> explain_scene(const SceneDesc& scene, const SceneAsset& asse
   std::string text = fmt::format(
       "Scene '{}': {} strands x {} vertices, solver {}, {:g} steps of {} substeps per s\n", scene.name,
       asset.strand_count, asset.vertex_count, scene.solver.name, scene.step_rate_hz, scene.substeps);
+  text += quality_text(scene, measured.step_ms);
   if (!measured.sim_device.empty()) text += fmt::format("Simulated on: {}\n", measured.sim_device);
   text += fmt::format("Assumed: {} viewers of strands, {} of frames\n\nFacts\n", facts.strand_viewers,
                       facts.frame_viewers);

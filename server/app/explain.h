@@ -27,6 +27,7 @@ struct MeasureConfig {
 struct Measured {
   std::string sim_device;  // for people: what simulated
   gl::PassReports passes;
+  double step_ms = 0.0;  // median of the steps
 };
 
 /// Plans the passes of a server with these viewers and runs the needed ones a few times, on an executor and a
@@ -37,8 +38,9 @@ Result<Measured> measure_passes(const SceneDesc& scene, const SceneContent& cont
 /// Returns what the scene's solver states about the groom, one sentence each.
 Result<std::vector<std::string>> explain_groom(const SceneDesc& scene, const Groom& groom);
 
-/// Returns the facts with reasons, the solver's notes on the groom, and the device that simulated if it was
-/// measured. The passes follow: kept, not requested or unread, with bytes and milliseconds.
+/// Returns the quality and its reason, the facts with theirs, the solver's notes on the groom, and the device
+/// that simulated if it was measured. The passes follow: kept, not requested or unread, with bytes and
+/// milliseconds.
 Result<std::string> explain_scene(const SceneDesc& scene, const SceneAsset& asset, const RuntimeFacts& facts,
                                   const Measured& measured, const std::vector<std::string>& groom_notes = {});
 

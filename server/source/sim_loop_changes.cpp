@@ -12,6 +12,7 @@
 #include "common/groom/groom_asset.h"
 #include "common/log/log.h"
 #include "common/strands/strand_codec.h"
+#include "server/source/auto_quality.h"
 #include "server/source/scene_change.h"
 #include "server/source/sim_loop.h"
 #include "server/source/wet_hair.h"
@@ -19,8 +20,6 @@
 namespace strandcast {
 namespace {
 
-// A scene's quality is full where a step takes this share of its time at most; so many are timed.
-constexpr double kFullShare = 0.5;
 constexpr int kTimedSteps = 9;
 
 /// Whether a solver built for one set of facts serves another: only what it compiles for counts.
@@ -268,19 +267,18 @@ Result<double> SimLoop::time_step_ms() {
   return median(step_ms);
 }
 
-/// Of a scene that leaves its quality to the machine: full, where steps take half of the time there is or
-/// less. Simulated time that waits for somebody else has no such limit.
+/// Of a scene that leaves its quality to the machine. Simulated time that waits for somebody else has no
+/// limit.
 Status SimLoop::settle_quality() {
   if (config_.scene.quality != kAutoQuality || config_.is_lockstep || config_.script != nullptr) return {};
   ASSIGN_OR_RETURN(const double step_ms, time_step_ms());
-  const double most_ms = kFullShare * kMsPerS / config_.scene.step_rate_hz;
-  const std::string why = fmt::format("a step of full takes {:.1f} ms of the {:.1f} ms there are", step_ms,
-                                      kMsPerS / config_.scene.step_rate_hz);
-  if (step_ms <= most_ms) {
-    log_info("sim", "quality auto: full, as {}", why);
+  const AutoQuality judged = auto_quality(step_ms, config_.scene.step_rate_hz);
+  if (judged.is_full) {
+    log_info("sim", "quality auto: full, as {}", judged.reason);
     return {};
   }
-  log_info("sim", "quality auto: fast, as {}; full looks better: strandcast-ctl set quality=full", why);
+  log_info("sim", "quality auto: fast, as {}; full looks better: strandcast-ctl set quality=full",
+           judged.reason);
   ASSIGN_OR_RETURN(config_.scene, change_scene(config_.scene, std::string("quality=") + kFastQuality));
   config_.scene.quality = kAutoQuality;
   return rebuild_solver(config_.scene, analyse(config_.scene, facts_));

@@ -129,6 +129,7 @@ def check_run():
         "--groom": (["--groom", "a.tfx,b.tfx"], server(("--groom", "HERE/a.tfx"), ("--groom", "HERE/b.tfx"))),
         "--scene": (["--scene", "a.textproto"], server(("--scene", "HERE/a.textproto"))),
         "--set": (["--set", "a=1", "--set", "b=2"], server(("--set", "a=1"), ("--set", "b=2"))),
+        "--quality": (["--quality", "full"], server(("--set", "quality=full"))),
         "--record": (["--record", "a.mcap"], server(("--record", "HERE/a.mcap"))),
         "--mocap": (["--mocap", "vmc"], {**server(("--mocap", "vmc")), **feed(("--motion", "none"), gone=[builtin])}),
         "--motion": (["--motion", "a.bvh"], feed(("--motion", "HERE/a.bvh"), gone=[builtin])),

@@ -256,6 +256,16 @@ TEST(Explain, NamesEverySolverAndPrintsTheListAsItIs) {
   for (const char* part : {"Simulated on: an abacus", "half of the strands are stiffened", "has_wind",
                            "has_head_mesh", "1.25 ms", "unread", "not requested", "saved"})
     EXPECT_THAT(*text, HasSubstr(part));
+  // A scene that leaves its quality to the machine: by the time of a step, and why.
+  SceneDesc open_scene = scene;
+  open_scene.quality = kAutoQuality;
+  open_scene.step_rate_hz = 60.0;
+  const auto with_step = [&](double step_ms) {
+    return *explain_scene(open_scene, asset, {}, {"", *passes, step_ms});
+  };
+  EXPECT_THAT(with_step(8.3),
+              HasSubstr("Quality: auto, full here, as a step of full takes 8.3 ms of the 16.7 ms"));
+  EXPECT_THAT(with_step(8.4), HasSubstr("Quality: auto, fast here"));
   size_t at = text->find("\nPasses\n");
   for (const gl::PassReport& pass : *passes) {
     const size_t next = text->find(fmt::format("\n  {:<18} {}", pass.name, gl::to_string(pass.fate)), at);
