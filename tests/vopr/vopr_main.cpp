@@ -15,6 +15,7 @@
 #include <string_view>
 
 #include "common/base/version.h"
+#include "tests/vopr/links.h"
 #include "tests/vopr/system.h"
 #include "tests/vopr/threads_private.h"
 
@@ -23,18 +24,23 @@ namespace {
 
 constexpr const char* kUsage =
     "usage: strandcast-vopr [--seed N | --seeds A..B] [--simulate SECONDS] [--plant NAME] [--calm] [--show]\n"
+    "       strandcast-vopr --links corners|whole\n"
     "  --seed N          one run (1)\n"
     "  --seeds A..B      many runs, one after the other; ends with 1 if any of them breaks a rule\n"
     "  --simulate S      simulated seconds of each run (60)\n"
     "  --plant NAME      plants a fault that the rules must find:\n"
     "                    wrong-hash, stays-away, done-twice, token-in-log, deaf\n"
     "  --calm            no faults\n"
-    "  --show            prints every line as it comes\n";
+    "  --show            prints every line as it comes\n"
+    "  --links GRID      one viewer at links of every rate, delay and share of stalls: ends with 1 where one "
+    "finds\n"
+    "                    no class that fits, does not keep it, or shows its first picture late\n";
 
 struct Options {
   uint64_t first = 1, last = 1;
   RunPlan plan;
   bool is_help = false;
+  std::optional<LinkGrid> links;
 };
 
 std::optional<Plant> plant_of(const std::string& name) {
@@ -68,6 +74,9 @@ std::optional<Options> parse(int count, char** words) {
       options.first = std::strtoull(value, &end, 10);
       if (std::strncmp(end, "..", 2) != 0) return std::nullopt;
       options.last = std::strtoull(end + 2, &end, 10);
+    } else if (word == "--links") {
+      if (std::strcmp(value, "whole") != 0 && std::strcmp(value, "corners") != 0) return std::nullopt;
+      options.links = *value == 'w' ? LinkGrid::Whole : LinkGrid::Corners;
     } else if (word == "--simulate") {
       options.plan.simulated_s = std::strtod(value, &end);
     } else if (word == "--plant") {
@@ -78,7 +87,7 @@ std::optional<Options> parse(int count, char** words) {
       return std::nullopt;
     }
     if (end != nullptr && (*end != 0 || end == value)) return std::nullopt;
-    if (value != nullptr && (word.starts_with("--seed") || word == "--simulate" || word == "--plant")) ++i;
+    if (word.starts_with("--seed") || word == "--simulate" || word == "--plant" || word == "--links") ++i;
   }
   return options;
 }
@@ -153,5 +162,6 @@ int main(int count, char** words) {
     return 0;
   }
   hold_still(words);
+  if (options->links) return walk_links(*options->links) == 0 ? 0 : 1;
   return run_many(*options);
 }
