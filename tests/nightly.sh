@@ -58,6 +58,7 @@ run_part() {
     wasm)
       bash deploy/install_deps.sh emscripten esbuild nodejs dpkg-dev node-typescript chromium firefox-esr libjs-three
       build ci -DSTRANDCAST_WEB=ON && STRANDCAST_SOAK_S=600 STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci 1 -R '^web\.' &&
+        for name in browser window; do STRANDCAST_BROWSER=firefox node tests/web/page_$name.mjs build/ci/bin/strandcast-server || exit 1; done &&
         cmake --preset ci -DSTRANDCAST_WEB=OFF >/dev/null
       ;;
     mutants) bash tests/mutants.sh --random 300 --seed "$(date +%Y%m%d)" --most 10 ;;
