@@ -8,7 +8,7 @@
 # kernels compile for NEON), packages (as root: do the Debian packages install, run and go in a clean Debian 12, and does the
 # container), fleet (sessions, relays and viewers with a Slurm and an HAProxy of their own: deploy/fleet/try.sh), wasm (does the strand core in WebAssembly decode what this one does, bit for bit, and does the page work in a browser),
 # mutants (300 faults planted at random, by the date's seed: which of them does no test notice?), vopr (2,000 seeds of the whole system
-# on simulated time, from the date's seed on). A part that fails
+# on simulated time, from the date's seed on), links (which class of strands viewer and page find over 36 links). A part that fails
 # does not keep the others from running; a table of all stands at the end. A finding of a fuzzer stays under
 # build/fuzz/findings.
 set -euo pipefail
@@ -20,11 +20,11 @@ parts=()
 while [ $# -gt 0 ]; do
   case "$1" in
     --seconds) seconds="${2:?--seconds needs a number}"; shift 2 ;;
-    fuzz | grids | dev | tsan | lto | arm | packages | fleet | wasm | mutants | vopr) parts+=("$1"); shift ;;
-    *) echo "unknown argument '$1' (known: --seconds N, fuzz, grids, dev, tsan, lto, arm, packages, fleet, wasm, mutants, vopr)" >&2; exit 2 ;;
+    fuzz | grids | dev | tsan | lto | arm | packages | fleet | wasm | mutants | vopr | links) parts+=("$1"); shift ;;
+    *) echo "unknown argument '$1' (known: --seconds N, fuzz, grids, dev, tsan, lto, arm, packages, fleet, wasm, mutants, vopr, links)" >&2; exit 2 ;;
   esac
 done
-[ ${#parts[@]} -gt 0 ] || parts=(fuzz grids dev tsan lto arm packages fleet wasm mutants vopr)
+[ ${#parts[@]} -gt 0 ] || parts=(fuzz grids dev tsan lto arm packages fleet wasm mutants vopr links)
 
 bash deploy/install_deps.sh clang libclang-rt-14-dev xvfb xauth glslang-tools glslc spirv-tools
 log="$(mktemp)"
@@ -58,9 +58,14 @@ run_part() {
     wasm)
       bash deploy/install_deps.sh emscripten esbuild nodejs dpkg-dev node-typescript chromium firefox-esr libjs-three
       build ci -DSTRANDCAST_WEB=ON && STRANDCAST_SOAK_S=600 STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci 1 -R '^web\.' &&
+        for name in browser window; do STRANDCAST_BROWSER=firefox node tests/web/page_$name.mjs build/ci/bin/strandcast-server || exit 1; done &&
         cmake --preset ci -DSTRANDCAST_WEB=OFF >/dev/null
       ;;
     mutants) bash tests/mutants.sh --random 300 --seed "$(date +%Y%m%d)" --most 10 ;;
+    links)
+      bash deploy/install_deps.sh emscripten esbuild nodejs dpkg-dev node-typescript chromium
+      build ci -DSTRANDCAST_WEB=ON && build/ci/bin/strandcast-vopr --links whole && node tests/web/page_links.mjs build/ci/bin/strandcast-server
+      ;;
     vopr) build ci && build/ci/bin/strandcast-vopr --seeds "$(date +%Y%m%d)0000..$(date +%Y%m%d)1999" ;;
   esac
 }

@@ -300,6 +300,7 @@ TEST(ReconnectPolicy, ThePageHasTheSameNumbers) {
   EXPECT_EQ(number("URGENT_ATTEMPTS"), kUrgentAttempts);
   EXPECT_EQ(number("JITTER"), kReconnectJitter);
   EXPECT_EQ(number("STABLE_MS"), ms(kStableConnection));
+  EXPECT_EQ(number("DOUBTED_MS"), ms(kDoubtedServer));
   EXPECT_EQ(number("SILENT_MS"), ms(kSilentServer));
   const ClientConfig config;
   EXPECT_EQ(number("IDLE_MS"), ms(config.idle_timeout));

@@ -20,6 +20,7 @@
 #include "common/pictures/picture.h"
 #include "common/wire/messages.h"
 #include "server/scene/scene_content.h"
+#include "tests/vopr/links.h"
 #include "tests/vopr/system.h"
 #include "tests/vopr/threads_private.h"
 
@@ -28,6 +29,7 @@ namespace {
 
 constexpr const char* kUsage =
     "usage: strandcast-vopr [--seed N | --seeds A..B] [--simulate SECONDS] [--plant NAME] [--calm] [--show]\n"
+    "       strandcast-vopr --links corners|whole\n"
     "  --seed N          one run (1)\n"
     "  --seeds A..B      many runs, one after the other; ends with 1 if any of them breaks a rule\n"
     "  --simulate S      simulated seconds of each run (60)\n"
@@ -35,12 +37,16 @@ constexpr const char* kUsage =
     "                    wrong-hash, stays-away, done-twice, token-in-log, deaf, relay-ends,\n"
     "                    first-is-final, feeder-ends, one-queue, long-command, report-forgets, lost-bytes\n"
     "  --calm            no faults\n"
-    "  --show            prints every line as it comes\n";
+    "  --show            prints every line as it comes\n"
+    "  --links GRID      one viewer at links of every rate, delay and share of stalls: ends with 1 where one "
+    "finds\n"
+    "                    no class that fits, does not keep it, or shows its first picture late\n";
 
 struct Options {
   uint64_t first = 1, last = 1;
   RunPlan plan;
   bool is_help = false;
+  std::optional<LinkGrid> links;
 };
 
 std::optional<Plant> plant_of(const std::string& name) {
@@ -81,6 +87,9 @@ std::optional<Options> parse(int count, char** words) {
       options.first = std::strtoull(value, &end, 10);
       if (std::strncmp(end, "..", 2) != 0) return std::nullopt;
       options.last = std::strtoull(end + 2, &end, 10);
+    } else if (word == "--links") {
+      if (std::strcmp(value, "whole") != 0 && std::strcmp(value, "corners") != 0) return std::nullopt;
+      options.links = *value == 'w' ? LinkGrid::Whole : LinkGrid::Corners;
     } else if (word == "--simulate") {
       options.plan.simulated_s = std::strtod(value, &end);
     } else if (word == "--plant") {
@@ -91,7 +100,7 @@ std::optional<Options> parse(int count, char** words) {
       return std::nullopt;
     }
     if (end != nullptr && (*end != 0 || end == value)) return std::nullopt;
-    if (value != nullptr && (word.starts_with("--seed") || word == "--simulate" || word == "--plant")) ++i;
+    if (word.starts_with("--seed") || word == "--simulate" || word == "--plant" || word == "--links") ++i;
   }
   return options;
 }
@@ -187,5 +196,6 @@ int main(int count, char** words) {
   }
   hold_still(words);
   warm_up();
+  if (options->links) return walk_links(*options->links) == 0 ? 0 : 1;
   return run_many(*options);
 }

@@ -7,6 +7,7 @@ import os from 'node:os';
 import path from 'node:path';
 
 const USUAL_MS = 30_000;
+const STAND_MS = 60_000;
 const POLL_MS = 100; // the page tells of itself twice a second
 const MOST_SAID = 4000; // characters of its complaints
 
@@ -19,6 +20,22 @@ function findChromium() {
 export const whyNoBrowser = () => (findChromium() ? undefined : 'needs a browser (chromium)');
 const asRoot = () => (process.getuid?.() === 0 ? ['--no-sandbox'] : []);
 export const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
+
+/** So many has the page shown. */
+export const picturesOf = (tab) => tab.evaluate('Number(document.body?.dataset.pictures ?? 0)');
+/** Waits until no further picture comes for so long. Where little time is, what moves is drawn smaller: that is none. */
+export async function comeToStand(tab, stillMs, count = picturesOf) {
+  const end = Date.now() + STAND_MS;
+  for (let before = -1, since = 0; Date.now() < end; await sleep(POLL_MS)) {
+    const pictures = await count(tab);
+    const { mode, share } = await tab.state();
+    const isSmaller = mode === 'strands' && share < 1;
+    if (pictures === 0 || pictures !== before || isSmaller) since = Date.now();
+    else if (Date.now() - since >= stillMs) return;
+    before = pictures;
+  }
+  throw new Error(`no picture stands within ${STAND_MS} ms; ${tab.errors?.join(' | ')}`);
+}
 
 /** Its last files come late, from processes that outlive the first. What is left after that is the system's. */
 async function removeFolder(folder) {

@@ -76,11 +76,29 @@ export class Firefox {
   /** In the one window, whose inside gets this size. */
   async open(url, { width = 640, height = 360 } = {}) {
     await this.send('WebDriver:Navigate', { url: 'about:blank' });
+    await this.resize(width, height);
+    await this.send('WebDriver:Navigate', { url });
+    return this;
+  }
+  async resize(width, height) {
     await this.send('WebDriver:SetWindowRect', { width, height });
     const [inWidth, inHeight] = await this.evaluate('[innerWidth, innerHeight]');
     await this.send('WebDriver:SetWindowRect', { width: 2 * width - inWidth, height: 2 * height - inHeight });
-    await this.send('WebDriver:Navigate', { url });
-    return this;
+  }
+  /** The same with tabs, as browser.mjs has them. What the console and the network say is not seen. */
+  get withTabs() {
+    const turnTo = (handle, focus) => this.send('WebDriver:SwitchToWindow', { handle, focus });
+    const open = async (url, size) => {
+      const [first] = await this.send('WebDriver:GetWindowHandles'); // the one before may be closed
+      await turnTo(first, true);
+      const { handle } = await this.send('WebDriver:NewWindow', { type: 'tab', focus: true });
+      const tab = Object.assign(Object.create(this), { errors: [], requests: [] });
+      tab.send = (name, params) => (name === 'Page.bringToFront' ? turnTo(handle, true) : turnTo(handle, false).then(() => this.send(name, params)));
+      tab.close = () => tab.send('WebDriver:CloseWindow');
+      await turnTo(handle, true);
+      return tab.open(url, size);
+    };
+    return { open, end: () => this.end() };
   }
   async evaluate(expression) {
     return (await this.send('WebDriver:ExecuteScript', { script: `return (${expression});`, args: [] })).value;
@@ -99,9 +117,15 @@ export class Firefox {
     }
   }
   async press(key) {
-    const names = { End: '\uE010', Home: '\uE011' };
+    const names = { End: '\uE010', Home: '\uE011', ArrowLeft: '\uE012', ArrowUp: '\uE013', ArrowRight: '\uE014', ArrowDown: '\uE015', Enter: '\uE007', Escape: '\uE00C', Tab: '\uE004' };
     const value = names[key] ?? key;
     await this.send('WebDriver:PerformActions', { actions: [{ type: 'key', id: 'keys', actions: [{ type: 'keyDown', value }, { type: 'keyUp', value }] }] });
+  }
+  async drag(from, to, steps = 5) {
+    const move = (part) => ({ type: 'pointerMove', duration: 20, x: Math.round(from[0] + (to[0] - from[0]) * part), y: Math.round(from[1] + (to[1] - from[1]) * part) });
+    const moves = Array.from({ length: steps }, (_, i) => move((i + 1) / steps));
+    const actions = [move(0), { type: 'pointerDown', button: 0 }, ...moves, { type: 'pointerUp', button: 0 }];
+    await this.send('WebDriver:PerformActions', { actions: [{ type: 'pointer', id: 'mouse', parameters: { pointerType: 'mouse' }, actions }] });
   }
   /** PNG; also to a file where one is named. */
   async screenshot(file = undefined) {

@@ -7,7 +7,7 @@ import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 import { pathToFileURL } from 'node:url';
-import { Browser, sleep } from './browser.mjs';
+import { Browser, comeToStand, picturesOf as shownPictures, sleep } from './browser.mjs';
 import { NodeSocket } from './node_socket.mjs';
 import { HEAD, PackageSite, root, whyNoThree } from './package_site.mjs';
 import { psnr, readPng } from './png.mjs';
@@ -111,13 +111,7 @@ const picturesOf = (tab) => tab.state().then(({ pictures = 0 }) => pictures, () 
 /** Once it stands. */
 async function shownBy(url, name, count, beforeEnd = () => undefined) {
   const tab = await browser.open(url, SIZE);
-  const end = Date.now() + 30_000;
-  for (let last = -1, quiet = 0; quiet < 3; await sleep(400)) {
-    if (Date.now() > end) throw new Error(`${url} does not come to stand: ${tab.errors}`);
-    const pictures = await count(tab);
-    quiet = pictures > 0 && pictures === last ? quiet + 1 : 0;
-    last = pictures;
-  }
+  await comeToStand(tab, 1200, count);
   await tab.evaluate('for (const card of document.querySelectorAll(".card, #warnings")) card.hidden = true');
   await sleep(100);
   const picture = readPng(await tab.screenshot(shots && path.join(shots, `${name}.png`)));
@@ -129,7 +123,7 @@ async function shownBy(url, name, count, beforeEnd = () => undefined) {
 let page;
 const tests = {
   async 'the element shows what the page shows'() {
-    page = await shownBy(`${server.url}#mode=strands&codec=tangent&draw=tiles`, 'page', (tab) => tab.evaluate('Number(document.body?.dataset.pictures ?? 0)'));
+    page = await shownBy(`${server.url}#mode=strands&codec=tangent&draw=tiles`, 'page', shownPictures);
     const seen = await shownBy(`${site.origin}/view.html`, 'view', picturesOf);
     assert.equal(psnr(page, seen), Infinity);
   },

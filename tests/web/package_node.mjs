@@ -10,7 +10,7 @@ import path from 'node:path';
 import { fileURLToPath, pathToFileURL } from 'node:url';
 import zlib from 'node:zlib';
 import { NodeSocket } from './node_socket.mjs';
-import { Server, SMALL } from './server.mjs';
+import { Link, Server, SMALL } from './server.mjs';
 
 const MOST_BYTES = 60_000; // of scripts, by gzip, without the modules
 const [program, tar] = process.argv.slice(2);
@@ -159,6 +159,32 @@ const tests = {
     assert.throws(() => watching.pause(), /watch only/);
     watching.close();
     connection.close();
+  },
+  async 'beside a silent link another is tried, which takes its place unless the first one speaks'() {
+    const link = await Link.start(server);
+    const connection = open(link);
+    const words = [];
+    connection.on('link', ({ state }) => words.push(state));
+    let welcomes = 0;
+    connection.on('welcome', () => ++welcomes);
+    await take(connection, 2);
+    link.holdsNew = true;
+    link.fallSilent();
+    await until(() => link.connections.length === 2, 'another', 12_000); // ReconnectPolicy.ThePageHasTheSameNumbers: 15 s otherwise
+    link.speak(1);
+    await take(connection, 2);
+    link.speak(2); // which lets nobody in any more
+    await take(connection, 20);
+    assert.equal(welcomes, 1);
+    link.holdsNew = false;
+    const since = Date.now();
+    link.fallSilent();
+    await until(() => welcomes === 2, 'one more', 12_000);
+    console.log(`  after ${Date.now() - since} ms`);
+    await take(connection, 2);
+    assert.ok(!words.includes('waiting'), words.join());
+    connection.close();
+    link.end();
   },
   async 'a lost server is found again, an ended session says why'() {
     const mortal = await Server.start(program, SMALL);

@@ -288,6 +288,46 @@ check('a dead link is left at once, without the closing handshake', () => {
   assert.ok(!socket.isOpen);
 });
 
+check('two sockets beside each other hear each their own', () => {
+  const made = [];
+  globalThis.WebSocket = class {
+    static OPEN = 1;
+    readyState = 1;
+    sent = [];
+    constructor() { made.push(this); }
+    send(bytes) { this.sent.push(bytes.length); }
+    close() { this.readyState = 2; }
+  };
+  globalThis.self = {};
+  page.runSocket();
+  const [near, far] = [{}, {}]; // what each end posts the other one hears
+  near.postMessage = (data) => far.onmessage({ data });
+  far.postMessage = (data) => near.onmessage({ data });
+  self.onmessage({ data: { port: far } });
+  const heard = [];
+  const sockets = ['silent', 'new'].map((name) => {
+    const socket = new page.DistantSocket(near, 'ws://hair', 'strandcast.v1');
+    Object.assign(socket, { onmessage: (data) => heard.push([name, data]), onclose: (code) => heard.push([name, code]) });
+    return socket;
+  });
+  for (const socket of made) socket.onopen();
+  sockets[1].send(new Uint8Array(3));
+  sockets[0].drop(1000, '');
+  made[0].onmessage({ data: 'late' });
+  made[1].onmessage({ data: 'a' });
+  made[0].onclose({ code: 1006, reason: '' });
+  sockets[1].send(new Uint8Array(2));
+  made[1].onclose({ code: 1001, reason: '' });
+  assert.deepEqual(heard, [['silent', 1000], ['new', 'a'], ['new', 1001]]);
+  assert.deepEqual(made.map(({ sent }) => sent), [[], [3, 2]]);
+});
+
+check('a silent connection that is soon left again is given longer', () => {
+  const policy = new page.ReconnectPolicy();
+  const waits = [5_000, 5_000, 20_000].map((livedMs) => (policy.replace(livedMs), policy.doubtMs));
+  assert.deepEqual(waits, [2, 4, 1].map((times) => times * page.DOUBTED_MS));
+});
+
 check('timecode is counted as the server counts it', () => {
   const text = (numerator, denominator, is_drop, frame) => page.timecodeText({ rate_numerator: numerator, rate_denominator: denominator, is_drop, frame });
   assert.equal(text(24000, 1001, false, 89356), '01:02:03:04');

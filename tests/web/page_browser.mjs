@@ -267,4 +267,5 @@ const all = {
   },
 };
 
-await runAll(all, browser, server);
+// What a page asks for, its console and its history are told by Chromium alone.
+await runAll(all, browser, server, ['strands come', 'what comes while', 'tokens', 'a page of another origin', 'memory stays']);

@@ -6,7 +6,7 @@ import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import fs from 'node:fs';
 import path from 'node:path';
-import { sleep } from './browser.mjs';
+import { comeToStand, sleep } from './browser.mjs';
 import { psnr, readPng } from './png.mjs';
 import { begin, program, runAll, shots, work } from './served.mjs';
 import { SMALL } from './server.mjs';
@@ -35,11 +35,7 @@ const open = async (page) => {
 };
 /** Without what lies over it, once it stands. */
 async function picture(tab, name) {
-  for (let before = -1, quiet = 0; quiet < 4; await sleep(150)) {
-    const count = Number(await tab.evaluate('document.body.dataset.pictures ?? 0'));
-    quiet = count > 0 && count === before ? quiet + 1 : 0;
-    before = count;
-  }
+  await comeToStand(tab, 600);
   await tab.evaluate('for (const card of document.querySelectorAll(".card, #warnings")) card.style.visibility = "hidden"');
   return readPng(await tab.screenshot(shots && path.join(shots, `${name}.png`)));
 }

@@ -6,7 +6,7 @@
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import path from 'node:path';
-import { sleep } from './browser.mjs';
+import { comeToStand, sleep } from './browser.mjs';
 import { Firefox, whyNoFirefox } from './firefox.mjs';
 import { psnr, readPng } from './png.mjs';
 import { begin, program, runAll, shots, work } from './served.mjs';
@@ -19,8 +19,7 @@ if (missing) {
 }
 const isWhole = process.env.STRANDCAST_TEST_GRID === 'whole';
 const LEAST_DB = 40;
-const PATIENCE_MS = 60_000;
-const STILL = 15; // a busy machine takes a second or two for the whole picture of what stands
+const STILL_MS = 3000; // a busy machine takes a second or two for the whole picture of what stands
 const { browser: chromium, server } = await begin([...SMALL, '--lockstep']);
 const firefox = await Firefox.start();
 const ctlProgram = path.join(path.dirname(program), 'strandcast-ctl');
@@ -29,15 +28,7 @@ ctl('--connect', `127.0.0.1:${server.port}`, 'step', '60');
 
 /** Once it stands, sharp, without what lies over it. */
 async function picture(tab, name) {
-  const end = Date.now() + PATIENCE_MS;
-  for (let before = -1, quiet = 0; quiet < STILL; await sleep(200)) {
-    assert.ok(Date.now() < end, `${name} does not come to stand`);
-    const count = Number(await tab.evaluate('document.body.dataset.pictures || 0'));
-    const { mode, share } = await tab.state();
-    const isSharp = mode !== 'strands' || share === 1; // where little time is, what moves is drawn smaller
-    quiet = count > 0 && count === before && isSharp ? quiet + 1 : 0;
-    before = count;
-  }
+  await comeToStand(tab, STILL_MS);
   await tab.evaluate('[...document.querySelectorAll(".card, #warnings")].forEach((card) => { card.style.visibility = "hidden"; })');
   await sleep(200);
   return readPng(await tab.screenshot(shots && path.join(shots, `${name}.png`)));

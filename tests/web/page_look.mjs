@@ -4,7 +4,7 @@
 // Ends with 77 where there is no browser.
 import { execFileSync } from 'node:child_process';
 import path from 'node:path';
-import { Browser, sleep } from './browser.mjs';
+import { Browser, comeToStand, sleep } from './browser.mjs';
 import { psnr, readPng } from './png.mjs';
 import { begin, program, runAll, shots, work } from './served.mjs';
 
@@ -19,12 +19,7 @@ const address = `127.0.0.1:${server.port}`;
 async function shownBy(from, wishes, shows, size) {
   const tab = await from.open(`${server.url}#${wishes}`, size);
   await tab.until(async () => (await tab.evaluate('document.body.dataset.shows')) === shows, shows);
-  // Whole, and once more sharpened: no further picture comes.
-  for (let before = -1, quiet = 0; quiet < 4; await sleep(500)) {
-    const count = Number(await tab.evaluate('document.body.dataset.pictures ?? 0'));
-    quiet = count > 0 && count === before ? quiet + 1 : 0;
-    before = count;
-  }
+  await comeToStand(tab, 2000);
   await tab.evaluate('for (const card of document.querySelectorAll(".card, #warnings")) card.hidden = true');
   await sleep(200);
   const picture = readPng(await tab.screenshot(shots && path.join(shots, `${wishes.replaceAll('&', '_')}.png`)));

@@ -7,7 +7,7 @@ import fs from 'node:fs';
 import path from 'node:path';
 import { Browser, sleep } from './browser.mjs';
 import { begin, program, runAll, sharedTab, shots, work } from './served.mjs';
-import { Server, SMALL } from './server.mjs';
+import { Link, Server, SMALL } from './server.mjs';
 
 // With them a window of 1280 x 720 at one, two, three and four times its size.
 const SIZES = [[1280, 720], [640, 360], [568, 320], [480, 270], [427, 240], [360, 640], [320, 256], [320, 180]];
@@ -84,11 +84,11 @@ async function namelessControls(tab) {
 }
 
 /** Of what happens in the page between now and its next picture after it is seen again, ms. */
-const UNTIL_PICTURE = `window.seen = new Promise((done) => document.addEventListener('visibilitychange', () => {
+const UNTIL_PICTURE = `(window.seen = new Promise((done) => document.addEventListener('visibilitychange', () => {
   const begun = performance.now();
   new MutationObserver((_, observer) => { observer.disconnect(); done(performance.now() - begun); })
     .observe(document.body, { attributeFilter: ['data-pictures'] });
-}, { once: true })); 0`;
+}, { once: true })), 0)`;
 
 const all = {
   async 'the server\'s pictures are as large as the window, soon after it changes'() {
@@ -165,6 +165,20 @@ const all = {
     await tab.until((now) => now.isConnected && now.states > 3, 'states again');
     await mortal.end();
     await tab.close();
+  },
+  async 'beside a silent link another is tried, and takes its place'() {
+    if (process.env.STRANDCAST_TEST_GRID !== 'whole') return console.log('  by night; beside it page.test.mjs and package_node.mjs');
+    const link = await Link.start(server);
+    const tab = await browser.open(`${link.url}#mode=strands`);
+    await tab.until((now) => now.codec === 'step' && now.states > 100, 'states');
+    const since = Date.now();
+    link.fallSilent();
+    await tab.until((now) => now.isConnected && now.states < 100, 'another', 12_000); // it counts from 0
+    console.log(`  after ${Date.now() - since} ms`);
+    const state = await tab.until((now) => now.codec === 'step' && now.states > 30, 'its states');
+    assert.equal(state.hash_ok, true, state.rejected);
+    await tab.close();
+    link.end();
   },
   async 'the way back finds hair that moves'() {
     const tab = await browser.open(`${server.url}#mode=strands`); // whose count of states begins anew
@@ -350,4 +364,5 @@ const all = {
   },
 };
 
-await runAll(all, browser, server);
+// Firefox gives no other media, sizes below its own window's, touches or lost cards to tests.
+await runAll(all, browser, server, ["the server's pictures", 'every control', 'keys alone', 'a drag', 'who lacks', 'a graphics card', 'the way back']);

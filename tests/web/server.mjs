@@ -2,6 +2,7 @@
 //   const server = await Server.start('build/ci/bin/strandcast-server', ['--set', '...']); server.url; await server.end();
 import { spawn } from 'node:child_process';
 import fs from 'node:fs';
+import net from 'node:net';
 import os from 'node:os';
 import path from 'node:path';
 
@@ -35,5 +36,33 @@ export class Server {
     if (this.child.exitCode !== null || this.child.signalCode !== null) return;
     this.child.kill('SIGTERM');
     await new Promise((done) => this.child.once('exit', done));
+  }
+}
+
+/** A relay before a server, whose connections fall silent and speak again. */
+export class Link {
+  static async start(server) {
+    const link = new Link();
+    link.connections = [];
+    link.listener = net.createServer((near) => {
+      const ends = [near, net.connect(server.port, '127.0.0.1')];
+      for (const [i, end] of ends.entries()) end.on('error', () => {}).on('close', () => ends[1 - i].destroy()).pipe(ends[1 - i]);
+      link.connections.push(ends);
+      if (link.holdsNew) link.fallSilent(link.connections.length - 1);
+    });
+    await new Promise((done) => link.listener.listen(0, '127.0.0.1', done));
+    link.url = `http://127.0.0.1:${link.listener.address().port}/`;
+    return link;
+  }
+  /** From this one on: nothing passes any more. */
+  fallSilent(first = 0) {
+    for (const ends of this.connections.slice(first)) for (const end of ends) end.unpipe().pause();
+  }
+  speak(last) {
+    for (const ends of this.connections.slice(0, last)) for (const [i, end] of ends.entries()) end.pipe(ends[1 - i]);
+  }
+  end() {
+    for (const end of this.connections.flat()) end.destroy();
+    this.listener.close();
   }
 }

@@ -145,8 +145,8 @@ export class StrandcastHair extends THREE.Object3D {
   get isDirty(): boolean {
     return this.prepared.length > 0 || (this.next !== undefined && !this.isBusy);
   }
-  private tell(message: ToPrepare): void {
-    this.worker.postMessage(message);
+  private tell(message: ToPrepare, transfer: Transferable[] = []): void {
+    this.worker.postMessage(message, transfer);
   }
   private fail(reason: string): void {
     console.error(`StrandcastHair: ${reason}`);
@@ -165,8 +165,9 @@ export class StrandcastHair extends THREE.Object3D {
     if (!this.next && view === this.viewed) return;
     this.viewed = view;
     if (this.next) {
-      const { positions, pose: { rotation }, bust } = (this.asked = this.next);
-      this.tell({ kind: 'state', state: { positions, rotation, bust } });
+      const { positions: whole, pose: { rotation }, bust } = (this.asked = this.next);
+      const positions = whole.slice(); // what a message copies by itself is copied three times
+      this.tell({ kind: 'state', state: { positions, rotation, bust } }, [positions.buffer]);
       this.rotation = rotation;
       this.next = undefined;
       this.isReady = true;

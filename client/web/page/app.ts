@@ -599,6 +599,7 @@ class Viewer {
     document.documentElement.dataset.strandcast = JSON.stringify({
       isConnected: this.isConnected, mode: ['strands', 'pictures'][this.shown] ?? '', hz, camera: this.camera.offset,
       states: this.figures?.decodedFrames ?? 0, bytes: this.figures?.receivedBytes ?? 0, pictures: this.pictureCount, codec: this.figures?.codec ?? '',
+      stream: this.quality && [this.quality.strand_share, this.quality.rate_divisor],
       decodeMs: this.figures?.decodeMs ?? 0, wholeMs: this.drawFigures?.leastWholeMs ?? 0, share: this.drawFigures?.share ?? 0,
       hash_ok: !this.figures?.rejectedFrames, wrong: this.figures?.rejectedFrames ?? 0, timeMs: this.timeline?.place?.timeMs, rejected: this.figures?.lastError ?? '', error: at('trouble').hidden ? '' : at('trouble-why').textContent,
     });

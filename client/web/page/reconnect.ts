@@ -7,6 +7,8 @@ const URGENT_MS = 1000;
 const URGENT_ATTEMPTS = 30;
 const JITTER = 0.25;
 const STABLE_MS = 10_000;
+/** Nothing heard for so long: a new connection is tried beside this one, and takes its place unless it speaks first. */
+export const DOUBTED_MS = 1500;
 /** Nothing heard for so long: "not connected" is shown. */
 export const SILENT_MS = 3000;
 /** Nothing heard for so long: the connection is dead, as ClientConfig has it. */
@@ -57,7 +59,13 @@ export function mayComeBack(code: number, wasIn: boolean): boolean {
 
 export class ReconnectPolicy {
   private attempts = 0;
+  /** Nothing heard for so long: another connection is tried. */
+  doubtMs = DOUBTED_MS;
   constructor(private readonly random: () => number = Math.random) {}
+  /** A silent connection was left for another. Where that happens soon again, long messages over a slow link look like silence. */
+  replace(connectedForMs: number): void {
+    this.doubtMs = connectedForMs >= STABLE_MS ? DOUBTED_MS : 2 * this.doubtMs;
+  }
   nextDelayMs(connectedForMs: number): number {
     if (connectedForMs >= STABLE_MS) this.attempts = 0;
     const longestMs = this.attempts < URGENT_ATTEMPTS ? URGENT_MS : LONGEST_MS;

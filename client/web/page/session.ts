@@ -4,8 +4,9 @@ import { ClockOffset, nowNs, Recent } from './clock';
 import { compileCore, Core, StrandDecoder } from './core';
 import type { Asked, Camera, FromNet, NetFigures, State, StatePort, ToNet } from './messages';
 import { decodablePictures, PictureDecoder, type Decoded } from './pictures';
-import { faultOf, GIVEN_UP_CODE, IDLE_MS, mayComeBack, ReconnectPolicy, SILENT_MS, WELCOME_MS, wordsFor } from './reconnect';
+import { DOUBTED_MS, faultOf, GIVEN_UP_CODE, IDLE_MS, mayComeBack, ReconnectPolicy, SILENT_MS, WELCOME_MS, wordsFor } from './reconnect';
 import { DistantSocket, type ServerSocket } from './socket';
+import { TAPE_URL } from './tape';
 import {
   ClientMessage, decodeServerMessage, encodeClientMessage, FrameHeader, kControl, kFrameHeaderBytes, Mode, Opcode,
   PictureCodec, Partly, readFrameHeader, readStateHash, Role, type WelcomeMessage,
@@ -39,6 +40,14 @@ export interface Surroundings {
   states: StatePort;
 }
 
+/** An attempt, and what it has come to. */
+interface Line {
+  readonly socket: ServerSocket;
+  connection?: Connection; // once it is open
+  openedMs: number;
+  patience: number; // with a server that lets nobody in
+}
+
 /** What lasts over reconnections. */
 export class Net {
   private core?: Core;
@@ -51,13 +60,12 @@ export class Net {
   stepNs = 0; // of one vertex in a solver's step here; 0 until something here takes steps
   private asked!: Asked;
   private pictureCodecs!: Promise<number>;
-  private socket?: ServerSocket;
-  private connection?: Connection;
+  private line?: Line;
+  private beside?: Line; // tried while the other one is silent
+  private besideMs = 0; // none before
   private readonly policy = new ReconnectPolicy();
   private retry = 0;
-  private patience = 0; // with a server that lets nobody in
   private reports = 0;
-  private openedMs = 0;
   private lookedMs = Date.now();
   private isHidden = false;
   private wasIn = false; // somebody said Welcome
@@ -89,10 +97,17 @@ export class Net {
     clearInterval(this.reports);
     this.leave();
   }
+  private get connection(): Connection | undefined {
+    return this.line?.connection;
+  }
   private look(): void {
-    if (Date.now() - this.lookedMs > SLEPT_MS) this.wake();
+    const lateMs = Date.now() - this.lookedMs;
+    if (lateMs > SLEPT_MS) this.wake();
     this.lookedMs = Date.now();
     this.connection?.report();
+    // Who stood still itself has heard nothing meanwhile.
+    const isDue = lateMs < DOUBTED_MS && performance.now() >= this.besideMs && this.asked.url !== TAPE_URL;
+    if (isDue && !this.beside && this.connection?.isSilentFor(this.policy.doubtMs)) this.beside = this.dial();
   }
   /** After sleep a connection may be dead and not know it, and who waits to come back has waited long enough. */
   private wake(): void {
@@ -106,7 +121,7 @@ export class Net {
   private use(core: Core): void {
     if (core.call.strand_core_step_ns) this.stepNs = Math.max(core.call.strand_core_step_ns(), LEAST_STEP_NS);
     this.core = core;
-    this.connection?.setCore(core);
+    for (const line of [this.line, this.beside]) line?.connection?.setCore(core);
   }
   /** There are the server's pictures then. */
   withoutCore(reason: string): void {
@@ -151,57 +166,81 @@ export class Net {
   }
   reconnect(asked: Asked): void {
     this.asked = asked;
-    this.leave();
     this.connect();
   }
   private leave(): void {
     clearTimeout(this.retry);
     this.retry = 0;
-    clearTimeout(this.patience);
-    if (!this.socket) return;
-    this.socket.onclose = undefined;
-    this.socket.drop(1000, '');
-    this.connection?.end();
-    this.connection = undefined; // whoever asks it for a state meanwhile gets none
+    this.leaveBeside();
+    if (this.line) this.hangUp(this.line);
+    this.line = undefined; // whoever asks its connection for a state meanwhile gets none
+  }
+  private leaveBeside(): void {
+    if (this.beside) this.hangUp(this.beside);
+    this.beside = undefined;
+  }
+  private hangUp(line: Line): void {
+    clearTimeout(line.patience);
+    line.socket.onclose = undefined;
+    line.socket.drop(1000, '');
+    line.connection?.end();
   }
 
   private connect(): void {
-    clearTimeout(this.retry);
-    this.retry = 0;
+    this.leave();
     const fault = faultOf(this.asked);
     if (fault) return this.post({ kind: 'state', state: 'ended', reason: fault, retryMs: 0 });
     this.post({ kind: 'state', state: 'connecting', reason: '', retryMs: 0 });
+    this.line = this.dial();
+  }
+  private dial(): Line {
     const socket = this.around.openSocket(this.asked.url, PROTOCOL);
-    this.socket = socket;
-    let wasOpen = false;
-    clearTimeout(this.patience);
-    this.patience = setTimeout(() => {
-      if (!this.connection?.hasWelcome) socket.drop(GIVEN_UP_CODE, 'the server does not answer');
+    const line: Line = { socket, openedMs: 0, patience: 0 };
+    line.patience = setTimeout(() => {
+      if (!line.connection?.hasWelcome) socket.drop(GIVEN_UP_CODE, 'the server does not answer');
     }, WELCOME_MS);
     socket.onopen = () => {
-      wasOpen = true;
-      this.openedMs = performance.now();
-      const connection = (this.connection = new Connection(this, socket, this.asked, this.core));
+      line.openedMs = performance.now();
+      const connection = (line.connection = new Connection(this, socket, this.asked, this.core));
       void this.pictureCodecs.then((codecs) => connection.hello(codecs));
     };
-    socket.onmessage = (data, receivedNs) => this.connection?.receive(data, receivedNs);
-    socket.onclose = (code, said) => {
-      clearTimeout(this.patience);
-      const reason = this.connection?.goodbye || said || wordsFor(code, wasOpen);
-      const hadWelcome = this.connection?.hasWelcome ?? false;
-      this.connection?.end();
-      this.connection = undefined;
-      this.wasIn ||= hadWelcome;
-      // A token may be good for watching only; servers of before say so by 1008.
-      if ((code === 4004 || code === 1008) && !hadWelcome && this.asked.role === Role.controller) {
-        this.asked = { ...this.asked, role: Role.viewer };
-        return this.connect();
-      }
-      if (!mayComeBack(code, this.wasIn)) return this.post({ kind: 'state', state: 'ended', reason, retryMs: 0 });
-      const retryMs = this.policy.nextDelayMs(wasOpen ? performance.now() - this.openedMs : 0);
-      this.post({ kind: 'state', state: 'waiting', reason, retryMs });
-      this.retry = setTimeout(() => this.connect(), retryMs);
+    socket.onmessage = (data, receivedNs) => {
+      if (line === this.line) this.leaveBeside(); // it speaks again
+      line.connection?.receive(data, receivedNs);
     };
+    socket.onclose = (code, said) => {
+      clearTimeout(line.patience);
+      line.connection?.end();
+      if (line === this.line) return this.lose(line, code, said);
+      this.beside = undefined;
+      this.besideMs = performance.now() + this.policy.nextDelayMs(0);
+    };
+    return line;
+  }
+  /** The server has let this one in: it takes the place of one that is silent. */
+  welcome(connection: Connection): void {
+    if (connection !== this.beside?.connection) return;
+    const line = this.beside;
+    this.beside = undefined;
+    this.policy.replace(performance.now() - this.line!.openedMs);
+    this.leave();
+    this.line = line;
+  }
+  private lose({ connection, openedMs }: Line, code: number, said: string): void {
+    this.leaveBeside();
+    this.line = undefined;
+    const reason = connection?.goodbye || said || wordsFor(code, openedMs > 0);
+    const hadWelcome = connection?.hasWelcome ?? false;
+    this.wasIn ||= hadWelcome;
+    // A token may be good for watching only; servers of before say so by 1008.
+    if ((code === 4004 || code === 1008) && !hadWelcome && this.asked.role === Role.controller) {
+      this.asked = { ...this.asked, role: Role.viewer };
+      return this.connect();
+    }
+    if (!mayComeBack(code, this.wasIn)) return this.post({ kind: 'state', state: 'ended', reason, retryMs: 0 });
+    const retryMs = this.policy.nextDelayMs(openedMs ? performance.now() - openedMs : 0);
+    this.post({ kind: 'state', state: 'waiting', reason, retryMs });
+    this.retry = setTimeout(() => this.connect(), retryMs);
   }
 
   command(message: ToNet): void {
@@ -400,6 +439,7 @@ class Connection {
 
   private begin(welcome: WelcomeMessage): void {
     if (this.welcome) throw new Error('the server sent a second Welcome');
+    this.net.welcome(this);
     this.welcome = welcome;
     if (this.core) this.now = this.decoderOf(welcome.codec);
     this.hasWelcome = true;
@@ -430,6 +470,10 @@ class Connection {
     this.socket.drop(GIVEN_UP_CODE, this.goodbye);
   }
 
+  /** Never before its first frame: one long message may be under way. */
+  isSilentFor(ms: number): boolean {
+    return this.shown >= 0 && performance.now() - this.lastReceivedMs > ms;
+  }
   /** A silent server is shown as away, and after IDLE_MS it is looked for anew. */
   private listen(): void {
     const silentMs = performance.now() - this.lastReceivedMs;

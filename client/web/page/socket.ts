@@ -23,38 +23,45 @@ export function runSocket(): void {
   self.onmessage = ({ data }: MessageEvent<SocketStart | ToTape>) => {
     if (!('port' in data)) return tape?.hear(data);
     const { port } = data;
-    let socket: WebSocket | undefined;
-    let present = 0;
+    const sockets = new Map<number, WebSocket>();
+    let played = 0; // the socket that the tape is
     port.onmessage = ({ data: wish }: MessageEvent<ToSocket>) => {
       const post = (message: FromSocket, transfer: Transferable[] = []): void => port.postMessage(message, transfer);
+      const socket = sockets.get(wish.number);
       if (wish.kind === 'open') {
         const { number, url, protocol, originMs } = wish;
-        present = number;
         const early = performance.timeOrigin - originMs;
         const give = (data: unknown): void => {
           const receivedNs = Math.round((performance.now() + early) * 1e6);
           post({ kind: 'message', number, data, receivedNs }, data instanceof ArrayBuffer ? [data] : []);
         };
         if (url === TAPE_URL && data.tape) {
+          played = number;
           post({ kind: 'open', number });
           tape ??= new Tape(data.tape);
           return tape.begin({ give, mark: () => post({ kind: 'mark', number }), tell: (place) => (self as unknown as WorkerScope).postMessage(place) });
         }
+        let opened: WebSocket;
         try {
-          socket = new WebSocket(url, protocol);
+          opened = new WebSocket(url, protocol);
         } catch (error) {
           return post({ kind: 'closed', number, code: 4005, reason: (error as Error).message });
         }
-        socket.binaryType = 'arraybuffer';
-        socket.onopen = () => post({ kind: 'open', number });
-        socket.onmessage = ({ data }: MessageEvent<unknown>) => give(data);
-        socket.onclose = ({ code, reason }) => post({ kind: 'closed', number, code, reason });
-      } else if (wish.number === present && tape) {
-        if (wish.kind === 'close') tape.end();
-        else if (wish.kind === 'passed') tape.passed();
-      } else if (wish.number === present && socket) {
-        if (wish.kind === 'close') socket.close(wish.code);
-        else if (wish.kind === 'send' && socket.readyState === WebSocket.OPEN) socket.send(wish.bytes);
+        sockets.set(number, opened);
+        opened.binaryType = 'arraybuffer';
+        opened.onopen = () => post({ kind: 'open', number });
+        opened.onmessage = ({ data }: MessageEvent<unknown>) => give(data);
+        opened.onclose = ({ code, reason }) => {
+          sockets.delete(number);
+          post({ kind: 'closed', number, code, reason });
+        };
+      } else if (wish.number === played) {
+        if (wish.kind === 'close') tape?.end();
+        else if (wish.kind === 'passed') tape?.passed();
+      } else if (wish.kind === 'close') {
+        socket?.close(wish.code);
+      } else if (wish.kind === 'send' && socket?.readyState === WebSocket.OPEN) {
+        socket.send(wish.bytes);
       }
     };
   };
@@ -71,24 +78,26 @@ export interface ServerSocket {
 }
 
 let lastNumber = 0;
+const present = new Map<number, DistantSocket>();
 
 export class DistantSocket implements ServerSocket {
   isOpen = false;
-  private isDropped = false;
   onopen?: () => void;
   onmessage?: (data: unknown, receivedNs: number) => void;
   onclose?: (code: number, reason: string) => void;
   private readonly number = ++lastNumber;
   constructor(private readonly port: MessagePort, url: string, protocol: string) {
-    port.onmessage = ({ data: message }: MessageEvent<FromSocket>) => {
-      if (message.number !== this.number || this.isDropped) return;
-      if (message.kind === 'message') return this.onmessage?.(message.data, message.receivedNs);
-      if (message.kind === 'mark') return this.post({ kind: 'passed', number: this.number });
-      this.isOpen = message.kind === 'open';
-      if (message.kind === 'open') this.onopen?.();
-      else this.onclose?.(message.code, message.reason);
-    };
+    present.set(this.number, this);
+    port.onmessage = ({ data }: MessageEvent<FromSocket>) => present.get(data.number)?.hear(data);
     this.post({ kind: 'open', number: this.number, url, protocol, originMs: performance.timeOrigin });
+  }
+  private hear(message: FromSocket): void {
+    if (message.kind === 'message') return this.onmessage?.(message.data, message.receivedNs);
+    if (message.kind === 'mark') return this.post({ kind: 'passed', number: this.number });
+    this.isOpen = message.kind === 'open';
+    if (message.kind === 'open') return this.onopen?.();
+    present.delete(this.number);
+    this.onclose?.(message.code, message.reason);
   }
   private post(wish: ToSocket, transfer: Transferable[] = []): void {
     this.port.postMessage(wish, transfer);
@@ -98,13 +107,9 @@ export class DistantSocket implements ServerSocket {
   }
   /** Ends it here and now: over a link that is dead the browser's closing handshake takes a minute. */
   drop(code: number, reason: string): void {
-    if (this.isDropped) return;
-    this.isDropped = true;
-    this.close(code);
-    this.onclose?.(code, reason);
-  }
-  close(code: number): void {
+    if (!present.delete(this.number)) return;
     this.isOpen = false;
     this.post({ kind: 'close', number: this.number, code });
+    this.onclose?.(code, reason);
   }
 }
