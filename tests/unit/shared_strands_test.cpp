@@ -298,7 +298,7 @@ TEST_P(SharedStrands, GoOnFromWhatAJoinerIsTold) {
 
 /// Besides the head's field, of which every keyframe tells. `TellsRodsBesideTheirWeight` has the rods.
 TEST(JoiningStrands, TakesFewBitsAVertexInFullQuality) {
-  constexpr double kMostBits = 28.0;
+  constexpr double kMostBits = 25.6;
   SceneDesc scene = scene_of("full");
   scene.head.collider = "spheres";
   Stream stream(scene, true);
