@@ -4,20 +4,26 @@
 
 #include "common/base/check.h"
 #include "common/strands/strand_codec.h"
+#include "server/report/shared_run.h"
 
 namespace strandcast {
 namespace {
+
+/// Whose strands a simulation goes on from.
+enum class Hair { ItsOwn, OfViewers };
 
 /// A strand codec of common/strands, used as server and viewer use it.
 class OwnCodec final : public StreamCodec {
  public:
   static Result<std::unique_ptr<StreamCodec>> make(const std::string& name, float bound_m,
-                                                   std::optional<WindTold> wind, const StreamShape& shape) {
+                                                   std::optional<WindTold> wind, const StreamShape& shape,
+                                                   Hair hair = Hair::ItsOwn) {
     auto codec = std::unique_ptr<OwnCodec>(new OwnCodec(name, shape));
     ASSIGN_OR_RETURN(codec->quantum_m_, lattice_step_m(name, bound_m));
     ASSIGN_OR_RETURN(codec->encoder_, make_strand_encoder(name));
     ASSIGN_OR_RETURN(codec->decoder_, codec->new_decoder());
     if (wind) codec->told_wind_.emplace(*wind);
+    if (hair == Hair::OfViewers) codec->shared_.emplace(codec->quantum_m_);
     codec->encoder_->set_rest_shape(shape.rest_in_head_m);
     return std::unique_ptr<StreamCodec>(std::move(codec));
   }
@@ -26,11 +32,17 @@ class OwnCodec final : public StreamCodec {
   Status take(const StreamFrame& frame) override {
     snapshot_ = on_lattice(frame, quantum_m_);
     if (told_wind_) snapshot_.trail = told_wind_->trail(snapshot_.trail);
+    if (!shared_) return {};
+    snapshot_ = shared_->published(frame);
+    shared_->step(snapshot_);
+    shared_->put_strands(snapshot_);
     return {};
   }
 
   Result<std::vector<std::byte>> encode() override {
+    if (shared_) encoder_->set_state(shared_->copy());
     const EncodedFramePtr frame = encoder_->encode(snapshot_);
+    if (shared_) shared_->follow(encoder_->take_shared(), snapshot_);
     if (!frame) return make_error(ErrorCode::LimitExceeded, "codec '{}': a frame is too large", name_);
     return frame->message;
   }
@@ -41,10 +53,15 @@ class OwnCodec final : public StreamCodec {
   }
 
   std::vector<glm::vec3> decoded() const override { return positions_in_head(*decoded_); }
+  const std::vector<glm::vec3>& meant(const StreamFrame& frame) const override {
+    return shared_ && shared_->is_active() && !shared_->in_head_m().empty() ? shared_->in_head_m()
+                                                                            : frame.position_in_head_m;
+  }
 
   // A viewer that begins with the keyframe must see what all others see.
   Result<size_t> join_bytes(const StreamFrame& frame) override {
     RETURN_IF_ERROR(take(frame));
+    if (shared_) encoder_->set_state(shared_->copy());
     const JoinFrames join = encoder_->encode_for_join(snapshot_);
     if (!join.keyframe) return make_error(ErrorCode::LimitExceeded, "codec '{}': no keyframe", name_);
     ASSIGN_OR_RETURN(const auto joiner, new_decoder());
@@ -71,6 +88,7 @@ class OwnCodec final : public StreamCodec {
   std::unique_ptr<StrandEncoder> encoder_;
   std::unique_ptr<StrandDecoder> decoder_;
   std::optional<ToldWind> told_wind_;
+  std::optional<SharedRun> shared_;
   Snapshot snapshot_;
   std::shared_ptr<const Snapshot> decoded_;
 };
@@ -136,6 +154,17 @@ std::vector<StreamCodecRow> own_stream_codecs(double bound_m) {
     }
   }
   return rows;
+}
+
+StreamCodecRow exact_stream_codec(double bound_m) {
+  StreamCodecRow row;
+  row.name = kExactCodec;
+  row.is_ours = row.is_temporal = true;
+  row.bound_m = bound_m;
+  row.make = [bound_m](const StreamShape& shape) {
+    return OwnCodec::make("step", static_cast<float>(bound_m), std::nullopt, shape, Hair::OfViewers);
+  };
+  return row;
 }
 
 }  // namespace strandcast

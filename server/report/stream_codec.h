@@ -68,6 +68,10 @@ class StreamCodec {
   virtual Status decode(std::span<const std::byte> message) = 0;
   /// Returns the result of the last decode(), (vertex_count x strand_count) as in StreamFrame; not timed.
   virtual std::vector<glm::vec3> decoded() const = 0;
+  /// Returns where the strands of the last take() are: the recording's, unless they go on from the viewers'.
+  virtual const std::vector<glm::vec3>& meant(const StreamFrame& frame) const {
+    return frame.position_in_head_m;
+  }
   /// Returns the bytes that a viewer joining at `frame` needs; ends the stream.
   virtual Result<size_t> join_bytes(const StreamFrame& frame) = 0;
 };
@@ -87,5 +91,9 @@ struct StreamCodecRow {
 /// Returns every strand codec of the project at one bound; a codec that predicts by steps appears once for
 /// each of kWindsTold.
 std::vector<StreamCodecRow> own_stream_codecs(double bound_m);
+inline constexpr const char* kExactCodec = "exact";
+/// Returns "step" where the simulation goes on from its viewers' strands, so that frames are exact. It needs
+/// a solver that viewers can step.
+StreamCodecRow exact_stream_codec(double bound_m);
 
 }  // namespace strandcast

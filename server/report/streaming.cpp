@@ -232,6 +232,7 @@ std::vector<StreamCodecRow> codecs_for(const StreamCase& one) {
   if (one.has_peers) codecs = bound_free_stream_codecs();
   for (const double bound_m : kStreamBoundsM) {
     for (StreamCodecRow& row : own_stream_codecs(bound_m)) codecs.push_back(std::move(row));
+    if (bound_m == kGoalBoundM) codecs.push_back(exact_stream_codec(bound_m));
     if (!one.has_peers || (bound_m != kGoalBoundM && !one.has_curve_of_peers)) continue;
     for (StreamCodecRow& row : peer_stream_codecs(bound_m)) codecs.push_back(std::move(row));
   }
@@ -264,8 +265,12 @@ class StreamingRun {
     StreamRecording& recording = *recorded;
     for (const StreamCodecRow& codec : codecs_for(one)) {
       progress_.begin_run(fmt::format("{}: {}", name, codec.name));
-      ASSIGN_OR_RETURN(StreamingRow row, measure_codec(codec, recording));
-      report_.rows.push_back(std::move(row));
+      const StepTrail* trail = recording.frames.back().published.trail.get();
+      const bool is_stepped = trail != nullptr && trail->model != nullptr;
+      if (codec.name != kExactCodec || is_stepped) {
+        ASSIGN_OR_RETURN(StreamingRow row, measure_codec(codec, recording));
+        report_.rows.push_back(std::move(row));
+      }
       progress_.end_run(codec_cost(one.size));
     }
     // Walking on the first size, or whatever comes first.
@@ -377,7 +382,7 @@ Result<StreamingRow> measure_codec(const StreamCodecRow& codec, const StreamReco
     if (!message) return named(message.error());
     if (auto status = decode.time([&] { return stream.decode(*message); }); !status)
       return named(status.error());
-    errors.add(stream.decoded(), frame.position_in_head_m);
+    errors.add(stream.decoded(), stream.meant(frame));
     (i < kStartFrames ? start_bytes : bytes) += static_cast<double>(message->size());
   }
   auto join_bytes = stream.join_bytes(recording.frames.back());

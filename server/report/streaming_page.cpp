@@ -347,6 +347,10 @@ std::string streaming_page(const StreamingReport& report) {
   HtmlPage page("Streaming strands: what a viewer needs, and what it sees");
   page.answer(needs_text(report));
   page.table(needs_table(report));
+  page.paragraph(
+      "Exact frames are exact: viewers take the simulation's own steps and have its own numbers. All other "
+      "codecs keep vertices within the bound.");
+  page.table(reach_table(report));
   if (const std::string clips = clips_text(report); !clips.empty()) page.paragraph(clips);
   add_view_sections(page, report.view);
   add_playout_section(page, report.playout, report.playout_note);

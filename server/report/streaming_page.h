@@ -27,6 +27,9 @@ Status save_streaming(const StreamingReport& report, const std::filesystem::path
 /// Returns Mbit/s and milliseconds of both sides, at the goals' bound, of each of our codecs and of the best
 /// peers. For the built-in scene and the largest number of vertices, in the first recording of each class.
 HtmlTable needs_table(const StreamingReport& report);
+/// Returns every codec beside the others, at the goals' bound: bits, Mbit/s of more and fewer strands,
+/// milliseconds, and how many strands a phone's browser has time for. Of walking at the largest size.
+HtmlTable reach_table(const StreamingReport& report);
 /// Returns the conclusion in words: the codec with the fewest bits.
 std::string needs_text(const StreamingReport& report);
 /// Returns bits per vertex by bound, of every clip, part, strand model, codec of ours and wind, at the first

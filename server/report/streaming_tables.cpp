@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/scene/scene_desc.h"
 #include "server/report/streaming_goals.h"
@@ -11,6 +12,8 @@
 namespace strandcast {
 namespace {
 
+constexpr double kPhoneSlowdown = 4.0;
+constexpr double kLeastMs = 1e-3;
 constexpr MotionLevel kLevels[] = {MotionLevel::Idle, MotionLevel::Active, MotionLevel::Violent};
 
 bool is_same(const StreamSize& a, const StreamSize& b) {
@@ -153,6 +156,47 @@ HtmlTable needs_table(const StreamingReport& report) {
     table.rows.push_back(needs_row(name, columns, [&, peer_kind = kind](const NeedColumn& column) {
       return peer_in(report, column, peer_kind);
     }));
+  return table;
+}
+
+HtmlTable reach_table(const StreamingReport& report) {
+  constexpr uint32_t kCounts[] = {1'000, 10'000, 100'000};
+  const std::vector<NeedColumn> columns = timed_columns(need_columns(report));
+  HtmlTable table;
+  if (columns.empty()) return table;
+  const NeedColumn& column = *std::max_element(
+      columns.begin(), columns.end(),
+      [](const NeedColumn& a, const NeedColumn& b) { return a.size.vertices() < b.size.vertices(); });
+  table.caption = fmt::format(
+      "Measured with {} vertices, {}; for other counts Mbit/s follow from the bits a vertex, and of exact "
+      "frames stay as they are. A phone's core in a browser is taken as {:g} times slower than one here; a "
+      "viewer gives half of it.",
+      to_string(column.size), to_string(column.level), kPhoneSlowdown);
+  table.columns = {"codec", "bits/vertex"};
+  for (const uint32_t count : kCounts) table.columns.push_back(fmt::format("{} strands: Mbit/s", count));
+  table.columns.insert(table.columns.end(),
+                       {"server, ms", "viewer, ms", "a phone has time for, strands at 60 Hz"});
+  std::vector<const StreamingRow*> rows;
+  for (const StreamingRow& row : report.rows)
+    if (is_needed(report, row) && row.motion == column.motion && is_same(row.size, column.size) &&
+        row.keeps_bound())
+      rows.push_back(&row);
+  std::stable_sort(rows.begin(), rows.end(),
+                   [](const StreamingRow* a, const StreamingRow* b) { return a->bits < b->bits; });
+  for (const StreamingRow* row : rows) {
+    std::vector<HtmlCell> cells = {row->codec_and_wind(), fmt::format("{:.3f}", row->bits)};
+    for (const uint32_t count : kCounts) {
+      const double share =
+          row->codec == kExactCodec ? 1.0 : static_cast<double>(count) / row->size.strand_count;
+      cells.emplace_back(fmt::format("{:.2f}", share * row->mbit_per_s()));
+    }
+    cells.emplace_back(fmt::format("{:.2f}", row->encode_cpu_ms));
+    cells.emplace_back(fmt::format("{:.2f}", row->decode_cpu_ms));
+    const double phone_ms = kPhoneSlowdown * std::max(row->decode_cpu_ms, kLeastMs);
+    const double strands = 0.5 * 1e3 * kStreamFrameS / phone_ms * row->size.strand_count;
+    cells.emplace_back(fmt::format("{:.0f}", 100.0 * std::floor(strands / 100.0)));
+    table.rows.push_back(std::move(cells));
+  }
   return table;
 }
 

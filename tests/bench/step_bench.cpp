@@ -2,9 +2,11 @@
 // the wind, its mean or nothing: bits a vertex, CPU milliseconds of both sides, and the largest error. One
 // thread per side. --classes yes: what every class of strands takes against the first, by both codecs.
 // --shared yes: what an encoder takes while the simulation goes on from its viewers' strands. --recorded yes:
-// what a second of it takes in a recording, and how long its slowest moment takes to show.
+// what a second of it takes in a recording, and how long its slowest moment takes to show. --joined yes: how
+// far hair is from where it would be without a joiner every second.
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
@@ -19,9 +21,9 @@
 #include "server/encode/strand_encode_worker.h"
 #include "server/net/strand_class.h"
 #include "server/record/recorder.h"
+#include "server/report/shared_run.h"
 #include "server/report/stream_codec.h"
 #include "server/report/stream_recording.h"
-#include "server/scene/shared_hair.h"
 #include "server/scene/step_log.h"
 #include "server/sim/executor/lanes_executor.h"
 
@@ -38,6 +40,7 @@ struct Options {
   bool has_classes = false;
   bool has_shared = false;
   bool has_recorded = false;
+  bool has_joined = false;
 };
 
 constexpr size_t kStart = 9;
@@ -117,44 +120,6 @@ Status compare_classes(const StreamRecording& recording, double bound_m) {
   return {};
 }
 
-/// Strands that go on from those of an encoder's viewers, whatever the recording has.
-class SharedRun {
- public:
-  explicit SharedRun(float quantum_m) : quantum_m_(quantum_m) {}
-  bool is_active() const { return hair_.is_active(); }
-  void step(const Snapshot& state) {
-    if (is_active()) hair_.step(state.trail->ticks.back(), *state.trail->scene, 1.0 / kStreamFrameS);
-  }
-  std::shared_ptr<const SharedState> copy() const { return is_active() ? hair_.state() : nullptr; }
-  /// The recording's state with these strands.
-  Snapshot published(const StreamFrame& frame) {
-    Snapshot state = on_lattice(frame, quantum_m_);
-    // As the simulation counts it.
-    state.sim_time_ns = std::llround(static_cast<double>(state.tick) * kStreamFrameS * kNsPerS);
-    auto trail = std::make_shared<StepTrail>(*state.trail);
-    trail->shared = hair_.number();
-    state.trail = trail;
-    return state;
-  }
-  void put_strands(Snapshot& state) {
-    if (!is_active()) return;
-    QuantiseInput input;
-    static_cast<SnapshotInfo&>(input) = state;
-    std::vector<glm::vec3> in_head_m;
-    for (const glm::vec3& point : state_of(hair_.read_blocks()).position_m)
-      in_head_m.emplace_back(glm::conjugate(state.world_from_head.rotation) * glm::dvec3(point));
-    input.position_in_head_m = in_head_m;
-    state = quantise(input).snapshot;
-  }
-  void follow(const std::shared_ptr<SharedUpdate>& update, const Snapshot& state) {
-    if (update != nullptr) hair_.follow(*update, *state.trail, 1.0 / kStreamFrameS);
-  }
-
- private:
-  float quantum_m_;
-  SharedHair hair_;
-};
-
 /// As a recorder asks for keyframes, of strands that are shared or not.
 Status measure_recorded(const StreamRecording& recording, double bound_m, bool shares) {
   const StreamShape& shape = recording.shape;
@@ -209,6 +174,42 @@ Status measure_recorded(const StreamRecording& recording, double bound_m, bool s
       shares ? "shared" : "apart", seconds, exact, 1e-3 * keyframe_bytes / seconds,
       1e-3 * keyframe_bytes / std::max(keyframes - 2.0, 1.0), 1e-3 * delta_bytes / seconds,
       static_cast<double>(longest_ns) * 1e-6);
+  return {};
+}
+
+/// Hair whose viewers somebody joins every second, beside hair that nobody joins.
+Status measure_joined(const StreamRecording& recording, double bound_m) {
+  constexpr size_t kEvery = 60;
+  const StreamShape& shape = recording.shape;
+  ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m("step", static_cast<float>(bound_m)));
+  std::array<SharedRun, 2> runs = {SharedRun(quantum_m), SharedRun(quantum_m)};
+  std::vector<std::unique_ptr<StrandEncoder>> encoders;
+  for (size_t i = 0; i < runs.size(); ++i) {
+    ASSIGN_OR_RETURN(auto encoder, make_strand_encoder("step"));
+    encoder->set_rest_shape(shape.rest_in_head_m);
+    encoders.push_back(std::move(encoder));
+  }
+  for (size_t frame = 0; frame < recording.frames.size(); ++frame) {
+    const bool is_join = frame > 0 && frame % kEvery == 0;
+    for (size_t i = 0; i < runs.size(); ++i) {
+      Snapshot state = runs[i].published(recording.frames[frame]);
+      runs[i].step(state);
+      encoders[i]->set_state(runs[i].copy());
+      runs[i].put_strands(state);
+      if (i == 0 && is_join)
+        encoders[i]->encode_for_join(state);
+      else
+        encoders[i]->encode(state);
+      if (i == 0 || !runs[i].is_active()) runs[i].follow(encoders[i]->take_shared(), state);
+    }
+    if (!is_join || frame == kEvery) continue;
+    const std::vector<glm::vec3>&with = runs[0].in_head_m(), &without = runs[1].in_head_m();
+    double sum_m2 = 0.0;
+    for (size_t i = 0; i < with.size(); ++i) sum_m2 += std::pow(glm::distance(with[i], without[i]), 2);
+    fmt::print("{} joiners: hair {:.4f} mm (rms) and {:.3f} mm (most) from where it would be\n",
+               frame / kEvery - 1, 1e3 * std::sqrt(sum_m2 / static_cast<double>(with.size())),
+               1e3 * largest_error_m(with, without));
+  }
   return {};
 }
 
@@ -274,6 +275,7 @@ Status run(const Options& options) {
     RETURN_IF_ERROR(measure_recorded(recording, options.bound_m, false));
     return measure_recorded(recording, options.bound_m, true);
   }
+  if (options.has_joined) return measure_joined(recording, options.bound_m);
   if (options.has_shared) return measure_shared(recording, options.bound_m);
   if (options.has_classes) return compare_classes(recording, options.bound_m);
   for (const StreamCodecRow& row : own_stream_codecs(options.bound_m)) {
@@ -330,6 +332,7 @@ int main(int argc, char** argv) {
     if (name == "--bound-mm") options.bound_m = 1e-3 * std::stod(value);
     if (name == "--classes") options.has_classes = value == "yes";
     if (name == "--shared") options.has_shared = value == "yes";
+    if (name == "--joined") options.has_joined = value == "yes";
     if (name == "--recorded") options.has_recorded = value == "yes";
     if (name == "--part" && value == "wildest") options.part = MotionPart::Wildest;
     if (name == "--size" &&

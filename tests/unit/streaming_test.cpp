@@ -199,6 +199,28 @@ TEST(WindTold, MoreOfItTakesFewerBits) {
   for (const auto& [codec, value] : bits) fmt::print("{}: {:.3f}\n", codec, value);
 }
 
+/// What frames of strands that are the viewers' take is the same for every count, and next to nothing.
+TEST(ExactCodec, TakesAsMuchForFewStrandsAsForMany) {
+  constexpr double kMostMbit = 0.045;
+  std::vector<double> mbit;
+  for (const uint32_t strand_count : {100u, 400u}) {
+    const auto recording =
+        record_strands({built_in_stream_motions()[1], {strand_count, 16}, 0.5, "", lanes()});
+    ASSERT_TRUE(recording.ok()) << recording.error().to_string();
+    const auto row = measure_codec(exact_stream_codec(kGoalBoundM), *recording);
+    ASSERT_TRUE(row.ok()) << row.error().to_string();
+    EXPECT_TRUE(row->keeps_bound());
+    mbit.push_back(row->mbit_per_s());
+    EXPECT_LT(mbit.back(), kMostMbit);
+    // Counter-example: strands that are not the viewers' are corrected.
+    for (const StreamCodecRow& codec : own_stream_codecs(kGoalBoundM))
+      if (codec.wind == WindTold::Known) {
+        EXPECT_GT(measure_codec(codec, *recording)->mbit_per_s(), kMostMbit);
+      }
+  }
+  EXPECT_NEAR(mbit[0], mbit[1], 0.1 * mbit[0]);
+}
+
 TEST(StreamCodecRows, AskForTheWindOnceOrForEachThatIsTold) {
   std::map<std::string, std::vector<std::string>> winds;
   for (const StreamCodecRow& row : own_stream_codecs(kGoalBoundM))
@@ -646,6 +668,28 @@ TEST(StreamingPage, BeginsWithWhatAViewerNeeds) {
   EXPECT_EQ(walking["best other, positions"], "201.6");
   const std::string page = streaming_page(report);
   EXPECT_LT(page.find("33.6"), page.find("Goals"));
+}
+
+TEST(StreamingPage, HasEveryCodecBesideTheOthers) {
+  StreamingReport report = just_met();
+  StreamingRow exact = row(kExactCodec, MotionLevel::Active, 0.004);
+  exact.is_ours = true;
+  exact.decode_cpu_ms = 5.0;
+  report.rows.push_back(exact);
+  const HtmlTable table = reach_table(report);
+  ASSERT_FALSE(table.rows.empty());
+  std::map<std::string, std::vector<std::string>> cells;
+  for (const auto& line : table.rows) {
+    ASSERT_EQ(line.size(), table.columns.size());
+    for (const HtmlCell& cell : line) cells[line[0].text].push_back(cell.text);
+  }
+  // 160,000 vertices; exact frames do not grow with their count, others do.
+  EXPECT_THAT(cells.at("exact"),
+              testing::ElementsAre("exact", "0.004", "0.04", "0.04", "0.04", testing::_, "5.00", "4100"));
+  EXPECT_EQ(cells.at("tangent")[2], "3.36");
+  EXPECT_EQ(cells.at("tangent")[4], "336.00");
+  EXPECT_TRUE(cells.contains("draco temporal"));
+  EXPECT_THAT(streaming_page(report), HasSubstr("Exact frames are exact"));
 }
 
 TEST(StreamingPage, SaysWhichClipsThereWere) {

@@ -10,8 +10,27 @@
 namespace strandcast::step {
 namespace {
 
-constexpr float kFineVelocityStepMps = 1.0f / 880.0f;  // in three directions: 0.99 mm/s at most
-constexpr float kParentShare = 0.9f;  // of how the vertex before goes on otherwise than its neighbours
+/// How velocities are rounded, and what is expected of a vertex. Edges hardly grow, so that smaller steps
+/// along them cost little and leave more of the bound to those across.
+struct FineRule {
+  float across_mps, along_mps;
+  /// Of how the last three vertices before go on otherwise than their neighbours.
+  std::array<float, 3> share;
+  float reach_squared;  // 0: the nearest steps; else the fewest along an edge that are as near
+};
+constexpr FineRule kFirstRule{1.0f / 880.0f, 1.0f / 880.0f, {0.9f, 0.0f, 0.0f}, 0.0f};
+constexpr float kNearlyHalf = 0.4999f;  // of a step; rounds up what is beyond one
+constexpr float kAcrossMps = 1.0f / 810.0f;
+constexpr float kAlongMps = 1.0f / 1080.0f;
+/// 0.99 mm/s at most.
+constexpr FineRule kRule{kAcrossMps,
+                         kAlongMps,
+                         {1.55f, -1.0f, 0.28f},
+                         0.5f * kAcrossMps* kAcrossMps + 0.25f * kAlongMps* kAlongMps};
+const FineRule& rule_of(Rounding rounding) {
+  return rounding == Rounding::FirstFine ? kFirstRule : kRule;
+}
+
 constexpr float kShortestSquared = 1e-14f;
 constexpr int32_t kStepsOfQuarter = 32;                                // of a turn; a power of two
 constexpr float kTwistTangent = 0.82842712f / float{kStepsOfQuarter};  // of half a step's angle, in the mean
@@ -19,7 +38,7 @@ constexpr uint32_t kTurnMask = uint32_t{4 * kStepsOfQuarter - 1};
 
 /// Of everything that is told finely.
 struct FineTables {
-  std::array<NumberTables, 2> velocity;  // across edges, along them
+  std::array<NumberTables, 3> velocity;  // across edges, along them
   Predictor::ComponentTables component;
 };
 
@@ -75,15 +94,33 @@ int32_t whole_steps_of(float value) {
   return static_cast<int32_t>((within + kRounder) - kRounder);
 }
 
+/// Whole steps for what velocities are beside what is expected of them.
+std::array<int32_t, 3> steps_of(const glm::vec3& apart_mps, const FineRule& rule) {
+  std::array<int32_t, 3> steps = {whole_steps_of(apart_mps.x * (1.0f / rule.across_mps)),
+                                  whole_steps_of(apart_mps.y * (1.0f / rule.across_mps)),
+                                  whole_steps_of(apart_mps.z * (1.0f / rule.along_mps))};
+  const float x = apart_mps.x - rule.across_mps * static_cast<float>(steps[0]);
+  const float y = apart_mps.y - rule.across_mps * static_cast<float>(steps[1]);
+  const float left = rule.reach_squared - (x * x + y * y);
+  if (left <= 0.0f) return steps;
+  const float beyond = std::abs(apart_mps.z) - std::sqrt(left);
+  const auto fewest =
+      beyond > 0.0f ? std::abs(whole_steps_of(beyond * (1.0f / rule.along_mps) + kNearlyHalf)) : 0;
+  if (fewest < std::abs(steps[2])) steps[2] = steps[2] < 0 ? -fewest : fewest;
+  return steps;
+}
+
 }  // namespace
 
-/// Visits the velocities of a slice, in steps beside what is expected from the vertex before and the
-/// neighbours: across an edge how they go on there, along it how fast theirs grow, which is next to nothing.
-/// steps(first, wanted) gives three whole numbers.
+/// Visits the velocities of a slice beside what is expected from the vertices before and the neighbours:
+/// across an edge how they go on there, along it how fast theirs grow, which is next to nothing.
+/// steps(first, apart_mps) gives three whole numbers.
 template <class Steps>
 void Predictor::visit_velocities(uint32_t slice, Steps steps) {
   const tangent::Layout& layout = ground_.layout;
   const uint32_t vertex_count = model_.vertex_count;
+  const FineRule& rule = rule_of(rounding_);
+  const glm::vec3 step_mps(rule.across_mps, rule.across_mps, rule.along_mps);
   const StrandBlocks& position = *moving(PlaneRole::Position);
   StrandBlocks& velocity = *moving(PlaneRole::Velocity);
   const size_t begin = layout.slice_begin[slice];
@@ -97,23 +134,23 @@ void Predictor::visit_velocities(uint32_t slice, Steps steps) {
       beside[i] = near == layout.no_neighbour() ? changes_at(place) - vertex_count : changes_at(near);
     }
     EdgeFrame frame;
-    glm::vec3 apart(0.0f);  // of the vertex before
+    std::array<glm::vec3, 3> apart{};  // of the vertices before, the last one first
     glm::vec3 speed(0.0f);
     for (uint32_t v = 0; v < vertex_count; ++v) {
       const glm::vec4 near = 0.5f * (beside[0][v] + beside[1][v]);
-      const glm::vec3 expected = glm::vec3(near) + kParentShare * apart;
+      const glm::vec3 expected = glm::vec3(near) + ((rule.share[0] * apart[0] + rule.share[1] * apart[1]) +
+                                                    rule.share[2] * apart[2]);
       const glm::vec3 wanted = vector_at(velocity, place, v) - speed;
       if (v > 0) frame.aim(vector_at(position, place, v - 1), vector_at(position, place, v));
       const glm::vec3 about = v > 0 ? frame.parts_of(expected, near.w) : expected;
       const glm::vec3 parts = v > 0 ? frame.parts_of(wanted, dot_of(wanted, frame.along)) : wanted;
-      const std::array<int32_t, 3> found =
-          steps(3 * (place * vertex_count + v), (parts - about) * (1.0f / kFineVelocityStepMps));
+      const std::array<int32_t, 3> found = steps(3 * (place * vertex_count + v), parts - about);
       glm::vec3 rounded;
       for (int i = 0; i < 3; ++i)
-        rounded[i] = about[i] + kFineVelocityStepMps * static_cast<float>(found[static_cast<size_t>(i)]);
+        rounded[i] = about[i] + step_mps[i] * static_cast<float>(found[static_cast<size_t>(i)]);
       const glm::vec3 change = v > 0 ? frame.sum_of(rounded) : rounded;
       changes_at(place)[v] = glm::vec4(change, v > 0 ? rounded.z : 0.0f);
-      apart = v > 0 ? change - glm::vec3(near) : glm::vec3(0.0f);
+      apart = {v > 0 ? change - glm::vec3(near) : glm::vec3(0.0f), apart[0], apart[1]};
       speed += change;
       for (uint32_t axis = 0; axis < 3; ++axis) at(velocity, place, v, axis) = speed[static_cast<int>(axis)];
     }
@@ -135,15 +172,14 @@ void Predictor::forget_history() {
       std::fill_n(velocity.row(block, v, 3), kBlockStrands, 0.0f);
 }
 
-void Predictor::settle_finely(const tangent::Planes<int32_t>& decoded, float quantum_m) {
-  is_fine_ = true;
+void Predictor::settle_finely(const tangent::Planes<int32_t>& decoded, float quantum_m, Rounding rounding) {
+  rounding_ = rounding;
   forget_history();
   put_positions(decoded, quantum_m);
   velocity_steps_.resize(3 * size_t{places_} * model_.vertex_count);
   for_slices(ground_, [&](uint32_t slice) {
-    visit_velocities(slice, [&](size_t first, const glm::vec3& wanted) {
-      std::array<int32_t, 3> found;
-      for (size_t i = 0; i < 3; ++i) found[i] = whole_steps_of(wanted[static_cast<int>(i)]);
+    visit_velocities(slice, [&](size_t first, const glm::vec3& apart_mps) {
+      const std::array<int32_t, 3> found = steps_of(apart_mps, rule_of(rounding_));
       std::copy(found.begin(), found.end(), &velocity_steps_[first]);
       return found;
     });
@@ -187,14 +223,39 @@ Predictor::TwistTurn Predictor::turn_of_fine_steps(int32_t steps) {
   }
 }
 
+/// Visits the steps of a slice's velocities in the order of the stream; code(i, part, beside) has a step's
+/// index, which of the three parts it is, and the sum of sizes beside it: of the two vertices before, of the
+/// neighbours there, and of the part before across the same edge.
+template <class Code>
+void Predictor::visit_steps_beside(uint32_t slice, Code code) const {
+  const tangent::Layout& layout = ground_.layout;
+  const size_t row = 3 * size_t{model_.vertex_count};
+  const size_t begin = layout.slice_begin[slice];
+  const auto size_at = [&](size_t i) { return fold_sign(velocity_steps_[i]); };
+  for (size_t place = begin; place < begin + layout.strands_in[slice]; ++place)
+    for (size_t at = 0; at < row; ++at) {
+      const size_t i = place * row + at;
+      uint32_t sum = (at >= 3 ? 2 * size_at(i - 3) : 0) + (at >= 6 ? size_at(i - 6) : 0);
+      for (const std::vector<uint32_t>& neighbour : layout.neighbour) {
+        const size_t near = neighbour[place];
+        if (near != layout.no_neighbour())
+          sum += size_at(near * row + at);
+        else if (place > begin)
+          sum += size_at(i - row);
+      }
+      if (at % 3 == 1) sum += 2 * size_at(i - 1);
+      code(i, at % 3, sum);
+    }
+}
+
 /// All slices by the same tables, one after the other: learning anew would cost more than they gain by
 /// threads.
 void Predictor::write_fine(ValueWriter& writer) const {
   FineTables tables;
   for (uint32_t slice = 0; slice < ground_.layout.slice_count(); ++slice) {
-    const auto [begin, end] = vertices_of(ground_.layout, slice);
-    for (size_t vertex = begin; vertex < end; ++vertex)
-      for (size_t i = 0; i < 3; ++i) tables.velocity[i / 2].put(velocity_steps_[3 * vertex + i], writer);
+    visit_steps_beside(slice, [&](size_t i, size_t part, uint32_t beside) {
+      tables.velocity[part].put_beside(velocity_steps_[i], beside, writer);
+    });
     write_planes(slice, tables.component, writer);
   }
 }
@@ -203,10 +264,15 @@ void Predictor::read_fine(ValueReader& reader) {
   constexpr auto kMost = static_cast<int32_t>(kMostSteps);
   FineTables tables;
   for (uint32_t slice = 0; slice < ground_.layout.slice_count(); ++slice) {
-    const auto [begin, end] = vertices_of(ground_.layout, slice);
-    for (size_t vertex = begin; vertex < end; ++vertex)
-      for (size_t i = 0; i < 3; ++i)
-        velocity_steps_[3 * vertex + i] = std::clamp(tables.velocity[i / 2].take(reader), -kMost, kMost);
+    if (rounding_ == Rounding::FirstFine) {
+      const auto [begin, end] = vertices_of(ground_.layout, slice);
+      for (size_t i = 3 * begin; i < 3 * end; ++i)
+        velocity_steps_[i] = std::clamp(tables.velocity[i % 3 / 2].take(reader), -kMost, kMost);
+    } else {
+      visit_steps_beside(slice, [&](size_t i, size_t part, uint32_t beside) {
+        velocity_steps_[i] = std::clamp(tables.velocity[part].take_beside(beside, reader), -kMost, kMost);
+      });
+    }
     read_planes(slice, history_s_, tables.component, reader);
   }
 }

@@ -37,6 +37,20 @@ class NumberTables {
     remember(folded);
     return unfold_sign(folded);
   }
+  /// A number by the sum of about five sizes beside it, instead of the preceding ones.
+  void put_beside(int32_t value, uint32_t sum, ValueWriter& writer) {
+    const uint32_t size = size_beside(sum);
+    SymbolStep* next = writer.begin_run(1);
+    writer.put(fold_sign(value), tables_[size], shift_beside(size), next);
+    writer.end_run(next);
+  }
+  int32_t take_beside(uint32_t sum, ValueReader& reader) {
+    const uint32_t size = size_beside(sum);
+    SymbolCursor cursor = reader.begin_run(1);
+    const uint32_t folded = reader.value_of(cursor.take(tables_[size]), shift_beside(size));
+    reader.end_run(cursor);
+    return unfold_sign(folded);
+  }
   void put(int32_t value, ValueWriter& writer) {
     SymbolStep* next = writer.begin_run(1);
     put(value, writer, next);
@@ -57,6 +71,10 @@ class NumberTables {
   uint32_t expected_size() const {
     return std::min<uint32_t>(static_cast<uint32_t>(std::bit_width(before_ + last_)), kSizes - 1);
   }
+  static uint32_t size_beside(uint32_t sum) {
+    return std::min<uint32_t>(static_cast<uint32_t>(std::bit_width(sum)), kSizes - 1);
+  }
+  static uint32_t shift_beside(uint32_t size) { return size > 5 ? size - 5 : 0; }
   static uint32_t shift_of(uint32_t size) { return size > 4 ? size - 4 : 0; }
   void remember(uint32_t folded) {
     constexpr uint32_t kMost = 1u << 30;

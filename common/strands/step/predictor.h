@@ -89,7 +89,7 @@ class Predictor {
   void settle(const tangent::Planes<int32_t>& decoded, float quantum_m);
   /// The same so finely that nobody sees it. What strands remember of the last substep is forgotten: the next
   /// step finds it again.
-  void settle_finely(const tangent::Planes<int32_t>& decoded, float quantum_m);
+  void settle_finely(const tangent::Planes<int32_t>& decoded, float quantum_m, Rounding rounding);
   /// Appends the state for joiners; call settle() or settle_finely() first.
   void write_state(std::vector<std::byte>& bytes) const;
   /// Reads what write_state() wrote, under this pose of the head. BadInput for malformed bytes. Call place()
@@ -155,9 +155,12 @@ class Predictor {
   void settle_planes();
   template <class Steps>
   void visit_velocities(uint32_t slice, Steps steps);
+  template <class Code>
+  void visit_steps_beside(uint32_t slice, Code code) const;
   void place_velocities();
   void forget_history();
   void find_history(const StepInput& first);
+  bool is_fine() const { return rounding_ != Rounding::Coarse; }
   void write_fine(ValueWriter& writer) const;
   void read_fine(ValueReader& reader);
   static void copy_blocks(const std::unique_ptr<StrandBlocks>& from, std::unique_ptr<StrandBlocks>& to);
@@ -185,7 +188,7 @@ class Predictor {
   State state_;
   State saved_;
   // By settle() or settle_finely(), for write_state().
-  bool is_fine_ = false;
+  Rounding rounding_ = Rounding::Coarse;
   std::vector<int32_t> velocity_steps_;  // (places x vertex_count x 3), of settle_finely()
   std::vector<int32_t> twist_steps_;     // (places x vertex_count)
   float history_s_ = 0.0f;               // last substep of strands that remember it

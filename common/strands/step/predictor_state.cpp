@@ -32,8 +32,8 @@ int32_t steps_of(float value, float step) {
 /// In this order on the wire: later ones may be told beside those before.
 std::vector<Predictor::StatePlane> Predictor::state_planes() const {
   std::vector<StatePlane> planes;
-  if (is_fine_ && kernel_.carries_way) return planes;
-  if (!is_fine_)
+  if (is_fine() && kernel_.carries_way) return planes;
+  if (!is_fine())
     planes.push_back({PlaneRole::Velocity, kVelocityStepMps, kernel_.carries_way ? kTensionStepM2ps2 : 0.0f});
   for (const PlaneRole role : kernel_.moving) {
     if (role == PlaneRole::VelocityChange) planes.push_back({role, kChangeStepMps});
@@ -60,7 +60,7 @@ float Predictor::share_history() {
 }
 
 void Predictor::settle(const tangent::Planes<int32_t>& decoded, float quantum_m) {
-  is_fine_ = false;
+  rounding_ = Rounding::Coarse;
   state_.is_body_known = false;  // joiners do not
   put_positions(decoded, quantum_m);
   history_s_ = share_history();
@@ -168,7 +168,7 @@ void Predictor::write_state(std::vector<std::byte>& bytes) const {
     for (int row = 0; row < 3; ++row) to.put(state_.head.turn_per_s[column][row]);
   to.put(state_.head.step_index);
   to.put(history_s_);
-  if (is_fine_) {
+  if (is_fine()) {
     ValueWriter writer;
     write_fine(writer);
     return writer.finish(bytes);
@@ -237,14 +237,14 @@ void Predictor::read_planes(uint32_t slice, float history_s, ComponentTables& ta
   for (size_t place = begin; place < end; ++place)
     component.take_strand(place, reader, [&](uint32_t v, int32_t value) {
       constexpr int32_t kMostFineSteps = 1 << 20;
-      const int32_t most = is_fine_ ? kMostFineSteps : kMostTwistSteps;
+      const int32_t most = is_fine() ? kMostFineSteps : kMostTwistSteps;
       twist_steps_[place * model_.vertex_count + v] = std::clamp(value, -most, most);
     });
 }
 
 Status Predictor::read_state(ByteReader& bytes, const Pose& pose, Rounding rounding) {
-  is_fine_ = rounding == Rounding::Fine;
-  if (is_fine_) velocity_steps_.assign(3 * size_t{places_} * model_.vertex_count, 0);
+  rounding_ = rounding;
+  if (is_fine()) velocity_steps_.assign(3 * size_t{places_} * model_.vertex_count, 0);
   state_.pose = pose;
   state_.head = HeadPath::at_rest(pose.rotation);
   bool are_usable = true;
@@ -260,12 +260,12 @@ Status Predictor::read_state(ByteReader& bytes, const Pose& pose, Rounding round
   if (!bytes.ok() || !are_usable)
     return make_error(ErrorCode::BadInput, "the state that steps go on from is cut off or no numbers");
   twist_steps_.assign(size_t{block_count()} * kBlockStrands * model_.vertex_count, 0);
-  std::vector<ValueReader> readers(is_fine_ ? 1 : ground_.layout.slice_count());
+  std::vector<ValueReader> readers(is_fine() ? 1 : ground_.layout.slice_count());
   for (ValueReader& reader : readers) {
     ASSIGN_OR_RETURN(const auto rest, reader.open(bytes.rest()));
     bytes.take_bytes(bytes.rest().size() - rest.size());
   }
-  if (is_fine_)
+  if (is_fine())
     read_fine(readers.front());
   else
     tangent::for_each_part(tangent::decode_terms(ground_.layout, ground_.workers),
@@ -279,10 +279,10 @@ Status Predictor::read_state(ByteReader& bytes, const Pose& pose, Rounding round
 
 void Predictor::place(const tangent::Planes<int32_t>& decoded, float quantum_m) {
   put_positions(decoded, quantum_m);
-  if (is_fine_) place_velocities();
+  if (is_fine()) place_velocities();
   if (moving(PlaneRole::RodAxis) == nullptr) return;
   twist([](const TwistedAxis&, int32_t steps, int32_t) { return steps; },
-        is_fine_ ? turn_of_fine_steps : turn_of_steps);
+        is_fine() ? turn_of_fine_steps : turn_of_steps);
 }
 
 }  // namespace strandcast::step

@@ -27,8 +27,9 @@ inline constexpr uint8_t kTellingFlags = kStepFlag | kSceneFlag | kModelFlag | k
 inline constexpr uint8_t kFineFlag = 64;
 inline constexpr uint8_t kFlags = kTellingFlags | kSparseFlag | kFineFlag;
 
-/// How what joiners receive is rounded: finely so that nobody sees it.
-enum class Rounding { Coarse, Fine };
+/// How what joiners receive is rounded: finely so that nobody sees it. FirstFine is that of number 13, which
+/// is only read.
+enum class Rounding { Coarse, FirstFine, Fine };
 
 /// Tick and pose of a frame that is predicted.
 struct Moment {
@@ -41,7 +42,8 @@ struct Moment {
 /// How a delta begins.
 struct Beginning {
   uint8_t flags = 0;
-  size_t head_bytes = 0;  // after the check, which covers them: of an exact frame (exact_head.h)
+  size_t head_bytes = 0;           // after the check, which covers them: of an exact frame (exact_head.h)
+  Rounding fine = Rounding::Fine;  // what kFineFlag means
 };
 
 class StepReader {
@@ -63,8 +65,9 @@ class StepReader {
   /// After an anchor: rounds the state to the one that joiners receive.
   virtual void settle(const tangent::History& history) = 0;
   /// Reads a keyframe's state except the positions; it is kept until take_over().
-  /// Returns how everything of the keyframe is rounded.
-  virtual Result<Rounding> read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout) = 0;
+  /// Returns how everything of the keyframe is rounded; `fine`: where it says finely.
+  virtual Result<Rounding> read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout,
+                                      Rounding fine) = 0;
   /// Completes read_state() after the keyframe's positions have become history.
   virtual void take_over(const Moment& now, const tangent::History& history) = 0;
 };

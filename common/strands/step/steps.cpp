@@ -88,7 +88,7 @@ void Steps::step(std::span<const StepTick> ticks, const Moment& now, const tange
 
 void Steps::follow(const Moment& now, const tangent::Frame& frame, const tangent::History& history) {
   const double seconds = static_cast<double>(now.sim_time_ns - last_.sim_time_ns) / kNsPerS;
-  if (is_stepping_ && rounding_ == Rounding::Fine) {
+  if (is_stepping_ && rounding_ != Rounding::Coarse) {
     ++age_;  // strands are placed when they settle
   } else if (is_stepping_ || is_following_) {
     predictor_->correct(
@@ -115,10 +115,10 @@ void Steps::follow_exact(const Moment& now) {
 }
 
 void Steps::settle(const tangent::History& history) {
-  base_ = rounding_ == Rounding::Fine ? base_of(last_, base_.chest) : TickBase{};
+  base_ = rounding_ != Rounding::Coarse ? base_of(last_, base_.chest) : TickBase{};
   if (!predictor_) return;
-  if (rounding_ == Rounding::Fine)
-    predictor_->settle_finely(history.lattice, history.quantum_m);
+  if (rounding_ != Rounding::Coarse)
+    predictor_->settle_finely(history.lattice, history.quantum_m, rounding_);
   else
     predictor_->settle(history.lattice, history.quantum_m);
 }
@@ -410,7 +410,7 @@ Status DecoderSteps::begin(const Beginning& beginning, const Moment& now, const 
   base_ = std::move(base);
   is_stepping_ = is_step;
   is_following_ = is_following;
-  rounding_ = (flags & kFineFlag) != 0 ? Rounding::Fine : Rounding::Coarse;
+  rounding_ = (flags & kFineFlag) != 0 ? beginning.fine : Rounding::Coarse;
   if (!is_step && !is_following) return {};
   step(ticks, now, layout, history);
   if (is_step) std::swap(history.lattice, expected_);
@@ -435,14 +435,14 @@ void DecoderSteps::settle(const tangent::History& history) {
   Steps::settle(history);
 }
 
-Result<Rounding> DecoderSteps::read_state(ByteReader& body, const Moment& now,
-                                          const tangent::Layout& layout) {
+Result<Rounding> DecoderSteps::read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout,
+                                          Rounding fine) {
   joined_ = {};
   const auto kind = body.take<uint8_t>();
   if (kind == kNoState) return Rounding::Coarse;
   if (kind > kFineState) return make_error(ErrorCode::BadInput, "a keyframe has a state of kind {}", kind);
-  const Rounding rounding = kind == kFineState ? Rounding::Fine : Rounding::Coarse;
-  if (rounding == Rounding::Fine) joined_.base = base_of(now, now.bust);
+  const Rounding rounding = kind == kFineState ? fine : Rounding::Coarse;
+  if (rounding != Rounding::Coarse) joined_.base = base_of(now, now.bust);
   ASSIGN_OR_RETURN(joined_.scene, read_scene(body));
   ASSIGN_OR_RETURN(StepModel model,
                    read_model(body, rest_in_head_m_, layout.strand_count, layout.vertex_count));

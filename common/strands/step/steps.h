@@ -142,7 +142,8 @@ class DecoderSteps final : public Steps, public StepReader {
   void finish(const Moment& now, const tangent::Frame& frame, const tangent::History& history) override;
   void finish_exact(const Moment& now) override { follow_exact(now); }
   void settle(const tangent::History& history) override;
-  Result<Rounding> read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout) override;
+  Result<Rounding> read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout,
+                              Rounding fine) override;
   void take_over(const Moment& now, const tangent::History& history) override;
   /// Keeps what the next keyframe tells, for take_shared().
   void keep_shared() { keeps_shared_ = true; }

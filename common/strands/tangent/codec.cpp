@@ -26,7 +26,9 @@ namespace strandcast::tangent {
 namespace {
 
 constexpr uint8_t kTangentNumber = 5;
-constexpr uint8_t kStepNumber = 13;
+constexpr uint8_t kStepNumber = 14;
+/// The same with other steps of what fine anchors round.
+constexpr uint8_t kFirstFineNumber = 13;
 /// Of the release 0.2.0: the same without fine anchors and graded fields.
 constexpr uint8_t kFirstStepNumber = 12;
 constexpr int kTableLevel = 3;
@@ -43,6 +45,10 @@ struct BodyHead {
 enum class Prediction { Motion, Steps };
 constexpr uint8_t codec_number(Prediction prediction) {
   return prediction == Prediction::Steps ? kStepNumber : kTangentNumber;
+}
+
+constexpr step::Rounding fine_of(uint8_t number) {
+  return number == kFirstFineNumber ? step::Rounding::FirstFine : step::Rounding::Fine;
 }
 
 /// What a stream remembers on both sides.
@@ -445,7 +451,7 @@ class Decoder final : public StrandDecoder {
     if (layout_.strand_count == 0) reset_layout({});
     auto snapshot = std::make_shared<Snapshot>(make_snapshot(message));
     if (message.header.opcode == Opcode::StrandKeyframe)
-      RETURN_IF_ERROR(read_keyframe(message, *snapshot));
+      RETURN_IF_ERROR(read_keyframe(message, number, *snapshot));
     else
       RETURN_IF_ERROR(read_delta(message, *snapshot));
     chain_number_ = number;
@@ -460,7 +466,7 @@ class Decoder final : public StrandDecoder {
     const auto told =
         static_cast<uint8_t>(std::to_integer<uint8_t>(bytes[kFrameHeaderBytes]) & ~step::kExactBit);
     if (bytes[0] != std::byte{uint8_t(Opcode::StrandKeyframe)}) return chain_number_;
-    return told == kFirstStepNumber ? told : number_;
+    return told == kFirstStepNumber || told == kFirstFineNumber ? told : number_;
   }
   bool is_exact(std::span<const std::byte> bytes) const {
     return steps_ && bytes.size() > kFrameHeaderBytes &&
@@ -510,7 +516,7 @@ class Decoder final : public StrandDecoder {
     if (steps_) steps_->restart(rest_in_head_m);
   }
 
-  Status read_keyframe(const StrandMessage& message, Snapshot& snapshot) {
+  Status read_keyframe(const StrandMessage& message, uint8_t number, Snapshot& snapshot) {
     Chain chain;
     chain.reset(layout_);
     chain.history.quantum_m = message.fixed.quantum_m;
@@ -520,8 +526,9 @@ class Decoder final : public StrandDecoder {
     const step::Moment moment{snapshot.tick, snapshot.sim_time_ns, snapshot.world_from_head, snapshot.bust};
     frame_.anchor_share = 1.0f;
     if (steps_ && body.ok()) {
-      ASSIGN_OR_RETURN(const step::Rounding rounding, steps_->read_state(body, moment, layout_));
-      if (rounding == step::Rounding::Fine) frame_.anchor_share = kFineShare;
+      ASSIGN_OR_RETURN(const step::Rounding rounding,
+                       steps_->read_state(body, moment, layout_, fine_of(number)));
+      if (rounding != step::Rounding::Coarse) frame_.anchor_share = kFineShare;
     }
     take_into(body, frame_.shape_weights);
     if (!body.ok())
@@ -554,7 +561,9 @@ class Decoder final : public StrandDecoder {
     ByteReader body(message.body);
     ASSIGN_OR_RETURN(const BodyHead head, read_head(body));
     const step::Moment moment{snapshot.tick, snapshot.sim_time_ns, snapshot.world_from_head};
-    if (steps_) RETURN_IF_ERROR(steps_->begin({head.flags}, moment, layout_, body, chain_.history));
+    if (steps_)
+      RETURN_IF_ERROR(
+          steps_->begin({head.flags, 0, fine_of(chain_number_)}, moment, layout_, body, chain_.history));
     Learnt learnt{chain_.tables, chain_.sparse_tables};
     const bool is_sparse = (head.flags & step::kSparseFlag) != 0;
     const Status status = is_sparse ? read_sparse_positions(body, message, snapshot, learnt)
