@@ -99,12 +99,19 @@ bool ClassChoice::has_standing_delay(const Question& question) const {
   return !delays_ns.empty() && median(std::move(delays_ns)) > kLowDelayNs;
 }
 
+/// The first choice, before any strand frame: by what the asset showed. A link seldom changes, and what was
+/// seen to be too much for it would be tried and taken back whenever that is forgotten.
+size_t ClassChoice::begin(const Question& question, int64_t time_ns) {
+  quiet_since_ns_ = time_ns;
+  const size_t chosen = affordable_class(question.present, question.costs, question.allowed_bytes_per_s);
+  if (chosen == question.present) return chosen;
+  failed_class_ = chosen - 1;
+  probe_ns_ = kLongestProbeNs;
+  return chosen;
+}
+
 size_t ClassChoice::choose(const Question& question, int64_t time_ns) {
-  if (quiet_since_ns_ == 0) {
-    // The first choice, before any strand frame: by what the asset showed.
-    quiet_since_ns_ = time_ns;
-    return affordable_class(question.present, question.costs, question.allowed_bytes_per_s);
-  }
+  if (quiet_since_ns_ == 0) return begin(question, time_ns);
   note_demand(question.costs[0], time_ns);
   const bool has_failed = has_failed_try(time_ns);
   if (!question.has_acks || (time_ns - quiet_since_ns_ < kSettleNs && !has_failed)) return question.present;

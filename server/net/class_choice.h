@@ -67,6 +67,7 @@ class ClassChoice {
   bool is_trying(int64_t time_ns) const;
 
  private:
+  size_t begin(const Question& question, int64_t time_ns);
   size_t choose_lower(const Question& question, int64_t time_ns);
   size_t choose_better(const Question& question, int64_t time_ns);
   bool has_failed_try(int64_t time_ns) const;
@@ -85,7 +86,7 @@ class ClassChoice {
   int64_t quiet_since_ns_ = 0;  // the last trouble or change
   int64_t improved_ns_ = 0;     // the last change, if it was for the better
   int64_t probe_ns_ = kFirstProbeNs;
-  size_t failed_class_ = 0;  // that was tried last and failed; probe_ns_ is for it and for better ones
+  size_t failed_class_ = 0;  // that was too much, seen or tried last; probe_ns_ is for it and for better ones
 };
 
 }  // namespace strandcast

@@ -30,6 +30,20 @@ TEST(ClassChoice, TheFirstOneIsTheBestThatIsAffordable) {
   }
 }
 
+// Its knowledge of the link may be forgotten sooner.
+TEST(ClassChoice, WhatTheFirstLookRulesOutIsTriedAfterTheLongestTime) {
+  ClassChoice choice;
+  const size_t begun = choice.choose(at(0, 50e3), kSInNs);
+  ASSERT_GT(begun, 0u);
+  int64_t time_ns = kSInNs;
+  while (choice.choose(at(begun, 0.0), time_ns) == begun) time_ns += 100 * kMsInNs;
+  EXPECT_EQ(time_ns - kSInNs, kLongestProbeNs);
+  ClassChoice free;
+  ASSERT_EQ(free.choose(at(begun, 0.0), kSInNs), begun) << "nothing is known, and nothing ruled out";
+  for (time_ns = kSInNs; free.choose(at(begun, 0.0), time_ns) == begun;) time_ns += 100 * kMsInNs;
+  EXPECT_EQ(time_ns - kSInNs, kFirstProbeNs);
+}
+
 TEST(ClassChoice, OneLossIsNoTroubleAndTwoAre) {
   ClassChoice choice = settled();
   choice.on_chain_loss(kBeginNs);

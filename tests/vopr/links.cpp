@@ -45,6 +45,10 @@ constexpr int64_t kFirstPictureNs = 1'500 * kMs;  // and kRoundTrips
 constexpr int kRoundTrips = 3;
 
 constexpr size_t kMostClasses = 16;
+constexpr size_t kToldChanges = 4;
+// The classes are measured over four turns of the head and back (2 pi / 3 s each).
+constexpr int64_t kWarmUpNs = 4 * kS;
+constexpr int64_t kMeasuredNs = 8'378 * kMs;
 
 /// Written by the process of a link, read by the one that waits for it.
 struct Seen {
@@ -54,6 +58,7 @@ struct Seen {
   size_t first_bytes = 0;  // until then
   size_t found_class = 0;
   size_t changes = 0;
+  int64_t changed_ns[kToldChanges] = {};
   size_t states = 0;
   int64_t oldest_ns = 0;  // from publishing to decoding
   bool has_joined = false;
@@ -143,14 +148,15 @@ void measure(const TestedLink& link, Seen& seen) {
       for (const auto& relay : relays) relay->pump(milliseconds(1));
   };
   world::set_node(kMeasurer);
-  run_until(world::time_ns() + 12 * kS);
+  run_until(world::time_ns() + kWarmUpNs);
   const auto bytes_of = [](LiveConnection& relay) { return totals_of(relay.session()).received_bytes; };
   std::vector<uint64_t> before;
   for (const auto& relay : relays) before.push_back(relay->has_session() ? bytes_of(*relay) : 0);
-  run_until(world::time_ns() + 20 * kS);
+  run_until(world::time_ns() + kMeasuredNs);
   for (size_t i = 0; i < seen.class_count; ++i)
     if (relays[i]->has_session())
-      seen.bytes_per_s[i] = static_cast<double>(bytes_of(*relays[i]) - before[i]) / 20.0;
+      seen.bytes_per_s[i] =
+          static_cast<double>(bytes_of(*relays[i]) - before[i]) * kNsPerS / static_cast<double>(kMeasuredNs);
 }
 
 /// Stands still for kStallNs at random, so that it makes this share of all time.
@@ -184,7 +190,10 @@ void watch(const TestedLink& link, Seen& seen) {
     }
     const size_t now = strand_stream_of(live->session().replay().stream_id()).strand_class;
     if (since_ns < kFoundNs) seen.found_class = now;
-    if (since_ns >= kFoundNs && now != present) ++seen.changes;
+    if (since_ns >= kFoundNs && now != present) {
+      if (seen.changes < kToldChanges) seen.changed_ns[seen.changes] = since_ns;
+      ++seen.changes;
+    }
     present = now;
     if (since_ns < kFoundNs) return;
     ++seen.states;
@@ -225,6 +234,14 @@ std::string broken_rules(const TestedLink& link, const Seen& seen, size_t fittin
   return broken;
 }
 
+std::string change_times(const Seen& seen) {
+  std::string text;
+  for (size_t i = 0; i < std::min(seen.changes, kToldChanges); ++i)
+    text += fmt::format("{} {:.1f}", i == 0 ? ", changes after s:" : "",
+                        static_cast<double>(seen.changed_ns[i]) / kS);
+  return text;
+}
+
 int walk(const std::vector<TestedLink>& links) {
   int broken_links = 0;
   for (const bool has_steps : {false, true}) {
@@ -245,7 +262,7 @@ int walk(const std::vector<TestedLink>& links) {
                  link.round_trip_ns / kMs, link.stalled_share * 100.0, fitting, seen.found_class,
                  seen.changes, seen.first_picture_ns / kMs, seen.first_bytes / 1000, seen.oldest_ns / kMs,
                  static_cast<double>(seen.states) * kNsPerS / kSteadyNs,
-                 broken.empty() ? "" : "  BROKEN:" + broken);
+                 broken.empty() ? "" : "  BROKEN:" + broken + change_times(seen));
       std::fflush(stdout);
     }
   }
