@@ -11,6 +11,9 @@
 
 namespace strandcast {
 
+/// What becomes of guides beside other strands. Where there is nothing but guides, they are the hair.
+enum class GuideUse { LeaveOut, Alone };
+
 inline constexpr size_t kMaxGroupNameChars = 80;  // that are kept of what a file says
 
 /// What files say of strands besides their shape, in their order; a list is empty where they do not say it.

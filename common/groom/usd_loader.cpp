@@ -265,20 +265,24 @@ Result<UsdStage> read_stage(const std::shared_ptr<GroomSource>& source) {
   return read_usda_stage({text.data(), text.size()});
 }
 
-/// Guides that drive other strands are no hair; alone they are.
-void leave_out_guides(StatedGroom& stated, Tally& tally) {
+/// Guides that drive other strands are no hair, unless that is asked for; alone they are.
+void part_guides(StatedGroom& stated, Tally& tally, GuideUse use) {
   const auto guides = std::count(tally.is_guide.begin(), tally.is_guide.end(), uint8_t{1});
   if (guides == 0) return;
   if (static_cast<size_t>(guides) == tally.is_guide.size()) {
     stated.notes.emplace_back("all strands are guides: they are taken as hair");
     return;
   }
-  for (uint8_t& flag : tally.is_guide) flag = 1 - flag;
+  if (use == GuideUse::LeaveOut)
+    for (uint8_t& flag : tally.is_guide) flag = 1 - flag;
   keep_strands(stated.groom, stated.labels, tally.is_guide);
-  stated.notes.push_back(fmt::format("{} guides are left out", guides));
+  stated.notes.push_back(
+      use == GuideUse::Alone
+          ? fmt::format("{} guides are the hair, other strands are left out", guides)
+          : fmt::format("{} guides are left out (groom.file.guides takes them alone)", guides));
 }
 
-Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source) {
+Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source, GuideUse guides) {
   ASSIGN_OR_RETURN(const UsdStage stage, read_stage(source));
   StatedGroom stated;
   stated.groom.offset.push_back(0);
@@ -299,7 +303,7 @@ Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source) {
   stated.unit_reason = "its metersPerUnit says so";
   stated.up_axis_reason = "its upAxis says so";
   stated.notes = notes_of(stage, tally);
-  leave_out_guides(stated, tally);
+  part_guides(stated, tally, guides);
   stated.groom = with_pinning(std::move(stated.groom), Pinning::Root);
   return with_usable_strands(std::move(stated));
 }
@@ -310,14 +314,14 @@ bool is_usd_extension(std::string_view extension) {
   return extension == ".usd" || extension == ".usda" || extension == ".usdc" || extension == ".usdz";
 }
 
-Result<StatedGroom> read_usd(std::string_view file) {
-  return read(std::make_shared<GroomSource>(std::as_bytes(std::span(file))));
+Result<StatedGroom> read_usd(std::string_view file, GuideUse guides) {
+  return read(std::make_shared<GroomSource>(std::as_bytes(std::span(file))), guides);
 }
 
-Result<StatedGroom> load_usd(const std::filesystem::path& path) {
+Result<StatedGroom> load_usd(const std::filesystem::path& path, GuideUse guides) {
   auto source = GroomSource::open(path);
   if (!source) return at(path.string(), source.error());
-  auto stated = read(*source);
+  auto stated = read(*source, guides);
   if (!stated) return at(path.string(), stated.error());
   stated->groom.name = path.stem().string();
   return stated;

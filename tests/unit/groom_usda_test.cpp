@@ -261,7 +261,12 @@ TEST(Usda, GuidesAreNoHairUnlessAllAre) {
       read_with("int[] primvars:groom_guide = [0, 1]\nint[] primvars:groom_id = [7, 8]\n");
   EXPECT_EQ(mixed.groom.offset, (std::vector<uint32_t>{0, 3}));
   EXPECT_EQ(mixed.labels.id, std::vector<int32_t>{7});
-  EXPECT_THAT(mixed.notes, Contains("1 guides are left out"));
+  EXPECT_THAT(mixed.notes, Contains(HasSubstr("1 guides are left out")));
+  const auto alone = read_usd(stage(kLines + "int[] primvars:groom_guide = [0, 1]\n"), GuideUse::Alone);
+  ASSERT_TRUE(alone) << alone.error().to_string();
+  EXPECT_EQ(alone->groom.strand_count(), 1u);
+  EXPECT_NE(alone->groom.rest_position_m, mixed.groom.rest_position_m);
+  EXPECT_THAT(alone->notes, Contains(HasSubstr("1 guides are the hair")));
   for (const char* const all : {"int[] primvars:groom_guide = [1, 1]\n", "int primvars:groom_guide = 1\n",
                                 "uniform token purpose = \"guide\"\n"}) {
     const StatedGroom guides = read_with(all);

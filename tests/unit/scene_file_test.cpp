@@ -30,7 +30,7 @@ SceneDesc unusual_scene() {
   FileGroomDesc file{.path = "../a folder/x.tfx",
                      .more_paths = {"b.tfx", "/c.hair"},
                      .unit_m = 0.1f,
-                     .up_axis = UpAxis::Z,
+                     .up_axis = UpAxis::MinusZ,
                      .has_up_axis = true,
                      .yaw_deg = -37.5f,
                      .has_yaw = true,
@@ -38,6 +38,7 @@ SceneDesc unusual_scene() {
                      .has_origin = true};
   file.vertex_count = 24;
   file.strand_vertex_count = 100;
+  file.guides = true;
   file.pinning = Pinning::BothEnds;
   file.has_pinning = true;
   s.groom = file;
