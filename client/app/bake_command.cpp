@@ -25,7 +25,8 @@ bool is_of_curves(const std::string& motion) {
 /// What is fed, in motion time, but for the motion of curves. Who names no motion holds the head still.
 Result<FeedPlan> bake_plan(const BakeCommand& command) {
   FeedOptions options = command.feed;
-  options.blend_s = 0.0;  // the lead does that, so that frames stay at the clip's times
+  options.is_keeping_facing = true;  // for a program that has the clip itself
+  options.blend_s = 0.0;             // the lead does that, so that frames stay at the clip's times
   if (options.wind == kSceneWind) options.wind = "none";
   if (is_of_curves(options.motion)) options.motion = "none";
   FeedPlan plan;
