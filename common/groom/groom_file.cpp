@@ -67,20 +67,20 @@ Error call_text(const std::filesystem::path& path, Error error) {
                                       path.extension().string(), hint));
 }
 
-Result<StatedGroom> unstated(const std::filesystem::path& path, Result<Groom> groom) {
-  if (groom) {
-    auto usable = with_usable_strands({.groom = std::move(groom).value()});
+Result<StatedGroom> usable(const std::filesystem::path& path, Result<StatedGroom> stated) {
+  if (stated) {
+    auto usable = with_usable_strands(std::move(stated).value());
     return usable ? usable : call_text(path, at(path.string(), usable.error()));
   }
-  return groom.error().code == ErrorCode::NotFound ? groom.error() : call_text(path, groom.error());
+  return stated.error().code == ErrorCode::NotFound ? stated.error() : call_text(path, stated.error());
 }
 
 Result<StatedGroom> load_by_extension(const std::filesystem::path& path, const GroomFileOptions& options) {
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (extension == ".tfx") return unstated(path, load_tfx(path));
-  if (extension == ".hair") return unstated(path, load_hair(path));
+  if (extension == ".tfx") return usable(path, load_tfx(path));
+  if (extension == ".hair") return usable(path, load_hair(path));
   if (extension == ".abc") return load_abc(path, options.guides);
   if (extension == ".ply") return load_ply(path, options.strand_vertex_count);
   if (is_usd_extension(extension)) return load_usd(path, options.guides);
