@@ -178,6 +178,10 @@ std::vector<std::string> StrandSet::names() const {
   return names;
 }
 
+HairMaterial StrandSet::material() const {
+  return scene_.origin ? scene_.origin->material.scaled(1.0 / options_.unit_m) : HairMaterial{};
+}
+
 uint32_t StrandSet::collapsed_count(std::span<const glm::dvec3> points) const {
   uint32_t collapsed = 0;
   size_t begin = 0;

@@ -49,6 +49,8 @@ class StrandSet {
   std::vector<int16_t> guides() const;
   /// Returns the name of the curves that each strand belongs to; empty if no file says it.
   std::vector<std::string> names() const;
+  /// Returns what the hair is made of, in kg and the file's lengths; nothing if no file says it.
+  HairMaterial material() const;
   /// Counts the strands that have no length in points of a frame, having lost it since the first one.
   uint32_t collapsed_count(std::span<const glm::dvec3> points) const;
 

@@ -144,6 +144,7 @@ Result<StatedGroom> load_parts(const GroomFileOptions& options) {
       return at(path.string(), same.error());
     if (const Status same = agree(whole.is_z_up, part.is_z_up, "up axis"); !same)
       return at(path.string(), same.error());
+    if (!whole.material.is_known()) whole.material = part.material;
     if (!whole.unit_m) whole.unit_reason = part.unit_reason;
     if (!whole.is_z_up) whole.up_axis_reason = part.up_axis_reason;
     if (part.unit_m) whole.unit_m = part.unit_m;
@@ -213,6 +214,29 @@ std::string pin_alike(Groom& groom) {
       freed, groom.strand_count(), root, tip);
 }
 
+/// What strands can be made of; the rest is left out and named.
+HairMaterial usable_material(HairMaterial material, std::vector<std::string>& notes) {
+  std::string taken;
+  const auto judge = [&](std::optional<double>& value, double least, double most, const char* what) {
+    if (!value) return;
+    const bool is_usable = *value >= least && *value <= most;
+    if (is_usable)
+      taken += fmt::format("{}{} {:.4g}", taken.empty() ? "" : ", ", what, *value);
+    else
+      notes.push_back(
+          fmt::format("its {} {:.4g} is left out: {:g} to {:g} can be", what, *value, least, most));
+    if (!is_usable) value.reset();
+  };
+  judge(material.diameter, 2e-6, 2e-2, "diameter in m");
+  judge(material.young_modulus, 0.0, 1e16, "Young's modulus in Pa");
+  judge(material.density, 1.0, 1e5, "density in kg/m^3");
+  judge(material.poisson_ratio, -0.9, 0.5, "Poisson's ratio");
+  if (!taken.empty())
+    notes.push_back(
+        fmt::format("it is made of: {} (direct_rod takes it; solver.parameters overrides it)", taken));
+  return material;
+}
+
 std::string size_text(const Groom& groom) {
   const glm::vec3 size_m = size_of(groom);
   return fmt::format("{:.2f} x {:.2f} x {:.2f} m", size_m.x, size_m.y, size_m.z);
@@ -277,6 +301,7 @@ PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
     note(fmt::format("1 unit = {}", unit_text(guess.value)),
          guess.reason.empty() ? "the roots say nothing of a head" : guess.reason, "unit_m");
   }
+  placed.material = usable_material(stated.material.scaled(placement.unit_m), placed.notes);
   placed.is_of_head = is_hair_of_head(groom);
   placement.origin = options.origin;
   GroomPlacement rest = placement;  // upright by now

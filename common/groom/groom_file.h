@@ -36,6 +36,7 @@ struct GroomFileOptions {
 struct PlacedGroom {
   Groom groom;
   StrandLabels labels;  // of its strands and vertices
+  HairMaterial material;
   GroomPlacement placement;
   bool is_of_head = true;     // its roots might be those of a head
   std::string unlikely_unit;  // why no head has hair in this unit, and which one fits; empty: it may

@@ -12,6 +12,10 @@
 
 namespace strandcast {
 
+/// Properties of curves in the proposal for deformable bodies of USD's physics.
+inline constexpr std::string_view kUsdRestPoints = "physics:restShapePoints";
+inline constexpr std::string_view kUsdThicknesses = "physics:thicknesses";
+
 /// Whether this is ".usd", ".usda", ".usdc" or ".usdz".
 bool is_usd_extension(std::string_view extension);
 

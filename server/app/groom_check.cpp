@@ -128,6 +128,7 @@ namespace {
 Result<std::string> step_groom(SceneDesc scene, const SceneContent& content, const MeasureConfig& config) {
   RuntimeFacts facts;
   facts.strand_viewers = 1;
+  scene = with_material(std::move(scene), content.material);
   scene.stream.codec = "raw";  // what is sent is no matter here
   ASSIGN_OR_RETURN(const Measured measured, measure_passes(scene, content, facts, config));
   ASSIGN_OR_RETURN(const std::vector<std::string> said, explain_groom(scene, content.groom));

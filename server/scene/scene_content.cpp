@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "common/groom/bust_skin.h"
@@ -119,6 +120,16 @@ std::vector<SphereCollider> colliders_of(const SceneDesc& scene,
   return scene.has_auto_collider ? head_colliders : std::vector<SphereCollider>{};
 }
 
+SceneDesc with_material(SceneDesc scene, const HairMaterial& material) {
+  if (scene.solver.name != "direct_rod") return scene;
+  for (const auto& [parameter, value, factor] : {std::tuple("radius_m", material.diameter, 0.5),
+                                                 {"young_modulus_pa", material.young_modulus, 1.0},
+                                                 {"density_kgpm3", material.density, 1.0},
+                                                 {"poisson_ratio", material.poisson_ratio, 1.0}})
+    if (value) scene.solver.parameters.emplace(parameter, factor * *value);
+  return scene;
+}
+
 Result<SceneContent> load_scene_content(const SceneDesc& scene) {
   SceneContent content;
   GroomPlacement placement;
@@ -128,6 +139,7 @@ Result<SceneContent> load_scene_content(const SceneDesc& scene) {
     content.groom = hair.simulated();
     content.notes = std::move(hair.placed.notes);
     content.unlikely_unit = std::move(hair.placed.unlikely_unit);
+    content.material = hair.placed.material;
     placement = hair.placed.placement;
     // Fur gets none, unless somebody says where it is.
     has_head = hair.placed.is_of_head || !scene.head.mesh_path.empty() || scene.head.has_center;

@@ -327,6 +327,18 @@ TEST(SceneContent, FurGetsNoHeadUnlessOneIsStated) {
   EXPECT_FALSE(stated->colliders.empty());
 }
 
+TEST(SceneContent, ARodTakesWhatItsFileSaysAndTheSceneGoesBefore) {
+  SceneDesc scene = built_in_scene();
+  scene.solver = {"direct_rod", {{"density_kgpm3", 1100.0}}};
+  const HairMaterial material{8e-5, 2e9, 1250.0, {}};
+  const std::map<std::string, double> expected = {
+      {"radius_m", 4e-5}, {"young_modulus_pa", 2e9}, {"density_kgpm3", 1100.0}};
+  EXPECT_EQ(with_material(scene, material).solver.parameters, expected);
+  EXPECT_EQ(with_material(scene, {}).solver.parameters, scene.solver.parameters);
+  scene.solver = {"dftl", {}};
+  EXPECT_TRUE(with_material(scene, material).solver.parameters.empty());
+}
+
 TEST(SceneContent, MissingFilesAreNamed) {
   SceneDesc scene = built_in_scene();
   FileGroomDesc file;
