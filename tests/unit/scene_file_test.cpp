@@ -394,7 +394,7 @@ TEST(SceneFile, OverrideErrorsNameTheAssignmentAndKnownFields) {
   EXPECT_THAT(error_of("", {"camera=3"}), HasSubstr("known: offset_m, target_m, fov_y_rad"));
   EXPECT_THAT(error_of("", {"camera={ fov_y_rad: 9 }"}),
               StartsWith("--set camera={ fov_y_rad: 9 }: camera.fov_y_rad"));
-  EXPECT_THAT(error_of("", {"groom.file.up_axis=X"}), HasSubstr("(known: Y, Z)"));
+  EXPECT_THAT(error_of("", {"groom.file.up_axis=X"}), HasSubstr("(known: Y, Z, MINUS_Y, MINUS_Z)"));
   EXPECT_THAT(error_of("", {"colliders.5.radius_m=1"}), HasSubstr("not an index"));
   EXPECT_THAT(error_of("", {"colliders.-1.radius_m=1"}), HasSubstr("not an index"));
   EXPECT_THAT(error_of("", {"colliders.99999999999999999999.radius_m=1"}), HasSubstr("not an index"));
