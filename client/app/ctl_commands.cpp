@@ -87,7 +87,7 @@ double mean_facing_rad(const MotionClip& clip) {
 
 /// What is called front, left, right and back of the head is so of the clip's mean facing. Returns the turn.
 glm::dquat turned_ahead(MotionClip& clip) {
-  constexpr double kAsideRad = 0.35;  // less shows the face from the front
+  constexpr double kAsideRad = 0.02;  // less is ahead
   const double facing_rad = mean_facing_rad(clip);
   if (std::abs(facing_rad) < kAsideRad) return {1, 0, 0, 0};
   const Pose turn{{}, glm::angleAxis(-facing_rad, glm::dvec3(0, 1, 0))};

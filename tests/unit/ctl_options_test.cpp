@@ -17,7 +17,7 @@ inline void tell(FieldTexts& told, const std::string& where, const MotionFileOpt
                 is_keeping_first_frames);
 }
 inline void tell(FieldTexts& told, const std::string& where, const FeedOptions& all) {
-  OPTION_FIELDS(all, motion, wind, motion_file, is_keeping_facing, is_looped, blend_s, is_live, speed,
+  OPTION_FIELDS(all, motion, wind, motion_file, is_looped, is_keeping_facing, blend_s, is_live, speed,
                 seconds, rate_hz, timecode, ltc, fps, wind_mps, gust_intensity, seed, as, to);
 }
 inline void tell(FieldTexts& told, const std::string& where, const ExportCommand& all) {
