@@ -146,7 +146,7 @@ std::vector<std::string> server_words(const BakeCommand& command) {
   for (size_t i = 0; i + 1 < paths.size(); ++i) words.insert(words.end(), {"--groom", paths[i]});
   // All strands at every step, as near to what was simulated as a stream gets.
   for (const char* const assignment : {"detail.mode=off", "detail.simulated_share=1", "stream.codec=delta",
-                                       "stream.bound_m=2e-5", "stream.strand_rate_hz=0"})
+                                       "stream.bound_m=1e-6", "stream.strand_rate_hz=0"})
     set(assignment);
   for (const std::string& assignment : command.overrides) set(assignment);
   return words;

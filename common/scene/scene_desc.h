@@ -210,7 +210,7 @@ struct CameraDesc {
 struct StreamDesc {
   std::string codec = "step";  // "step" (fewest bits), "tangent", "delta" (least time) or "raw"
   bool has_codec = false;      // false: nobody chose; a server may take another where it costs too much
-  float bound_m = 1e-4f;       // announced Euclidean error bound, 2e-5 .. 5e-4
+  float bound_m = 1e-4f;       // announced Euclidean error bound, 1e-6 .. 5e-4
   uint32_t frame_width = 640, frame_height = 360;
   uint32_t jpeg_quality = 80;
   double frame_rate_hz = 15.0;  // rendered frames, at most

@@ -75,7 +75,7 @@ inline constexpr Range kGustLength{0.1, 1000.0, "m"};
 inline constexpr Range kFraction{0.0, 1.0, ""};
 inline constexpr Range kDirection{-1e3, 1e3, ""};
 inline constexpr Range kHeadPlace{-1000.0, 1000.0, "m"};
-inline constexpr Range kStreamBound{2e-5, 5e-4, "m"};
+inline constexpr Range kStreamBound{1e-6, 5e-4, "m"};
 inline constexpr Range kFrameWidth{kMinPictureSide, kMaxPictureWidth, "pixels"};
 inline constexpr Range kFrameHeight{kMinPictureSide, kMaxPictureHeight, "pixels"};
 inline constexpr Range kJpegQuality{1, 100, ""};

@@ -23,7 +23,7 @@ using testing::HasSubstr;
 
 constexpr double kClipRateHz = 60.0, kFps = 30.0;
 constexpr int kClipFrames = 31;
-constexpr double kBoundM = 2e-5 + 2e-6;  // of the stream, and what a file of floats rounds
+constexpr double kBoundM = 1e-6 + 2e-7;  // of the stream, and what a file of floats rounds
 
 class Bake : public testing::Test {
  protected:

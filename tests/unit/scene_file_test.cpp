@@ -316,11 +316,11 @@ TEST(SceneFile, RangeErrorsNamePlacePathValueAndRange) {
 
 TEST(SceneFile, RangeEndsAreIncluded) {
   for (const char* text :
-       {"stream { bound_m: 2e-5 }", "stream { bound_m: 5e-4 }", "step_rate_hz: 1000",
+       {"stream { bound_m: 1e-6 }", "stream { bound_m: 5e-4 }", "step_rate_hz: 1000",
         "groom { procedural { length_m: 0.005 } }", "groom { procedural { strand_count: 200000 } }"})
     EXPECT_EQ(error_of(text), "no error") << text;
   for (const char* text :
-       {"stream { bound_m: 1.99e-5 }", "stream { bound_m: 5.01e-4 }", "step_rate_hz: 1000.001"})
+       {"stream { bound_m: 9.9e-7 }", "stream { bound_m: 5.01e-4 }", "step_rate_hz: 1000.001"})
     EXPECT_NE(error_of(text), "no error") << text;
 }
 
