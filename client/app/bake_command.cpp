@@ -25,7 +25,8 @@ bool is_of_curves(const std::string& motion) {
 /// What is fed, in motion time, but for the motion of curves. Who names no motion holds the head still.
 Result<FeedPlan> bake_plan(const BakeCommand& command) {
   FeedOptions options = command.feed;
-  options.blend_s = 0.0;  // the lead does that, so that frames stay at the clip's times
+  options.is_keeping_facing = true;  // for a program that has the clip itself
+  options.blend_s = 0.0;             // the lead does that, so that frames stay at the clip's times
   if (options.wind == kSceneWind) options.wind = "none";
   if (is_of_curves(options.motion)) options.motion = "none";
   FeedPlan plan;
@@ -145,7 +146,7 @@ std::vector<std::string> server_words(const BakeCommand& command) {
   for (size_t i = 0; i + 1 < paths.size(); ++i) words.insert(words.end(), {"--groom", paths[i]});
   // All strands at every step, as near to what was simulated as a stream gets.
   for (const char* const assignment : {"detail.mode=off", "detail.simulated_share=1", "stream.codec=delta",
-                                       "stream.bound_m=2e-5", "stream.strand_rate_hz=0"})
+                                       "stream.bound_m=1e-6", "stream.strand_rate_hz=0"})
     set(assignment);
   for (const std::string& assignment : command.overrides) set(assignment);
   return words;

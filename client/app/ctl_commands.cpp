@@ -76,7 +76,27 @@ double wrapped(double t_s, double duration_s, bool is_looped) {
   return is_looped && duration_s > 0.0 ? std::fmod(t_s, duration_s) : t_s;
 }
 
-Status add_motion(const FeedOptions& options, FeedPlan& plan, double& length_s) {
+/// Where the head looks on the mean, rad from +Z towards +X; 0 where it looks all around.
+double mean_facing_rad(const MotionClip& clip) {
+  constexpr double kLeastTogether = 0.5;
+  glm::dvec3 sum(0.0);
+  for (const Pose& pose : clip.world_from_head) sum += pose.rotation * glm::dvec3(0, 0, 1);
+  const double count = static_cast<double>(clip.world_from_head.size());
+  return std::hypot(sum.x, sum.z) < kLeastTogether * count ? 0.0 : std::atan2(sum.x, sum.z);
+}
+
+/// What is called front, left, right and back of the head is so of the clip's mean facing. Returns the turn.
+glm::dquat turned_ahead(MotionClip& clip) {
+  constexpr double kAsideRad = 0.02;  // less is ahead
+  const double facing_rad = mean_facing_rad(clip);
+  if (std::abs(facing_rad) < kAsideRad) return {1, 0, 0, 0};
+  const Pose turn{{}, glm::angleAxis(-facing_rad, glm::dvec3(0, 1, 0))};
+  for (Pose& pose : clip.world_from_head) pose = {turn * pose.position_m, turn.rotation * pose.rotation};
+  return turn.rotation;
+}
+
+/// Adds motion; `turn` is what it was turned by.
+Status add_motion(const FeedOptions& options, FeedPlan& plan, double& length_s, glm::dquat& turn) {
   if (options.motion == "none") return {};
   if (options.motion == "builtin") {
     plan.motion = [blend_s = options.blend_s](double t_s) {
@@ -92,6 +112,12 @@ Status add_motion(const FeedOptions& options, FeedPlan& plan, double& length_s) 
   }
   ASSIGN_OR_RETURN(MotionFile loaded, load_motion_file(options.motion, file));
   for (const std::string& note : loaded.notes) std::cerr << note << '\n';
+  if (!options.is_keeping_facing) turn = turned_ahead(loaded.clip);
+  if (turn.w < 1.0)
+    std::cerr << fmt::format(
+        "{}: turned by {:.0f} degrees, and a file of wind with it: then the head looks ahead "
+        "on the mean (--keep-facing leaves it)\n",
+        options.motion, glm::degrees(2.0 * std::atan2(turn.y, turn.w)));
   const auto path = std::make_shared<const ClipPath>(std::move(loaded.clip),
                                                      ClipPathOptions{options.is_looped, options.blend_s});
   length_s = path->duration_s();
@@ -111,7 +137,7 @@ Status add_motion(const FeedOptions& options, FeedPlan& plan, double& length_s) 
   return {};
 }
 
-Status add_wind(const FeedOptions& options, FeedPlan& plan) {
+Status add_wind(const FeedOptions& options, FeedPlan& plan, const glm::dquat& turn) {
   if (options.wind == "none") return {};
   if (options.wind == "gusts") {
     auto gusts = std::make_shared<const GustGenerator>(options.wind_mps, options.gust_intensity, kGustLengthM,
@@ -122,8 +148,9 @@ Status add_wind(const FeedOptions& options, FeedPlan& plan) {
   ASSIGN_OR_RETURN(WindSeries loaded, load_wind_csv(options.wind));
   for (const std::string& repair : loaded.repairs) std::cerr << options.wind << ": " << repair << '\n';
   auto series = std::make_shared<const WindSeries>(std::move(loaded));
-  plan.wind = [series, is_looped = options.is_looped](double t_s) {
-    return series->sample(wrapped(t_s, series->duration_s(), is_looped));
+  plan.wind = [series, turn, is_looped = options.is_looped](double t_s) {
+    const glm::dvec3 wind_mps(series->sample(wrapped(t_s, series->duration_s(), is_looped)));
+    return glm::vec3(turn * wind_mps);
   };
   return {};
 }
@@ -149,8 +176,9 @@ Result<FeedPlan> make_feed_plan(const FeedOptions& options) {
     ASSIGN_OR_RETURN(plan.timecode, open_ltc(options.ltc, fps));
   }
   double length_s = 0.0;  // of a motion file; 0 = without end
-  RETURN_IF_ERROR(add_motion(options, plan, length_s));
-  RETURN_IF_ERROR(add_wind(options, plan));
+  glm::dquat turn(1, 0, 0, 0);
+  RETURN_IF_ERROR(add_motion(options, plan, length_s, turn));
+  RETURN_IF_ERROR(add_wind(options, plan, turn));
   if (!plan.motion && !plan.wind && !plan.timecode)
     return make_error(ErrorCode::BadInput, "nothing to feed: both --motion and --wind are none");
   plan.is_live = options.is_live;

@@ -39,6 +39,7 @@ struct FeedOptions {
   std::string wind = "gusts";      // "gusts", "none" or a CSV file
   MotionFileOptions motion_file;   // how to read a BVH file
   bool is_looped = false;
+  bool is_keeping_facing = false;  // else a file that looks aside is turned to look ahead
   double blend_s = kClipBlendS;  // in which a motion sets in; 0: at once, and a loop jumps from end to start
   bool is_live = false;          // does not wait for a slow simulation
   double speed = 1.0;

@@ -24,6 +24,8 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
   app.add_option("--motion", feed.motion, "BVH file, builtin or none")->capture_default_str();
   app.add_option("--wind", feed.wind, "CSV file, gusts or none")->capture_default_str();
   declare_motion_file(app, feed.motion_file, "--");
+  app.add_flag("--keep-facing", feed.is_keeping_facing,
+               "Do not turn a BVH file that looks aside so that it looks ahead on the mean");
   app.add_flag("--loop", feed.is_looped,
                "Start over at the end of the files; the head is led back to where the motion begins");
   app.add_flag(

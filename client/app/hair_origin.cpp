@@ -76,6 +76,7 @@ Result<HairOrigin> load_origin(const FileGroomDesc& file, const SceneAsset& asse
   strands->object = in_order(labels.object, hair.order);
   strands->object_name = labels.object_name;
   strands->root_uv = in_order(hair.placed.groom.root_uv, hair.order);
+  strands->material = hair.placed.material;
   for (size_t i = 0; !labels.width.empty() && i < hair.order.size(); ++i) {
     const auto first = labels.width.begin() + hair.placed.groom.offset[hair.order[i]];
     strands->width_m.insert(strands->width_m.end(), first, first + asset.vertex_count);

@@ -172,6 +172,12 @@ class AbcWriter : public StrandWriter {
                         param_metadata("uni", "", 1, "int16_t"), strands_.guides()));
     RETURN_IF_ERROR(add(entries, "groom_id", AbcForm::Array, AbcType::I32, 1,
                         param_metadata("uni", "", 1, "int32_t"), strands_.ids()));
+    if (const StrandSet::Influence influence = strands_.influence(); !influence.id.empty()) {
+      RETURN_IF_ERROR(add(entries, "groom_closest_guides", AbcForm::Array, AbcType::I32, 3,
+                          param_metadata("uni", "", 3, "int32_t"), influence.id));
+      RETURN_IF_ERROR(add(entries, "groom_guide_weights", AbcForm::Array, AbcType::Float, 3,
+                          param_metadata("uni", "", 3, "float32_t"), influence.share));
+    }
     return add(entries, "groom_root_uv", AbcForm::Array, AbcType::Float, 2,
                param_metadata("uni", ";interpretation=vector", 2, "float32_t"), strands_.root_uv());
   }

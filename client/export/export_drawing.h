@@ -7,10 +7,17 @@
 
 namespace strandcast {
 
+/// Simulated strands that a drawn one hangs between, and how much on each; the shares sum to 1.
+struct ExportGuides {
+  glm::uvec3 strand{0};
+  glm::vec3 share{1.0f, 0.0f, 0.0f};
+};
+
 /// Points of strands, strand after strand, root first.
 struct ExportShape {
-  std::vector<uint32_t> first_point;  // (strand_count + 1)
-  std::vector<float> width_m;         // (point_count) diameter
+  std::vector<uint32_t> first_point;      // (strand_count + 1)
+  std::vector<float> width_m;             // (point_count) diameter
+  std::vector<ExportGuides> guides = {};  // (strand_count) of each; empty: not known
 };
 
 class ExportDrawing {

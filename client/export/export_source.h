@@ -10,6 +10,7 @@
 #include "client/export/export_drawing.h"
 #include "client/export/timecode_track.h"
 #include "common/base/result.h"
+#include "common/groom/stated_groom.h"
 #include "common/strands/scene_asset.h"
 #include "common/strands/snapshot.h"
 
@@ -24,6 +25,7 @@ struct ExportOrigin {
   std::vector<std::string> object_name;  // of them
   std::vector<glm::vec2> root_uv;        // (strand_count)
   std::vector<float> width_m;            // (strand_count x vertex_count) strand after strand
+  HairMaterial material;                 // in metres
 };
 
 /// Data that is the same for all states.

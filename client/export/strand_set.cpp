@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "common/math/point_tree.h"
 
@@ -29,6 +30,10 @@ ExportShape simulated_shape(const ExportScene& scene) {
 }
 
 void append(ExportShape& shape, const ExportShape& more) {
+  // Strands before these hang on themselves.
+  for (auto own = static_cast<uint32_t>(shape.guides.size()); own + 1 < shape.first_point.size(); ++own)
+    shape.guides.push_back({glm::uvec3(own)});
+  shape.guides.insert(shape.guides.end(), more.guides.begin(), more.guides.end());
   const auto first = static_cast<uint32_t>(shape.width_m.size());
   for (size_t strand = shape.first_point.empty() ? 0 : 1; strand < more.first_point.size(); ++strand)
     shape.first_point.push_back(first + more.first_point[strand]);
@@ -170,12 +175,38 @@ std::vector<int16_t> StrandSet::guides() const {
   return guides;
 }
 
+StrandSet::Influence StrandSet::influence() const {
+  Influence influence;
+  if (options_.role != ExportRole::Followers || shape_.guides.size() + 1 != shape_.first_point.size())
+    return influence;
+  const std::vector<int32_t> ids = this->ids();
+  std::vector<std::optional<int32_t>> id_of_key(key_count_);  // of those that are not left out
+  for (size_t i = 0; i < members_.size(); ++i)
+    if (members_[i].is_key) id_of_key[members_[i].key] = ids[i];
+  for (const Member& member : members_) {
+    const ExportGuides& guides = shape_.guides[member.strand];
+    float sum = 0.0f;
+    for (int k = 0; k < 3; ++k)
+      if (id_of_key[guides.strand[k]]) sum += guides.share[k];
+    for (int k = 0; k < 3; ++k) {
+      const std::optional<int32_t> id = id_of_key[guides.strand[k]];
+      influence.id.push_back(id.value_or(0));
+      influence.share.push_back(id && sum > 0.0f ? guides.share[k] / sum : 0.0f);
+    }
+  }
+  return influence;
+}
+
 std::vector<std::string> StrandSet::names() const {
   std::vector<std::string> names;
   if (!scene_.origin || scene_.origin->object.empty()) return names;
   for (const Member& member : members_)
     names.push_back(scene_.origin->object_name[scene_.origin->object[member.key]]);
   return names;
+}
+
+HairMaterial StrandSet::material() const {
+  return scene_.origin ? scene_.origin->material.scaled(1.0 / options_.unit_m) : HairMaterial{};
 }
 
 uint32_t StrandSet::collapsed_count(std::span<const glm::dvec3> points) const {

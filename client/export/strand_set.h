@@ -47,8 +47,17 @@ class StrandSet {
   std::vector<int32_t> groups() const;
   /// Returns 1 for each strand that drives others, else 0.
   std::vector<int16_t> guides() const;
+  /// Ids of the guides that a strand hangs between, and shares, three for each strand; none if no guides are
+  /// exported with what hangs between them.
+  struct Influence {
+    std::vector<int32_t> id;
+    std::vector<float> share;
+  };
+  Influence influence() const;
   /// Returns the name of the curves that each strand belongs to; empty if no file says it.
   std::vector<std::string> names() const;
+  /// Returns what the hair is made of, in kg and the file's lengths; nothing if no file says it.
+  HairMaterial material() const;
   /// Counts the strands that have no length in points of a frame, having lost it since the first one.
   uint32_t collapsed_count(std::span<const glm::dvec3> points) const;
 

@@ -10,6 +10,8 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "client/export/export_options.h"
 #include "client/export/strand_set.h"
@@ -47,6 +49,12 @@ class StrandWriter {
 
 /// What both forms of USD say: of Unreal's groom conventions, and what the file holds.
 inline constexpr int kUsdGroomMajor = 1, kUsdGroomMinor = 5;
+inline constexpr const char* kUsdCurvesSchema = "PhysicsCurvesDeformableSimAPI";
+inline constexpr const char* kUsdMaterialSchema = "PhysicsCurvesDeformableMaterialAPI";
+inline constexpr const char* kUsdBindingSchema = "MaterialBindingAPI";
+inline constexpr const char* kUsdBinding = "material:binding:physics";
+/// Returns what hair is made of, as numbers of a material.
+std::vector<std::pair<std::string, double>> usd_material(const StrandSet& strands);
 std::string usd_description(const ExportOptions& options, const StrandSet& strands);
 
 /// Make the writer of each format; the rest shape is written as the frame before the first. `strands` must

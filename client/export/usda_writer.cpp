@@ -11,6 +11,7 @@
 #include "client/export/strand_writer.h"
 #include "common/base/output_file.h"
 #include "common/base/worker_pool.h"
+#include "common/groom/usd_loader.h"
 
 namespace strandcast {
 namespace {
@@ -30,9 +31,13 @@ class UsdaWriter : public StrandWriter {
   }
 
   Status begin() {
-    RETURN_IF_ERROR(file_.append(layer_text()));
-    RETURN_IF_ERROR(file_.append(curves_text()));
+    RETURN_IF_ERROR(file_.append(layer_text() + material_text() + curves_text()));
     const std::vector<glm::dvec3> rest = strands_.rest_points();
+    if (is_of_matter()) {
+      RETURN_IF_ERROR(file_.append(fmt::format("        point3f[] {} = ", kUsdRestPoints)));
+      RETURN_IF_ERROR(append_points(rest));
+      RETURN_IF_ERROR(file_.append("\n"));
+    }
     RETURN_IF_ERROR(file_.append("        point3f[] points = "));
     RETURN_IF_ERROR(append_points(rest));
     RETURN_IF_ERROR(file_.append("\n        point3f[] points.timeSamples = {\n"));
@@ -79,9 +84,30 @@ class UsdaWriter : public StrandWriter {
     return text;
   }
 
-  std::string curves_text() const {
+  bool is_of_matter() const { return strands_.material().is_known(); }
+
+  /// As in the proposal for deformable bodies of USD's physics, which is not part of USD yet.
+  std::string material_text() const {
+    if (!is_of_matter()) return {};
     std::string text =
-        "    def BasisCurves \"Strands\" (\n        prepend apiSchemas = [\"GroomAPI\"]\n    )\n    {\n";
+        fmt::format("    def Material \"Matter\" (\n        prepend apiSchemas = [\"{}\"]\n    )\n    {{\n",
+                    kUsdMaterialSchema);
+    for (const auto& [name, value] : usd_material(strands_))
+      text += fmt::format("        float {} = {:.9g}\n", name, value);
+    return text + "    }\n";
+  }
+
+  std::string curves_text() const {
+    const std::string more =
+        is_of_matter() ? fmt::format(", \"{}\", \"{}\"", kUsdCurvesSchema, kUsdBindingSchema) : "";
+    std::string text = fmt::format(
+        "    def BasisCurves \"Strands\" (\n        prepend apiSchemas = [\"GroomAPI\"{}]\n    )\n    {{\n",
+        more);
+    if (is_of_matter()) text += fmt::format("        rel {} = </Hair/Matter>\n", kUsdBinding);
+    if (const auto diameter = strands_.material().diameter)
+      text +=
+          fmt::format("        float[] {} = [{:.9g}]\n        uniform token {}:elementType = \"constant\"\n",
+                      kUsdThicknesses, *diameter, kUsdThicknesses);
     text += "        uniform token type = \"linear\"\n        uniform token wrap = \"nonperiodic\"\n";
     text +=
         fmt::format("        int[] curveVertexCounts = [{}]\n", fmt::join(strands_.vertex_counts(), ", "));
@@ -115,7 +141,7 @@ class UsdaWriter : public StrandWriter {
   std::string root_uv_text() const {
     std::string text = "[";
     for (const glm::vec2& uv : strands_.root_uv())
-      text += fmt::format("{}({:.5g}, {:.5g})", text.size() > 1 ? ", " : "", uv.x, uv.y);
+      text += fmt::format("{}({:.8g}, {:.8g})", text.size() > 1 ? ", " : "", uv.x, uv.y);
     return text + "]";
   }
 
@@ -207,6 +233,16 @@ class UsdaWriter : public StrandWriter {
 };
 
 }  // namespace
+
+std::vector<std::pair<std::string, double>> usd_material(const StrandSet& strands) {
+  const HairMaterial material = strands.material();
+  std::vector<std::pair<std::string, double>> said;
+  for (const auto& [name, value] : {std::pair("physics:youngsModulus", material.young_modulus),
+                                    {"physics:poissonsRatio", material.poisson_ratio},
+                                    {"physics:density", material.density}})
+    if (value) said.emplace_back(name, *value);
+  return said;
+}
 
 std::string usd_description(const ExportOptions& options, const StrandSet& strands) {
   return fmt::format(

@@ -12,7 +12,7 @@ namespace {
 
 constexpr uint8_t kMinorVersion = 8;
 constexpr size_t kAlignedBytes = 8;
-constexpr uint8_t kPrependedList = 32;
+constexpr uint8_t kPrependedList = 32, kExplicitList = 3;
 // A package: ZIP (APPNOTE 4.3), with contents that begin at a multiple of 64 bytes.
 constexpr size_t kPackageAlignedBytes = 64, kMemberHeaderBytes = 30, kExtraHeadBytes = 4;
 constexpr uint16_t kZipVersion = 10, kPaddingId = 0x1986;
@@ -125,6 +125,12 @@ Result<UsdcValue> UsdcFile::prepended_tokens(std::span<const std::string> texts)
   return UsdcValue::of(UsdcType::TokenListOp, offset);
 }
 
+Result<UsdcValue> UsdcFile::target(uint32_t item) {
+  ASSIGN_OR_RETURN(const uint64_t offset,
+                   append_aligned(usdc_number(kExplicitList) + usdc_number(uint64_t{1}) + usdc_number(item)));
+  return UsdcValue::of(UsdcType::PathListOp, offset);
+}
+
 Result<UsdcValue> UsdcFile::samples(std::span<const double> times, std::span<const UsdcValue> values) {
   std::string bytes = usdc_number(uint64_t{times.size()});
   bytes += text_of(times);
@@ -142,7 +148,8 @@ Result<UsdcValue> UsdcFile::samples(std::span<const double> times, std::span<con
 Status UsdcFile::append_item(UsdcItem item, bool has_sibling) {
   const size_t own = element_.size();
   const auto name = static_cast<int32_t>(token(item.name).payload());
-  element_.push_back(item.kind == UsdcKind::Attribute ? -name : name);
+  const bool is_property = item.kind == UsdcKind::Attribute || item.kind == UsdcKind::Relationship;
+  element_.push_back(is_property ? -name : name);
   kind_.push_back(static_cast<int32_t>(item.kind));
   jump_.push_back(0);
   std::vector<std::string> prims, properties;

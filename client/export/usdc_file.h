@@ -18,7 +18,7 @@
 
 namespace strandcast {
 
-/// The root, a prim or an attribute, with values by their names and what is in it.
+/// The root, a prim, an attribute or a relationship, with values by their names and what is in it.
 struct UsdcItem {
   std::string name;
   UsdcKind kind = UsdcKind::Attribute;
@@ -43,6 +43,8 @@ class UsdcFile {
   Result<UsdcValue> tokens(std::span<const std::string> texts);
   /// Appends an edit that puts tokens in front of a list.
   Result<UsdcValue> prepended_tokens(std::span<const std::string> texts);
+  /// Appends the one target of a relationship, by its number among all items, parents first.
+  Result<UsdcValue> target(uint32_t item);
   /// Appends values of some times.
   Result<UsdcValue> samples(std::span<const double> times, std::span<const UsdcValue> values);
   /// Writes the root with all that is in it, and marks the file as finished. Returns its bytes.

@@ -1,11 +1,13 @@
 // Binary USD, alone or in a package: what usda_writer.cpp writes as text.
 #include <algorithm>
+#include <bit>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "client/export/strand_writer.h"
 #include "client/export/usdc_file.h"
+#include "common/groom/usd_loader.h"
 
 namespace strandcast {
 namespace {
@@ -39,6 +41,10 @@ class UsdcWriter : public StrandWriter {
     RETURN_IF_ERROR(describe_layer(root));
     UsdcItem hair = prim("Hair", "Xform");
     hair.fields.emplace_back("kind", file_.token("component"));
+    if (is_of_matter()) {
+      hair.items.push_back(prim("Matter", "Material"));
+      RETURN_IF_ERROR(describe_material(hair.items.back()));
+    }
     UsdcItem curves = prim("Strands", "BasisCurves");
     RETURN_IF_ERROR(describe_curves(curves));
     hair.items.push_back(std::move(curves));
@@ -123,7 +129,8 @@ class UsdcWriter : public StrandWriter {
   }
 
   Status describe_curves(UsdcItem& curves) {
-    const std::vector<std::string> schemas = {"GroomAPI"};
+    std::vector<std::string> schemas = {"GroomAPI"};
+    if (is_of_matter()) schemas.insert(schemas.end(), {kUsdCurvesSchema, kUsdBindingSchema});
     ASSIGN_OR_RETURN(const UsdcValue schema, file_.prepended_tokens(schemas));
     curves.fields.emplace_back("apiSchemas", schema);
     add_word(curves, "type", "linear");
@@ -140,8 +147,38 @@ class UsdcWriter : public StrandWriter {
       add(curves, name, "int", UsdcValue::of(UsdcType::Int, number, UsdcValue::kInlined))
           .fields.emplace_back("custom", UsdcValue::of(UsdcType::Bool, 1, UsdcValue::kInlined));
     RETURN_IF_ERROR(describe_groom(curves));
+    if (is_of_matter()) RETURN_IF_ERROR(describe_matter(curves));
     RETURN_IF_ERROR(add_series(curves, "points", "point3f[]", points_));
     return add_series(curves, "extent", "float3[]", extent_);
+  }
+
+  bool is_of_matter() const { return strands_.material().is_known(); }
+
+  Status describe_material(UsdcItem& material) {
+    const std::vector<std::string> schemas = {kUsdMaterialSchema};
+    ASSIGN_OR_RETURN(const UsdcValue schema, file_.prepended_tokens(schemas));
+    material.fields.emplace_back("apiSchemas", schema);
+    for (const auto& [name, value] : usd_material(strands_))
+      add(material, name, "float",
+          UsdcValue::of(UsdcType::Float, std::bit_cast<uint32_t>(static_cast<float>(value)),
+                        UsdcValue::kInlined));
+    return {};
+  }
+
+  /// Adds what binds curves to their material, and their rest shape.
+  Status describe_matter(UsdcItem& curves) {
+    constexpr uint32_t kMaterialPath = 2;  // behind the root and "Hair"
+    ASSIGN_OR_RETURN(const UsdcValue target, file_.target(kMaterialPath));
+    curves.items.push_back({std::string(kUsdBinding), UsdcKind::Relationship, {{"targetPaths", target}}, {}});
+    if (const auto diameter = strands_.material().diameter) {
+      const auto narrow = static_cast<float>(*diameter);
+      ASSIGN_OR_RETURN(const UsdcValue one,
+                       file_.array(UsdcType::Float, 1, std::as_bytes(std::span(&narrow, 1))));
+      add(curves, std::string(kUsdThicknesses), "float[]", one);
+      add_word(curves, std::string(kUsdThicknesses) + ":elementType", "constant");
+    }
+    add(curves, std::string(kUsdRestPoints), "point3f[]", points_.value.front());
+    return {};
   }
 
   /// Adds what Unreal asks of each strand.

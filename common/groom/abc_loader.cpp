@@ -91,7 +91,9 @@ std::optional<size_t> element_of(AbcScope scope, const AbcCurves& curves, size_t
 
 class AbcLoading {
  public:
-  explicit AbcLoading(const AbcArchive& archive) : archive_(archive) { groom_.offset.push_back(0); }
+  AbcLoading(const AbcArchive& archive, GuideUse guides) : archive_(archive), guide_use_(guides) {
+    groom_.offset.push_back(0);
+  }
 
   Status run() {
     ASSIGN_OR_RETURN(const AbcTree tree, AbcTree::read(archive_));
@@ -101,7 +103,7 @@ class AbcLoading {
       if (tree.nodes()[node].kind != AbcKind::Curves) continue;
       if (const Status added = add_object(tree, node); !added) return at(tree.path(node), added.error());
     }
-    leave_out_guides();
+    part_guides();
     // What strands say stays when all of them say it.
     const auto lacks_uv = [](const glm::vec2& uv) { return std::isnan(uv.x); };
     const auto lacks = [](float value) { return std::isnan(value); };
@@ -315,12 +317,13 @@ class AbcLoading {
         KnotCurve{control, weights, has_knots ? knots : std::span<const double>(even), order});
   }
 
-  /// Guides that drive other strands are no hair; alone they are.
-  void leave_out_guides() {
+  /// Guides that drive other strands are no hair, unless that is asked for; alone they are.
+  void part_guides() {
     tally_.guides = static_cast<size_t>(std::count(is_guide_.begin(), is_guide_.end(), uint8_t{1}));
     are_all_guides_ = tally_.guides == is_guide_.size();
     if (tally_.guides == 0 || are_all_guides_) return;
-    for (uint8_t& flag : is_guide_) flag = 1 - flag;
+    if (guide_use_ == GuideUse::LeaveOut)
+      for (uint8_t& flag : is_guide_) flag = 1 - flag;
     keep_strands(groom_, labels_, is_guide_);
   }
 
@@ -358,9 +361,12 @@ class AbcLoading {
                      t.unknown_objects));
     note(t.short_strands,
          fmt::format("{} strands of fewer than {} points are left out", t.short_strands, kMinVertexCount));
-    note(t.guides, are_all_guides_
-                       ? std::string("all strands are guides (groom_guide): they are taken as hair")
-                       : fmt::format("{} guides (groom_guide) are left out", t.guides));
+    note(t.guides,
+         are_all_guides_ ? std::string("all strands are guides (groom_guide): they are taken as hair")
+         : guide_use_ == GuideUse::Alone
+             ? fmt::format("{} guides (groom_guide) are the hair, other strands are left out", t.guides)
+             : fmt::format("{} guides (groom_guide) are left out (groom.file.guides takes them alone)",
+                           t.guides));
     note(t.groups.size() > 1,
          fmt::format("{} groups (groom_group_id) are one head of hair", t.groups.size()));
     note(t.has_ids,
@@ -373,27 +379,28 @@ class AbcLoading {
   StrandLabels labels_;  // of all strands; NaN for widths that are not there
   bool lacks_ids_ = false;
   std::vector<uint8_t> is_guide_;  // of each strand
+  const GuideUse guide_use_;
   bool are_all_guides_ = false;
   size_t lost_instances_ = 0;
   AbcTally tally_;
 };
 
-Result<StatedGroom> load(Result<AbcContainer> container) {
+Result<StatedGroom> load(Result<AbcContainer> container, GuideUse guides) {
   if (!container) return container.error();
   ASSIGN_OR_RETURN(const AbcArchive archive, AbcArchive::read(std::move(*container)));
-  AbcLoading loading(archive);
+  AbcLoading loading(archive, guides);
   RETURN_IF_ERROR(loading.run());
   return with_usable_strands(loading.finish());
 }
 
 }  // namespace
 
-Result<StatedGroom> read_abc(std::span<const std::byte> file) {
-  return load(AbcContainer::of(file));
+Result<StatedGroom> read_abc(std::span<const std::byte> file, GuideUse guides) {
+  return load(AbcContainer::of(file), guides);
 }
 
-Result<StatedGroom> load_abc(const std::filesystem::path& path) {
-  auto stated = load(AbcContainer::open(path));
+Result<StatedGroom> load_abc(const std::filesystem::path& path, GuideUse guides) {
+  auto stated = load(AbcContainer::open(path), guides);
   if (!stated) return at(path.string(), stated.error());
   stated->groom.name = path.stem().string();
   return stated;

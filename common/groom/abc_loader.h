@@ -12,11 +12,11 @@
 namespace strandcast {
 
 /// Loads all visible curves in file units, in file order, root vertex pinned. Cubic curves are replaced by as
-/// many points on the curve. Guides are omitted where other strands are there; notes list what was not read.
+/// many points on the curve. Guides beside other strands go as `guides` says; notes list what was not read.
 /// Unit and up axis are stated by our own exports alone. Errors name the file and the object.
-Result<StatedGroom> load_abc(const std::filesystem::path& path);
+Result<StatedGroom> load_abc(const std::filesystem::path& path, GuideUse guides = GuideUse::LeaveOut);
 
 /// Loads like load_abc() from bytes in memory; errors carry no file name.
-Result<StatedGroom> read_abc(std::span<const std::byte> file);
+Result<StatedGroom> read_abc(std::span<const std::byte> file, GuideUse guides = GuideUse::LeaveOut);
 
 }  // namespace strandcast

@@ -10,6 +10,7 @@
 #include "common/base/units.h"
 #include "common/groom/abc_loader.h"
 #include "common/groom/hair_loader.h"
+#include "common/groom/head_fit.h"
 #include "common/groom/ply_loader.h"
 #include "common/groom/resample.h"
 #include "common/groom/tfx_loader.h"
@@ -66,23 +67,23 @@ Error call_text(const std::filesystem::path& path, Error error) {
                                       path.extension().string(), hint));
 }
 
-Result<StatedGroom> unstated(const std::filesystem::path& path, Result<Groom> groom) {
-  if (groom) {
-    auto usable = with_usable_strands({.groom = std::move(groom).value()});
+Result<StatedGroom> usable(const std::filesystem::path& path, Result<StatedGroom> stated) {
+  if (stated) {
+    auto usable = with_usable_strands(std::move(stated).value());
     return usable ? usable : call_text(path, at(path.string(), usable.error()));
   }
-  return groom.error().code == ErrorCode::NotFound ? groom.error() : call_text(path, groom.error());
+  return stated.error().code == ErrorCode::NotFound ? stated.error() : call_text(path, stated.error());
 }
 
 Result<StatedGroom> load_by_extension(const std::filesystem::path& path, const GroomFileOptions& options) {
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (extension == ".tfx") return unstated(path, load_tfx(path));
-  if (extension == ".hair") return unstated(path, load_hair(path));
-  if (extension == ".abc") return load_abc(path);
+  if (extension == ".tfx") return usable(path, load_tfx(path));
+  if (extension == ".hair") return usable(path, load_hair(path));
+  if (extension == ".abc") return load_abc(path, options.guides);
   if (extension == ".ply") return load_ply(path, options.strand_vertex_count);
-  if (is_usd_extension(extension)) return load_usd(path);
+  if (is_usd_extension(extension)) return load_usd(path, options.guides);
   return at(
       path.string(),
       make_error(
@@ -143,6 +144,7 @@ Result<StatedGroom> load_parts(const GroomFileOptions& options) {
       return at(path.string(), same.error());
     if (const Status same = agree(whole.is_z_up, part.is_z_up, "up axis"); !same)
       return at(path.string(), same.error());
+    if (!whole.material.is_known()) whole.material = part.material;
     if (!whole.unit_m) whole.unit_reason = part.unit_reason;
     if (!whole.is_z_up) whole.up_axis_reason = part.up_axis_reason;
     if (part.unit_m) whole.unit_m = part.unit_m;
@@ -212,6 +214,29 @@ std::string pin_alike(Groom& groom) {
       freed, groom.strand_count(), root, tip);
 }
 
+/// What strands can be made of; the rest is left out and named.
+HairMaterial usable_material(HairMaterial material, std::vector<std::string>& notes) {
+  std::string taken;
+  const auto judge = [&](std::optional<double>& value, double least, double most, const char* what) {
+    if (!value) return;
+    const bool is_usable = *value >= least && *value <= most;
+    if (is_usable)
+      taken += fmt::format("{}{} {:.4g}", taken.empty() ? "" : ", ", what, *value);
+    else
+      notes.push_back(
+          fmt::format("its {} {:.4g} is left out: {:g} to {:g} can be", what, *value, least, most));
+    if (!is_usable) value.reset();
+  };
+  judge(material.diameter, 2e-6, 2e-2, "diameter in m");
+  judge(material.young_modulus, 0.0, 1e16, "Young's modulus in Pa");
+  judge(material.density, 1.0, 1e5, "density in kg/m^3");
+  judge(material.poisson_ratio, -0.9, 0.5, "Poisson's ratio");
+  if (!taken.empty())
+    notes.push_back(
+        fmt::format("it is made of: {} (direct_rod takes it; solver.parameters overrides it)", taken));
+  return material;
+}
+
 std::string size_text(const Groom& groom) {
   const glm::vec3 size_m = size_of(groom);
   return fmt::format("{:.2f} x {:.2f} x {:.2f} m", size_m.x, size_m.y, size_m.z);
@@ -229,17 +254,21 @@ PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
   };
   if (options.is_z_up) {
     placement.is_z_up = *options.is_z_up;
+    placement.is_upside_down = options.is_upside_down;
   } else if (stated.is_z_up) {
     placement.is_z_up = *stated.is_z_up;
     placed.notes.push_back(fmt::format("+{} of the file is up: {} (groom.file.up_axis overrides it)",
                                        *stated.is_z_up ? 'Z' : 'Y', stated.up_axis_reason));
   } else {
-    const Guess<bool> guess = guess_z_up(groom);
-    placement.is_z_up = guess.value;
-    if (guess.value) note("+Z of the file is up", guess.reason, "up_axis");
+    const Guess<UpSide> guess = guess_up(groom);
+    placement.is_z_up = guess.value.is_z_up;
+    placement.is_upside_down = guess.value.is_upside_down;
+    if (!guess.reason.empty())
+      note(fmt::format("{} of the file is up", name_of(guess.value)), guess.reason, "up_axis");
   }
   GroomPlacement upright;
   upright.is_z_up = placement.is_z_up;
+  upright.is_upside_down = placement.is_upside_down;
   for (glm::vec3& point : groom.rest_position_m) point = upright.place(point);
   if (options.yaw_deg) {
     placement.yaw_deg = *options.yaw_deg;
@@ -254,23 +283,29 @@ PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
       note(fmt::format("turned by {} degrees to face +Z", guess.value), guess.reason, "yaw_deg");
     }
   }
+  const auto judge_unit = [&](float unit_m) {
+    placed.unlikely_unit = unlikely_unit(unit_m, size_of(groom));
+    if (!placed.unlikely_unit.empty()) placed.notes.push_back(placed.unlikely_unit);
+  };
   if (options.unit_m > 0.0f) {
     placement.unit_m = options.unit_m;
+    judge_unit(options.unit_m);
   } else if (stated.unit_m) {
     placement.unit_m = *stated.unit_m;
     placed.notes.push_back(fmt::format("1 unit = {}: {} (groom.file.unit_m overrides it)",
                                        unit_text(*stated.unit_m), stated.unit_reason));
-    if (std::string unlikely = unlikely_unit(*stated.unit_m, size_of(groom)); !unlikely.empty())
-      placed.notes.push_back(std::move(unlikely));
+    judge_unit(*stated.unit_m);
   } else {
     const Guess<float> guess = guess_unit(groom);
     placement.unit_m = guess.value;
     note(fmt::format("1 unit = {}", unit_text(guess.value)),
          guess.reason.empty() ? "the roots say nothing of a head" : guess.reason, "unit_m");
   }
+  placed.material = usable_material(stated.material.scaled(placement.unit_m), placed.notes);
+  placed.is_of_head = is_hair_of_head(groom);
   placement.origin = options.origin;
   GroomPlacement rest = placement;  // upright by now
-  rest.is_z_up = false;
+  rest.is_z_up = rest.is_upside_down = false;
   for (glm::vec3& point : groom.rest_position_m) point = rest.place(point);
   groom.file_unit_m = placement.unit_m;
   placed.labels = std::move(stated.labels);

@@ -23,18 +23,23 @@ struct GroomFileOptions {
   std::vector<std::filesystem::path> more_paths;  // further parts of the same hair: the same unit and axes
   float unit_m = 0.0f;  // metres per file unit; 0 = as the file says, else guessed from the size of the head
   std::optional<bool> is_z_up = false;  // as GroomPlacement; empty = as the file says, else guessed
+  bool is_upside_down = false;          // likewise, where is_z_up is stated
   std::optional<float> yaw_deg = 0.0f;  // as GroomPlacement; empty = guessed
   glm::vec3 origin{0.0f};               // as GroomPlacement
   // Resample to this many, 2..kMaxVertexCount; 0 = keep, as far as a uniform groom can.
   uint32_t vertex_count = 0;
   std::optional<Pinning> pinning;    // empty: as the file says
   uint32_t strand_vertex_count = 0;  // of a .ply, as load_ply()
+  GuideUse guides = GuideUse::LeaveOut;
 };
 
 struct PlacedGroom {
   Groom groom;
   StrandLabels labels;  // of its strands and vertices
+  HairMaterial material;
   GroomPlacement placement;
+  bool is_of_head = true;     // its roots might be those of a head
+  std::string unlikely_unit;  // why no head has hair in this unit, and which one fits; empty: it may
   std::vector<std::string>
       notes;  // a sentence for each thing that the file says or that was guessed, and why
 };

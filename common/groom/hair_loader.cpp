@@ -74,8 +74,8 @@ Result<std::vector<uint32_t>> read_offsets(const ByteView& file, const HairHeade
     const uint32_t segments = header.has(kSegmentsBit)
                                   ? file.get<uint16_t>(kHeaderBytes + strand * sizeof(uint16_t))
                                   : header.default_segments;
-    if (segments == 0 || segments >= kMaxSourceVertexCount) {
-      return make_error(ErrorCode::BadInput, "strand {} has {} segments, allowed are 1 to {}", strand,
+    if (segments >= kMaxSourceVertexCount) {
+      return make_error(ErrorCode::BadInput, "strand {} has {} segments, at most {} are allowed", strand,
                         segments, kMaxSourceVertexCount - 1);
     }
     total += segments + 1;
@@ -91,7 +91,7 @@ Result<std::vector<uint32_t>> read_offsets(const ByteView& file, const HairHeade
 
 }  // namespace
 
-Result<Groom> read_hair(const ByteView& file) {
+Result<StatedGroom> read_hair(const ByteView& file) {
   ASSIGN_OR_RETURN(const HairHeader header, read_hair_header(file));
   Groom groom;
   ASSIGN_OR_RETURN(groom.offset, read_offsets(file, header));
@@ -105,15 +105,15 @@ Result<Groom> read_hair(const ByteView& file) {
           file.get<float>(points_at + i * kPointBytes + static_cast<uint64_t>(axis) * sizeof(float));
     }
   }
-  return with_pinning(std::move(groom), Pinning::Root);
+  return StatedGroom{.groom = with_pinning(std::move(groom), Pinning::Root)};
 }
 
-Result<Groom> load_hair(const std::filesystem::path& path) {
+Result<StatedGroom> load_hair(const std::filesystem::path& path) {
   ASSIGN_OR_RETURN(const std::vector<std::byte> bytes, load_file(path, kMaxGroomFileBytes));
-  auto groom = read_hair(ByteView(bytes));
-  if (!groom) return at(path.string(), groom.error());
-  groom->name = path.stem().string();
-  return groom;
+  auto stated = read_hair(ByteView(bytes));
+  if (!stated) return at(path.string(), stated.error());
+  stated->groom.name = path.stem().string();
+  return stated;
 }
 
 }  // namespace strandcast

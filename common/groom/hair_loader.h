@@ -6,15 +6,15 @@
 
 #include "common/base/result.h"
 #include "common/groom/byte_view.h"
-#include "common/groom/groom.h"
+#include "common/groom/stated_groom.h"
 
 namespace strandcast {
 
 /// Loads a `.hair` file in file units, root vertex pinned. Thickness, transparency and colour are checked for
 /// size and skipped. Errors name the file and the offending header field, strand or vertex.
-Result<Groom> load_hair(const std::filesystem::path& path);
+Result<StatedGroom> load_hair(const std::filesystem::path& path);
 
 /// Loads like load_hair() from bytes in memory; errors carry no file name.
-Result<Groom> read_hair(const ByteView& file);
+Result<StatedGroom> read_hair(const ByteView& file);
 
 }  // namespace strandcast

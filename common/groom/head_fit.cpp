@@ -66,6 +66,20 @@ FittedSphere fit_head_sphere(const Groom& groom) {
   return of_all;
 }
 
+bool is_hair_of_head(const Groom& groom) {
+  // Heads have 93 % and more of their roots there, bodies with limbs 50 to 70 %.
+  constexpr float kNearest = 0.7f, kFurthest = 1.35f;
+  constexpr size_t kOfTen = 8;
+  const std::vector<glm::vec3> roots = roots_of(groom);
+  const FittedSphere fitted = fit_sphere(roots);
+  if (roots.size() < kMinFittedRoots || !(extent_m(roots) >= 2.0f * fitted.radius_m)) return true;
+  const auto near_count = std::count_if(roots.begin(), roots.end(), [&](const glm::vec3& root) {
+    const float radii = glm::distance(root, fitted.center_m) / fitted.radius_m;
+    return radii > kNearest && radii < kFurthest;
+  });
+  return 10 * static_cast<size_t>(near_count) >= kOfTen * roots.size();
+}
+
 FittedSphere fit_head(const Groom& groom) {
   const FittedSphere fitted = fit_head_sphere(groom);
   if (groom.strand_count() >= kMinFittedRoots && fitted.radius_m >= kSmallestRadiusM &&

@@ -16,6 +16,10 @@ std::vector<glm::vec3> roots_of(const Groom& groom);
 /// sphere, only the upper roots count. Falls back to all roots.
 FittedSphere fit_head_sphere(const Groom& groom);
 
+/// Tells hair of a head from fur: roots of fur go all around, and many lie far from the sphere that fits
+/// them best.
+bool is_hair_of_head(const Groom& groom);
+
 /// Finds the head of a groom in metres. Uses the sphere through the roots if it has the size of a person's
 /// head. Otherwise it places a head of usual size so that the roots stand on it in the direction of growth.
 FittedSphere fit_head(const Groom& groom);

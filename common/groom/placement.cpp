@@ -25,8 +25,8 @@ constexpr std::array<CommonUnit, 4> kCommonUnits = {
 
 /// Fewer roots say nothing of a head.
 constexpr uint32_t kMinRoots = 64;
-/// +Z is up only when it is better than +Y by this much: -1 to 1 for how far the roots cover that side, and
-/// as much for how far the hair hangs from it.
+/// Another side is up only when it is better than +Y by this much: -1 to 1 for how far the roots cover that
+/// side, and as much for how far the hair hangs from it.
 constexpr double kClearlyBetter = 0.5;
 /// Roots that lie on that side of the head, and how far from the middle roots of a head are, in radii.
 constexpr double kOnTop = 0.1, kNearestPlacedRoot = 0.7, kFurthestPlacedRoot = 1.35;
@@ -100,13 +100,27 @@ glm::vec3 GroomPlacement::yawed(const glm::vec3& v) const {
   return {static_cast<float>(c * v.x + s * v.z), v.y, static_cast<float>(c * v.z - s * v.x)};
 }
 
-Guess<bool> guess_z_up(const Groom& groom) {
+Guess<UpSide> guess_up(const Groom& groom) {
   if (groom.strand_count() < kMinRoots) return {};
-  Groom turned = groom;
-  for (glm::vec3& point : turned.rest_position_m) point = {point.x, point.z, -point.y};
-  const Uprightness y = uprightness(groom), z = uprightness(turned);
-  if (!(z.top > kOnTop && z.top + z.fall > y.top + y.fall + kClearlyBetter)) return {false, {}};
-  return {true, "the hair covers that side and hangs from it"};
+  const auto score_of = [](const Uprightness& up) { return up.top + up.fall; };
+  Guess<UpSide> best;
+  double best_score = score_of(uprightness(groom)) + kClearlyBetter;
+  for (const UpSide& side : {UpSide{true, false}, {false, true}, {true, true}}) {
+    GroomPlacement placement;
+    placement.is_z_up = side.is_z_up;
+    placement.is_upside_down = side.is_upside_down;
+    Groom turned = groom;
+    for (glm::vec3& point : turned.rest_position_m) point = placement.turn(point);
+    const Uprightness up = uprightness(turned);
+    if (!(up.top > kOnTop && score_of(up) > best_score)) continue;
+    best = {side, "the hair covers that side and hangs from it"};
+    best_score = score_of(up);
+  }
+  return best;
+}
+
+const char* name_of(const UpSide& up) {
+  return up.is_z_up ? (up.is_upside_down ? "-Z" : "+Z") : (up.is_upside_down ? "-Y" : "+Y");
 }
 
 Guess<float> guess_yaw_deg(const Groom& groom) {

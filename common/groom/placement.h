@@ -11,17 +11,21 @@ namespace strandcast {
 
 /// Transformation of a file's points into head space.
 struct GroomPlacement {
-  bool is_z_up = false;     // +Z up and -Y forward in the file; turned to +Y up and +Z forward
-  float yaw_deg = 0.0f;     // then turned about +Y, counter-clockwise seen from above
-  float unit_m = 1.0f;      // metres per unit of the file
-  glm::vec3 origin{0.0f};   // point that becomes the head joint: file units, before the yaw
-  glm::vec3 shift_m{0.0f};  // further movement at last, in head space
+  bool is_z_up = false;         // +Z up and -Y forward in the file; turned to +Y up and +Z forward
+  bool is_upside_down = false;  // then turned over about +Z: the file's -Y or -Z is up
+  float yaw_deg = 0.0f;         // then turned about +Y, counter-clockwise seen from above
+  float unit_m = 1.0f;          // metres per unit of the file
+  glm::vec3 origin{0.0f};       // point that becomes the head joint: file units, before the yaw
+  glm::vec3 shift_m{0.0f};      // further movement at last, in head space
 
   glm::vec3 turn(const glm::vec3& direction) const;
   glm::vec3 place(const glm::vec3& point) const { return yawed(upright(point) - origin) * unit_m + shift_m; }
 
  private:
-  glm::vec3 upright(const glm::vec3& v) const { return is_z_up ? glm::vec3(v.x, v.z, -v.y) : v; }
+  glm::vec3 upright(const glm::vec3& v) const {
+    const glm::vec3 turned = is_z_up ? glm::vec3(v.x, v.z, -v.y) : v;
+    return is_upside_down ? glm::vec3(-turned.x, -turned.y, turned.z) : turned;
+  }
   glm::vec3 yawed(const glm::vec3& v) const;
 };
 
@@ -31,12 +35,20 @@ struct Guess {
   std::string reason;  // "the hairline is highest there"; empty: nothing to go by, the value is the default
 };
 
-/// Guesses whether +Z is up: true if hair covers, and hangs from, the +Z side clearly more than the +Y side.
-/// Any units.
-Guess<bool> guess_z_up(const Groom& groom);
+/// Which side of a file is up, as GroomPlacement has it.
+struct UpSide {
+  bool is_z_up = false;
+  bool is_upside_down = false;
+};
 
-/// Guesses the rotation about +Y, in degrees, that turns the face to +Z; nearly a quarter turn counts as one.
-/// The face is where the lowest roots are highest. `groom` is upright (+Y), in any unit.
+/// Guesses which of +Y, +Z, -Y and -Z is up: +Y, unless hair covers, and hangs from, another side clearly
+/// more. Any units.
+Guess<UpSide> guess_up(const Groom& groom);
+/// Returns the name of a side: "+Z".
+const char* name_of(const UpSide& up);
+
+/// Guesses the rotation about +Y, in whole degrees, that turns the face to +Z; nearly a quarter turn is taken
+/// as one. The face is where the lowest roots are highest. `groom` is upright (+Y), in any unit.
 Guess<float> guess_yaw_deg(const Groom& groom);
 
 /// Guesses the unit: the first of metre, centimetre, millimetre and inch that gives the sphere through the

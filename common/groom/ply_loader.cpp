@@ -20,7 +20,7 @@ struct PlyRowsRead {
   std::vector<std::vector<uint32_t>> strand_vertices;  // of lists
   std::vector<uint32_t> strand_counts;                 // vertices of each
   std::vector<std::pair<uint32_t, uint32_t>> edges;
-  uint64_t face_count = 0;
+  uint64_t face_count = 0, decimal_commas = 0;
 };
 
 bool is_strand_element(const std::string& name) {
@@ -68,9 +68,9 @@ Status read_strands(PlyRows& rows, const PlyElement& element, PlyRowsRead& read)
     RETURN_IF_ERROR(rows.read(element, row));
     const double count = list ? static_cast<double>(rows.list(*list).size())
                               : rows.value(segments ? *segments : *vertices) + (segments ? 1.0 : 0.0);
-    if (!(count >= kMinVertexCount && count <= kMaxSourceVertexCount))
-      return make_error(ErrorCode::BadInput, "strand {} has {} vertices, allowed are {} to {}", row, count,
-                        kMinVertexCount, kMaxSourceVertexCount);
+    if (!(count >= 0.0 && count <= kMaxSourceVertexCount))
+      return make_error(ErrorCode::BadInput, "strand {} has {} vertices, allowed are up to {}", row, count,
+                        kMaxSourceVertexCount);
     if (!list) {
       read.strand_counts.push_back(static_cast<uint32_t>(count));
       continue;
@@ -118,6 +118,7 @@ Result<PlyRowsRead> read_rows(std::string_view file, const PlyHeader& header) {
       for (uint64_t row = 0; row < element.row_count; ++row) RETURN_IF_ERROR(rows.read(element, row));
     }
   }
+  read.decimal_commas = rows.decimal_commas();
   if (rows.left_bytes() > 0)
     return make_error(ErrorCode::BadInput, "{} bytes are left after the last row", rows.left_bytes());
   if (read.points.empty()) return make_error(ErrorCode::BadInput, "there are no points");
@@ -326,6 +327,8 @@ Result<StatedGroom> read_ply(std::span<const std::byte> file, uint32_t strand_ve
   ASSIGN_OR_RETURN(PlyRowsRead read, read_rows(text, header));
   const Statements said = statements_of(header.comment);
   StatedGroom stated;
+  if (read.decimal_commas > 0)
+    stated.notes.push_back(fmt::format("{} numbers have a decimal comma", read.decimal_commas));
   stated.unit_m = said.unit_m;
   stated.is_z_up = said.is_z_up;
   stated.unit_reason = stated.up_axis_reason = "a comment of the file says so";

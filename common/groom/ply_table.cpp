@@ -171,7 +171,13 @@ Result<double> PlyRows::next_word(PlyType type) {
   const size_t end = std::min(text_.find_first_of(kSpace, at_), text_.size());
   const std::string_view word = text_.substr(at_, end - at_);
   at_ = end;
-  const auto value = parse_number<double>(word);
+  auto value = parse_number<double>(word);
+  if (!value && word.size() <= kMaxPlyNumberChars) {
+    std::string with_point(word);
+    std::replace(with_point.begin(), with_point.end(), ',', '.');
+    value = parse_number<double>(with_point);
+    decimal_commas_ += value ? 1 : 0;
+  }
   if (!value) return make_error(ErrorCode::BadInput, "{} is no number", quoted(word));
   const bool is_whole = type < PlyType::Float32;
   if (is_whole && *value != std::floor(*value))

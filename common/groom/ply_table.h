@@ -43,6 +43,8 @@ struct PlyHeader {
 /// Reads and checks the header. BadInput or LimitExceeded name the line.
 Result<PlyHeader> read_ply_header(std::string_view file);
 
+inline constexpr size_t kMaxPlyNumberChars = 64;  // of one with a decimal comma
+
 /// Reads the rows of a body in file order.
 class PlyRows {
  public:
@@ -58,6 +60,8 @@ class PlyRows {
   }
   /// Returns the number of unread bytes after the last row; white space does not count in text files.
   size_t left_bytes() const;
+  /// Returns how many numbers of a text file had a decimal comma.
+  uint64_t decimal_commas() const { return decimal_commas_; }
 
  private:
   Result<double> next(PlyType type);
@@ -66,6 +70,7 @@ class PlyRows {
   std::string_view text_;
   size_t at_;
   PlyFormat format_;
+  uint64_t decimal_commas_ = 0;
   std::vector<double> value_;
   std::vector<size_t> begin_;  // (properties + 1) where each one's values begin
 };

@@ -11,6 +11,24 @@
 
 namespace strandcast {
 
+/// What becomes of guides beside other strands. Where there is nothing but guides, they are the hair.
+enum class GuideUse { LeaveOut, Alone };
+
+/// What hair is made of, as far as somebody says it. Lengths are of the file's unit, metres once placed.
+struct HairMaterial {
+  std::optional<double> diameter, young_modulus, density, poisson_ratio;  // kg, s
+
+  bool is_known() const { return diameter || young_modulus || density || poisson_ratio; }
+  /// Returns the same where a length counts `factor` times as many units.
+  HairMaterial scaled(double factor) const {
+    const auto times = [](std::optional<double> value, double by) {
+      return value ? std::optional(*value * by) : value;
+    };
+    return {times(diameter, factor), times(young_modulus, 1.0 / factor),
+            times(density, 1.0 / (factor * factor * factor)), poisson_ratio};
+  }
+};
+
 inline constexpr size_t kMaxGroupNameChars = 80;  // that are kept of what a file says
 
 /// What files say of strands besides their shape, in their order; a list is empty where they do not say it.
@@ -61,6 +79,7 @@ inline StrandLabels named(StrandLabels labels, size_t strand_count, const std::s
 struct StatedGroom {
   Groom groom = {};  // in file units
   StrandLabels labels = {};
+  HairMaterial material = {};
   std::optional<float> unit_m = {};  // metres per file unit; empty: the file does not say
   std::optional<bool> is_z_up = {};  // as GroomPlacement; empty: the file does not say
   std::string unit_reason = {};      // where the file says it: "its metersPerUnit says so"

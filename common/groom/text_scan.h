@@ -54,6 +54,8 @@ class TextScan {
     return word;
   }
 
+  /// Returns what follows the last word in its line.
+  std::string_view rest() const { return rest_; }
   uint32_t line() const { return line_; }  // 1-based
 
  private:

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/base/file.h"
+#include "common/base/mercy.h"
 
 namespace strandcast {
 namespace {
@@ -140,14 +141,6 @@ Result<TfxHeader> read_tfx_header(const ByteView& file) {
       version);
 }
 
-Result<float> read_float(const ByteView& file, uint64_t offset, uint64_t item, uint64_t items_per_strand,
-                         const char* what) {
-  const auto value = file.get<float>(offset);
-  if (std::isfinite(value)) return value;
-  return make_error(ErrorCode::BadInput, "strand {} vertex {} (byte {}) has the {} {}",
-                    item / items_per_strand, item % items_per_strand, offset, what, value);
-}
-
 void read_positions(const ByteView& file, const TfxHeader& header, Groom& groom) {
   groom.rest_position_m.resize(header.vertex_total());
   for (uint64_t i = 0; i < header.vertex_total(); ++i) {
@@ -158,22 +151,24 @@ void read_positions(const ByteView& file, const TfxHeader& header, Groom& groom)
   }
 }
 
-/// Pin flags of version 4: the fourth float is an inverse mass, 0 = pinned.
-Status read_pins(const ByteView& file, const TfxHeader& header, Groom& groom) {
+/// Pin flags of version 4: the fourth float is an inverse mass, 0 = pinned. One that is no mass holds
+/// nothing, but for a root. Returns what to say of these.
+Result<std::string> read_pins(const ByteView& file, const TfxHeader& header, Groom& groom) {
+  BadItems broken;
   groom.pinned.resize(header.vertex_total());
   for (uint64_t i = 0; i < header.vertex_total(); ++i) {
     const uint64_t offset = header.positions().offset + i * header.position_bytes + 3 * kFloatBytes;
-    ASSIGN_OR_RETURN(const float inverse_mass,
-                     read_float(file, offset, i, header.vertex_count, "inverse mass"));
-    if (inverse_mass < 0.0f) {
-      return make_error(ErrorCode::BadInput,
-                        "strand {} vertex {} has the inverse mass {}, allowed is 0 or more",
-                        i / header.vertex_count, i % header.vertex_count, inverse_mass);
-    }
-    const bool is_root = i % header.vertex_count == 0;
-    groom.pinned[i] = is_root || inverse_mass == 0.0f ? 1 : 0;
+    const auto inverse_mass = file.get<float>(offset);
+    const uint64_t strand = i / header.vertex_count, vertex = i % header.vertex_count;
+    if (!std::isfinite(inverse_mass) || inverse_mass < 0.0f)
+      broken.add(make_error(ErrorCode::BadInput,
+                            "strand {} vertex {} (byte {}) has the inverse mass {}, allowed is 0 or more",
+                            strand, vertex, offset, inverse_mass));
+    groom.pinned[i] = vertex == 0 || inverse_mass == 0.0f ? 1 : 0;
   }
-  return {};
+  RETURN_IF_ERROR(broken.judge(header.vertex_total(), "vertices"));
+  return broken.count() == 0 ? std::string()
+                             : broken.sentence(header.vertex_total(), "vertices", "so that these are free");
 }
 
 void read_root_uv(const ByteView& file, const TfxHeader& header, Groom& groom) {
@@ -187,7 +182,7 @@ void read_root_uv(const ByteView& file, const TfxHeader& header, Groom& groom) {
 
 }  // namespace
 
-Result<Groom> read_tfx_binary(const ByteView& file) {
+Result<StatedGroom> read_tfx_binary(const ByteView& file) {
   ASSIGN_OR_RETURN(const TfxHeader header, read_tfx_header(file));
   if (header.positions().offset == 0) {
     return make_error(ErrorCode::BadInput,
@@ -203,19 +198,22 @@ Result<Groom> read_tfx_binary(const ByteView& file) {
   read_positions(file, header, groom);
   read_root_uv(file, header, groom);
   if (header.has_pin_flags) {
-    RETURN_IF_ERROR(read_pins(file, header, groom));
-    return groom;
+    ASSIGN_OR_RETURN(std::string note, read_pins(file, header, groom));
+    StatedGroom stated{.groom = std::move(groom)};
+    if (!note.empty()) stated.notes.push_back(std::move(note));
+    return stated;
   }
-  return with_pinning(std::move(groom), header.has_both_ends ? Pinning::BothEnds : Pinning::RootPair);
+  const Pinning pinning = header.has_both_ends ? Pinning::BothEnds : Pinning::RootPair;
+  return StatedGroom{.groom = with_pinning(std::move(groom), pinning)};
 }
 
-Result<Groom> load_tfx(const std::filesystem::path& path) {
+Result<StatedGroom> load_tfx(const std::filesystem::path& path) {
   ASSIGN_OR_RETURN(const std::string bytes, load_text(path, kMaxGroomFileBytes));
   const bool is_text = std::string_view(bytes).substr(0, kTextMark.size()) == kTextMark;
-  auto groom = is_text ? read_tfx_text(bytes) : read_tfx_binary(ByteView(std::as_bytes(std::span(bytes))));
-  if (!groom) return at(path.string(), groom.error());
-  groom->name = path.stem().string();
-  return groom;
+  auto stated = is_text ? read_tfx_text(bytes) : read_tfx_binary(ByteView(std::as_bytes(std::span(bytes))));
+  if (!stated) return at(path.string(), stated.error());
+  stated->groom.name = path.stem().string();
+  return stated;
 }
 
 }  // namespace strandcast

@@ -1,6 +1,9 @@
 // Version 2 of `.tfx`: header lines, then per strand "strand I numVerts K texcoord U V" and K lines "x y z".
+#include <algorithm>
 #include <cmath>
+#include <string>
 
+#include "common/base/mercy.h"
 #include "common/groom/text_scan.h"
 #include "common/groom/tfx_loader.h"
 
@@ -92,65 +95,130 @@ Result<TextHeader> read_text_header(TextScan& scan) {
   return line_error(scan, ErrorCode::BadInput, "the file ends before the first strand");
 }
 
-/// Reads one strand; the scan stands behind the word "strand" of its first line.
-Status read_strand(TextScan& scan, uint32_t strand, Groom& groom) {
-  ASSIGN_OR_RETURN(const uint32_t index, read_count(scan, "strand number"));
-  if (index != strand) {
-    return line_error(scan, ErrorCode::BadInput, "strand {} found where strand {} is needed", index, strand);
+/// Lines of strands. Each begins with a word that says whether it is the first of a strand.
+class StrandLines {
+ public:
+  /// The scan stands behind the word "strand".
+  explicit StrandLines(TextScan& scan) : scan_(scan) {}
+
+  bool at_end() const { return !has_line_; }
+  bool at_strand() const { return has_line_ && word_ == "strand"; }
+  void next() {
+    has_line_ = scan_.next_filled_line();
+    word_ = has_line_ ? scan_.next_word() : std::string_view();
   }
-  RETURN_IF_ERROR(expect_word(scan, "numVerts"));
-  ASSIGN_OR_RETURN(const uint32_t count, read_count(scan, "numVerts"));
-  if (count < kMinVertexCount || count > kMaxSourceVertexCount) {
-    return line_error(scan, ErrorCode::BadInput, "numVerts is {}, allowed are {} to {}", count,
-                      kMinVertexCount, kMaxSourceVertexCount);
-  }
-  if (groom.rest_position_m.size() + count > kMaxGroomVertices) {
-    return line_error(scan, ErrorCode::LimitExceeded, "more than {} vertices", kMaxGroomVertices);
-  }
-  RETURN_IF_ERROR(expect_word(scan, "texcoord"));
-  glm::vec2 uv;
-  ASSIGN_OR_RETURN(uv.x, read_coordinate(scan, "texcoord"));
-  ASSIGN_OR_RETURN(uv.y, read_coordinate(scan, "texcoord"));
-  RETURN_IF_ERROR(expect_line_end(scan));
-  groom.root_uv.push_back(uv);
-  for (uint32_t vertex = 0; vertex < count; ++vertex) {
-    if (!scan.next_filled_line()) {
-      return line_error(scan, ErrorCode::BadInput, "the file ends at vertex {} of {} of strand {}", vertex,
-                        count, strand);
+
+  /// Reads the strand at whose first line this stands, to the first line that is none of its own.
+  Status read(Groom& groom) {
+    word_ = {};
+    ASSIGN_OR_RETURN(const uint32_t index, read_count(scan_, "strand number"));
+    RETURN_IF_ERROR(expect_word(scan_, "numVerts"));
+    ASSIGN_OR_RETURN(const uint32_t count, read_count(scan_, "numVerts"));
+    if (count > kMaxSourceVertexCount)
+      return line_error(scan_, ErrorCode::BadInput, "numVerts is {}, at most {} are allowed", count,
+                        kMaxSourceVertexCount);
+    RETURN_IF_ERROR(expect_word(scan_, "texcoord"));
+    glm::vec2 uv;
+    ASSIGN_OR_RETURN(uv.x, read_coordinate(scan_, "texcoord"));
+    ASSIGN_OR_RETURN(uv.y, read_coordinate(scan_, "texcoord"));
+    RETURN_IF_ERROR(expect_line_end(scan_));
+    for (uint32_t vertex = 0; vertex < count; ++vertex) {
+      next();
+      if (at_end() || at_strand())
+        return line_error(scan_, ErrorCode::BadInput, "strand {} ends at vertex {} of {}", index, vertex,
+                          count);
+      ASSIGN_OR_RETURN(const glm::vec3 point, read_point());
+      groom.rest_position_m.push_back(point);
     }
+    next();
+    if (!at_end() && !at_strand())
+      return line_error(scan_, ErrorCode::BadInput, "{} follows the last of {} vertices of strand {}",
+                        quoted(word_), count, index);
+    groom.root_uv.push_back(uv);
+    groom.offset.push_back(static_cast<uint32_t>(groom.rest_position_m.size()));
+    return {};
+  }
+
+ private:
+  Result<glm::vec3> read_point() {
     glm::vec3 point;
     for (int axis = 0; axis < 3; ++axis) {
-      ASSIGN_OR_RETURN(point[axis], read_coordinate(scan, "coordinate"));
+      if (axis > 0) word_ = scan_.next_word();
+      const auto value = parse_number<float>(word_);
+      if (!value)
+        return line_error(scan_, ErrorCode::BadInput, "coordinate is {}, a number is needed", quoted(word_));
+      point[axis] = *value;
     }
-    RETURN_IF_ERROR(expect_line_end(scan));
-    groom.rest_position_m.push_back(point);
+    RETURN_IF_ERROR(expect_line_end(scan_));
+    return point;
   }
-  groom.offset.push_back(static_cast<uint32_t>(groom.rest_position_m.size()));
-  return {};
+
+  TextScan& scan_;
+  std::string_view word_ = "strand";
+  bool has_line_ = true;
+};
+
+/// Reads all strands, and leaves out those that cannot be used. Returns what to say of these.
+Result<std::string> read_strands(TextScan& scan, uint32_t strand_count, Groom& groom) {
+  BadItems broken;
+  StrandLines lines(scan);
+  uint32_t seen = 0;
+  for (; !lines.at_end(); ++seen) {
+    if (seen == strand_count)
+      return line_error(scan, ErrorCode::BadInput, "'strand' follows the last of {} strands", strand_count);
+    const size_t first = groom.rest_position_m.size();
+    if (const Status read = lines.read(groom); !read) {
+      broken.add(read.error());
+      groom.rest_position_m.resize(first);
+      while (!lines.at_end() && !lines.at_strand()) lines.next();
+    }
+    if (groom.rest_position_m.size() > kMaxGroomVertices)
+      return line_error(scan, ErrorCode::LimitExceeded, "more than {} vertices", kMaxGroomVertices);
+  }
+  for (uint32_t missing = seen; missing < strand_count; ++missing)
+    broken.add(
+        line_error(scan, ErrorCode::BadInput, "the file ends after {} of {} strands", seen, strand_count));
+  RETURN_IF_ERROR(broken.judge(strand_count, "strands"));
+  return broken.count() == 0 ? std::string() : broken.sentence(strand_count, "strands", "and are left out");
+}
+
+/// Tells rows of three numbers with decimal commas from rows whose numbers are separated by commas.
+bool has_decimal_commas(std::string_view text) {
+  constexpr std::string_view kBlank = " \t", kDigits = "0123456789";
+  const auto is_digit = [&](char c) { return kDigits.find(c) != std::string_view::npos; };
+  for (TextScan scan(text); scan.next_line();) {
+    const std::string_view line = scan.rest();
+    size_t words = 0, commas = 0;
+    for (size_t i = 0; i < line.size(); ++i) {
+      const bool follows_blank = i == 0 || kBlank.find(line[i - 1]) != std::string_view::npos;
+      if (follows_blank && kBlank.find(line[i]) == std::string_view::npos) ++words;
+      const bool is_between = i > 0 && i + 1 < line.size() && is_digit(line[i - 1]) && is_digit(line[i + 1]);
+      if (line[i] == ',' && is_between) ++commas;
+    }
+    if (words == 3 && commas > 0) return true;
+  }
+  return false;
 }
 
 }  // namespace
 
-Result<Groom> read_tfx_text(std::string_view text) {
+Result<StatedGroom> read_tfx_text(std::string_view text) {
+  std::string with_points;
+  if (has_decimal_commas(text)) {
+    with_points = text;
+    std::replace(with_points.begin(), with_points.end(), ',', '.');
+    text = with_points;
+  }
   TextScan scan(text);
   ASSIGN_OR_RETURN(const TextHeader header, read_text_header(scan));
   Groom groom;
   groom.offset.push_back(0);
-  for (uint32_t strand = 0; strand < header.strand_count; ++strand) {
-    if (strand > 0) {
-      if (!scan.next_filled_line()) {
-        return line_error(scan, ErrorCode::BadInput, "the file ends after {} of {} strands", strand,
-                          header.strand_count);
-      }
-      RETURN_IF_ERROR(expect_word(scan, "strand"));
-    }
-    RETURN_IF_ERROR(read_strand(scan, strand, groom));
-  }
-  if (scan.next_filled_line()) {
-    return line_error(scan, ErrorCode::BadInput, "{} follows the last of {} strands",
-                      quoted(scan.next_word()), header.strand_count);
-  }
-  return with_pinning(std::move(groom), header.has_both_ends ? Pinning::BothEnds : Pinning::RootPair);
+  ASSIGN_OR_RETURN(std::string note, read_strands(scan, header.strand_count, groom));
+  StatedGroom stated;
+  stated.groom = with_pinning(std::move(groom), header.has_both_ends ? Pinning::BothEnds : Pinning::RootPair);
+  if (!with_points.empty()) stated.notes.emplace_back("its numbers have decimal commas");
+  if (!note.empty()) stated.notes.push_back(std::move(note));
+  return stated;
 }
 
 }  // namespace strandcast

@@ -21,6 +21,7 @@ struct Tally {
   size_t curves_prims = 0;
   size_t left_out_prims = 0;
   size_t cubic_strands = 0;
+  size_t rests = 0, rests_elsewhere = 0;  // BasisCurves with a rest shape
   std::string basis;
   std::optional<double> time_code;
   float least_width = 0.0f, most_width = 0.0f;
@@ -114,6 +115,59 @@ StrandLabels labels_of(const UsdCurves& curves, double scale, const std::string&
   return labels;
 }
 
+/// Where the rest shape of curve physics has the roots: where the points have them, or in a space of its own.
+enum class RestShape { NotThere, InPlace, Elsewhere };
+
+RestShape rest_shape_of(const UsdCurves& curves) {
+  constexpr float kSameShare = 1e-3f;  // of the largest coordinate
+  if (curves.rest_points.empty()) return RestShape::NotThere;
+  if (curves.rest_points.size() != curves.points.size()) return RestShape::Elsewhere;
+  float reach = 0.0f;
+  for (const glm::vec3& point : curves.points)
+    reach = std::max({reach, std::abs(point.x), std::abs(point.y), std::abs(point.z)});
+  size_t root = 0;
+  for (const uint32_t count : curves.vertex_counts) {
+    if (count > 0 && !(glm::distance(curves.rest_points[root], curves.points[root]) <= kSameShare * reach))
+      return RestShape::Elsewhere;
+    root += count;
+  }
+  return RestShape::InPlace;
+}
+
+/// What the first material of curve physics says, and the curves themselves: in kg and the file's lengths.
+HairMaterial material_of(const UsdStage& stage, std::vector<std::string>& notes) {
+  HairMaterial material;
+  size_t others = 0;
+  const auto is_said = [](const std::optional<double>& value) { return value && std::isfinite(*value); };
+  for (size_t prim = 0; prim < stage.prim.size(); ++prim) {
+    const UsdPrim& own = stage.prim[prim];
+    const bool says_stiffness = is_said(own.matter.young_modulus) || is_said(own.bend_modulus);
+    if (is_left_out(stage, prim) || !(says_stiffness || is_said(own.matter.diameter))) continue;
+    if (material.is_known()) {
+      ++others;
+      continue;
+    }
+    const auto said = [&](std::optional<double> value, double factor) {
+      return is_said(value) ? std::optional(*value * factor) : std::nullopt;
+    };
+    material.diameter = said(own.matter.diameter, 1.0);
+    material.young_modulus =
+        said(is_said(own.matter.young_modulus) ? own.matter.young_modulus : own.bend_modulus,
+             stage.kilograms_per_unit);
+    material.poisson_ratio = said(own.matter.poisson_ratio, 1.0);
+    // 0 stands for what is not said.
+    if (own.matter.density.value_or(0.0) > 0.0)
+      material.density = said(own.matter.density, stage.kilograms_per_unit);
+  }
+  for (const UsdPrim& prim : stage.prim)
+    if (prim.curves && !prim.curves->thicknesses.empty() && !material.diameter) {
+      const std::vector<double>& all = prim.curves->thicknesses;
+      material.diameter = std::accumulate(all.begin(), all.end(), 0.0) / static_cast<double>(all.size());
+    }
+  if (others > 0) notes.push_back(fmt::format("{} further physics materials are not read", others));
+  return material;
+}
+
 Status add_curves(const UsdStage& stage, size_t prim, Groom& groom, StrandLabels& labels, Tally& tally) {
   const UsdCurves& curves = *stage.prim[prim].curves;
   RETURN_IF_ERROR(check_counts(curves));
@@ -123,7 +177,10 @@ Status add_curves(const UsdStage& stage, size_t prim, Groom& groom, StrandLabels
                       kMaxGroomVertices);
   ASSIGN_OR_RETURN(const CurveKind kind, kind_of(curves));
   ASSIGN_OR_RETURN(const glm::dmat4 world, world_from_prim(stage, prim));
-  const std::span<const glm::vec3> points(curves.points);
+  const RestShape rest = rest_shape_of(curves);
+  if (rest == RestShape::Elsewhere) ++tally.rests_elsewhere;
+  if (rest == RestShape::InPlace) ++tally.rests;
+  const std::span<const glm::vec3> points(rest == RestShape::InPlace ? curves.rest_points : curves.points);
   size_t first = 0;
   for (size_t curve = 0; curve < curves.vertex_counts.size(); ++curve) {
     const auto control = points.subspan(first, curves.vertex_counts[curve]);
@@ -176,7 +233,7 @@ std::string where_else(const UsdStage& stage) {
 }
 
 std::vector<std::string> notes_of(const UsdStage& stage, const Tally& tally) {
-  std::vector<std::string> notes;
+  std::vector<std::string> notes = stage.notes;
   if (tally.curves_prims > 1) notes.push_back(fmt::format("strands of {} BasisCurves", tally.curves_prims));
   if (tally.time_code)
     notes.push_back(
@@ -191,6 +248,9 @@ std::vector<std::string> notes_of(const UsdStage& stage, const Tally& tally) {
         fmt::format("widths of {:.4g} to {:.4g} units are kept for exports: look.strand_radius_m says "
                     "how thick hair is drawn",
                     tally.least_width, tally.most_width));
+  if (tally.rests > 0) notes.emplace_back("the hair is the rest shape of its curve physics");
+  if (tally.rests_elsewhere > 0)
+    notes.emplace_back("rest shapes whose roots lie elsewhere are not read: points are the hair");
   if (tally.left_out_prims > 0)
     notes.push_back(fmt::format("{} BasisCurves are left out: inactive, invisible, a class or an override",
                                 tally.left_out_prims));
@@ -265,20 +325,24 @@ Result<UsdStage> read_stage(const std::shared_ptr<GroomSource>& source) {
   return read_usda_stage({text.data(), text.size()});
 }
 
-/// Guides that drive other strands are no hair; alone they are.
-void leave_out_guides(StatedGroom& stated, Tally& tally) {
+/// Guides that drive other strands are no hair, unless that is asked for; alone they are.
+void part_guides(StatedGroom& stated, Tally& tally, GuideUse use) {
   const auto guides = std::count(tally.is_guide.begin(), tally.is_guide.end(), uint8_t{1});
   if (guides == 0) return;
   if (static_cast<size_t>(guides) == tally.is_guide.size()) {
     stated.notes.emplace_back("all strands are guides: they are taken as hair");
     return;
   }
-  for (uint8_t& flag : tally.is_guide) flag = 1 - flag;
+  if (use == GuideUse::LeaveOut)
+    for (uint8_t& flag : tally.is_guide) flag = 1 - flag;
   keep_strands(stated.groom, stated.labels, tally.is_guide);
-  stated.notes.push_back(fmt::format("{} guides are left out", guides));
+  stated.notes.push_back(
+      use == GuideUse::Alone
+          ? fmt::format("{} guides are the hair, other strands are left out", guides)
+          : fmt::format("{} guides are left out (groom.file.guides takes them alone)", guides));
 }
 
-Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source) {
+Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source, GuideUse guides) {
   ASSIGN_OR_RETURN(const UsdStage stage, read_stage(source));
   StatedGroom stated;
   stated.groom.offset.push_back(0);
@@ -299,7 +363,8 @@ Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source) {
   stated.unit_reason = "its metersPerUnit says so";
   stated.up_axis_reason = "its upAxis says so";
   stated.notes = notes_of(stage, tally);
-  leave_out_guides(stated, tally);
+  stated.material = material_of(stage, stated.notes);
+  part_guides(stated, tally, guides);
   stated.groom = with_pinning(std::move(stated.groom), Pinning::Root);
   return with_usable_strands(std::move(stated));
 }
@@ -310,14 +375,14 @@ bool is_usd_extension(std::string_view extension) {
   return extension == ".usd" || extension == ".usda" || extension == ".usdc" || extension == ".usdz";
 }
 
-Result<StatedGroom> read_usd(std::string_view file) {
-  return read(std::make_shared<GroomSource>(std::as_bytes(std::span(file))));
+Result<StatedGroom> read_usd(std::string_view file, GuideUse guides) {
+  return read(std::make_shared<GroomSource>(std::as_bytes(std::span(file))), guides);
 }
 
-Result<StatedGroom> load_usd(const std::filesystem::path& path) {
+Result<StatedGroom> load_usd(const std::filesystem::path& path, GuideUse guides) {
   auto source = GroomSource::open(path);
   if (!source) return at(path.string(), source.error());
-  auto stated = read(*source);
+  auto stated = read(*source, guides);
   if (!stated) return at(path.string(), stated.error());
   stated->groom.name = path.stem().string();
   return stated;

@@ -3,22 +3,25 @@
 #include <algorithm>
 
 #include "common/groom/text_scan.h"
+#include "common/groom/usd_loader.h"
 
 namespace strandcast {
 
-Status set_up_axis(UsdStage& stage, std::string_view axis) {
-  if (axis != "Y" && axis != "Z" && axis != "y" && axis != "z")
-    return make_error(ErrorCode::BadInput, "upAxis is {}, known are Y and Z", quoted(axis));
-  stage.is_z_up = axis == "Z" || axis == "z";
-  return {};
+void set_up_axis(UsdStage& stage, std::string_view axis) {
+  if (axis == "Y" || axis == "Z" || axis == "y" || axis == "z")
+    stage.is_z_up = axis == "Z" || axis == "z";
+  else
+    stage.notes.push_back(
+        fmt::format("its upAxis is {}, which is not Y or Z, and is left out", quoted(axis)));
 }
 
-Status set_meters_per_unit(UsdStage& stage, double value) {
+void set_meters_per_unit(UsdStage& stage, double value) {
   constexpr double kMostM = 1e3;
-  if (!(value > 0.0 && value <= kMostM))
-    return make_error(ErrorCode::BadInput, "metersPerUnit is {}, allowed is up to {}", value, kMostM);
-  stage.meters_per_unit = value;
-  return {};
+  if (value > 0.0 && value <= kMostM)
+    stage.meters_per_unit = value;
+  else
+    stage.notes.push_back(fmt::format(
+        "its metersPerUnit is {}, which is not above 0 and up to {:g}, and is left out", value, kMostM));
 }
 
 std::string* find_curves_word(UsdCurves& curves, std::string_view property) {
@@ -35,7 +38,20 @@ std::vector<double>* find_curves_numbers(UsdCurves& curves, std::string_view pro
          : property == "primvars:groom_group_id"           ? &curves.groups
          : property == "primvars:groom_root_uv"            ? &curves.root_uv
          : property == "primvars:groom_group_name:indices" ? &curves.group_name_indices
+         : property == kUsdThicknesses                     ? &curves.thicknesses
                                                            : nullptr;
+}
+
+std::optional<double>* find_material_number(UsdPrim& prim, std::string_view property) {
+  constexpr std::string_view kPhysics = "physics:", kOlder = "omniphysics:";
+  if (!prim.is_material || !(property.starts_with(kPhysics) || property.starts_with(kOlder))) return nullptr;
+  const std::string_view name = property.substr(property.find(':') + 1);
+  return name == "thickness" || name == "curvesThickness" ? &prim.matter.diameter
+         : name == "youngsModulus"                        ? &prim.matter.young_modulus
+         : name == "bendStiffness"                        ? &prim.bend_modulus
+         : name == "density"                              ? &prim.matter.density
+         : name == "poissonsRatio"                        ? &prim.matter.poisson_ratio
+                                                          : nullptr;
 }
 
 Status set_xform_op(UsdPrim& prim, std::string_view name, std::vector<double> value, bool is_sample) {

@@ -30,7 +30,9 @@ struct UsdCurves {
   std::vector<uint32_t> vertex_counts;
   std::vector<float> widths;
   std::vector<double> guides, ids, groups,
-      root_uv;                             // primvars of Unreal's groom conventions; empty: there are none
+      root_uv;                         // primvars of Unreal's groom conventions; empty: there are none
+  std::vector<glm::vec3> rest_points;  // of USD's proposed curve physics, as `thicknesses`
+  std::vector<double> thicknesses;
   std::vector<std::string> group_names;    // likewise; one for each strand or for all, or by indices
   std::vector<double> group_name_indices;  // empty: there are none
   std::string type = "cubic";              // USD's own defaults
@@ -51,15 +53,20 @@ struct UsdPrim {
   bool is_left_out = false;  // a class, an override, not active or not visible
   std::vector<UsdXformOp> op;
   std::vector<std::string> op_order;
+  bool is_material = false;
+  HairMaterial matter;                 // of a material
+  std::optional<double> bend_modulus;  // likewise, in place of Young's modulus
   std::optional<UsdCurves> curves;
 };
 
 struct UsdStage {
   std::optional<double> meters_per_unit;
+  double kilograms_per_unit = 1.0;
   std::optional<bool> is_z_up;
-  std::vector<UsdPrim> prim;     // parents before what is in them
-  size_t reference_count = 0;    // references, payloads, sublayers, inherited prims and variants
-  size_t other_curve_count = 0;  // NurbsCurves, HermiteCurves
+  std::vector<UsdPrim> prim;       // parents before what is in them
+  size_t reference_count = 0;      // references, payloads, sublayers, inherited prims and variants
+  size_t other_curve_count = 0;    // NurbsCurves, HermiteCurves
+  std::vector<std::string> notes;  // of what could not be used
 };
 
 /// Reads a stage from text; BadInput and LimitExceeded name the line.
@@ -67,13 +74,15 @@ Result<UsdStage> read_usda_stage(std::string_view text);
 /// Reads the same from the binary form; BadInput, LimitExceeded and Unsupported name the prim.
 Result<UsdStage> read_usdc_stage(std::shared_ptr<GroomSource> source);
 
-/// What both readers do with what a file states. BadInput for an axis or unit that is none.
-Status set_up_axis(UsdStage& stage, std::string_view axis);
-Status set_meters_per_unit(UsdStage& stage, double value);
+/// What both readers do with what a file states. An axis or unit that is none is left out with a note.
+void set_up_axis(UsdStage& stage, std::string_view axis);
+void set_meters_per_unit(UsdStage& stage, double value);
 /// Returns where a word of curves belongs ("type", "basis", "wrap"), or null for any other property.
 std::string* find_curves_word(UsdCurves& curves, std::string_view property);
 /// Returns where a list of numbers of curves belongs (of Unreal's groom conventions), or null.
 std::vector<double>* find_curves_numbers(UsdCurves& curves, std::string_view property);
+/// Returns where a number of a material belongs (of USD's proposed curve physics), or null.
+std::optional<double>* find_material_number(UsdPrim& prim, std::string_view property);
 /// Keeps a transform's numbers; those of a time sample stay behind those without. LimitExceeded.
 Status set_xform_op(UsdPrim& prim, std::string_view name, std::vector<double> value, bool is_sample);
 /// Whether a prim of this type is curves of another kind.

@@ -4,6 +4,7 @@
 
 #include "common/groom/groom.h"
 #include "common/groom/text_scan.h"
+#include "common/groom/usd_loader.h"
 #include "common/groom/usda_scan.h"
 
 namespace strandcast {
@@ -70,11 +71,17 @@ class StageReader {
     return read_metadata([this](std::string_view key) -> Status {
       if (key == "upAxis") {
         ASSIGN_OR_RETURN(const std::string_view axis, scan_.string());
-        return here(set_up_axis(stage_, axis));
+        set_up_axis(stage_, axis);
+        return {};
       }
       if (key == "metersPerUnit") {
         ASSIGN_OR_RETURN(const double value, scan_.number());
-        return here(set_meters_per_unit(stage_, value));
+        set_meters_per_unit(stage_, value);
+        return {};
+      }
+      if (key == "kilogramsPerUnit") {
+        ASSIGN_OR_RETURN(stage_.kilograms_per_unit, scan_.number());
+        return {};
       }
       if (key == "subLayers") ++stage_.reference_count;
       return scan_.skip_value();
@@ -112,6 +119,7 @@ class StageReader {
     if (scan_.take('(')) RETURN_IF_ERROR(read_prim_metadata(prim));
     if (is_other_curves(type)) ++stage_.other_curve_count;
     if (type == "BasisCurves") prim.curves.emplace();
+    prim.is_material = type == "Material";
     const size_t index = stage_.prim.size();
     stage_.prim.push_back(std::move(prim));
     RETURN_IF_ERROR(scan_.expect('{'));
@@ -173,6 +181,10 @@ class StageReader {
       prim.op_order.assign(order.begin(), order.end());
       return {};
     }
+    if (std::optional<double>* const number = find_material_number(prim, name)) {
+      ASSIGN_OR_RETURN(*number, scan_.number());
+      return {};
+    }
     if (name.starts_with("xformOp:")) return take_op(name, prim, time.has_value());
     return prim.curves ? take_curves(name, *prim.curves, time) : scan_.skip_value();
   }
@@ -187,6 +199,11 @@ class StageReader {
       if (time && !curves.points.empty()) return scan_.skip_value();
       ASSIGN_OR_RETURN(curves.points, scan_.points(kMaxGroomVertices));
       curves.time_code = time;
+      return {};
+    }
+    if (name == kUsdRestPoints) {
+      if (time && !curves.rest_points.empty()) return scan_.skip_value();
+      ASSIGN_OR_RETURN(curves.rest_points, scan_.points(kMaxGroomVertices));
       return {};
     }
     if (name == "curveVertexCounts") {

@@ -40,6 +40,7 @@ enum class UsdcType : uint8_t {
   Vec3f = 24,
   Vec3h = 25,
   TokenListOp = 32,
+  PathListOp = 34,
   TokenVector = 41,
   Specifier = 42,
   Variability = 44,

@@ -4,6 +4,7 @@
 #include <unordered_map>
 
 #include "common/groom/text_scan.h"
+#include "common/groom/usd_loader.h"
 #include "common/groom/usd_stage.h"
 #include "common/groom/usdc_archive.h"
 
@@ -62,12 +63,17 @@ class CrateReader {
     ASSIGN_OR_RETURN(const auto axis, archive_.field(archive_.root(), "upAxis"));
     if (axis) {
       ASSIGN_OR_RETURN(const auto text, archive_.text(*axis));
-      RETURN_IF_ERROR(set_up_axis(stage_, text));
+      set_up_axis(stage_, text);
     }
     ASSIGN_OR_RETURN(const auto unit, archive_.field(archive_.root(), "metersPerUnit"));
     if (unit) {
       ASSIGN_OR_RETURN(const auto numbers, archive_.numbers(*unit));
-      RETURN_IF_ERROR(set_meters_per_unit(stage_, numbers.empty() ? 0.0 : numbers.front()));
+      set_meters_per_unit(stage_, numbers.empty() ? 0.0 : numbers.front());
+    }
+    ASSIGN_OR_RETURN(const auto mass, archive_.field(archive_.root(), "kilogramsPerUnit"));
+    if (mass) {
+      ASSIGN_OR_RETURN(const auto numbers, archive_.numbers(*mass));
+      if (!numbers.empty()) stage_.kilograms_per_unit = numbers.front();
     }
     return count_references(archive_.root());
   }
@@ -134,6 +140,7 @@ class CrateReader {
     if (type) {
       ASSIGN_OR_RETURN(const auto name, archive_.text(*type));
       if (name == "BasisCurves") prim.curves.emplace();
+      prim.is_material = name == "Material";
       if (is_other_curves(name)) ++stage_.other_curve_count;
     }
     return count_references(own);
@@ -141,9 +148,11 @@ class CrateReader {
 
   static bool is_wanted(std::string_view name, UsdPrim& prim) {
     if (name == "visibility" || name.starts_with("xformOp")) return true;
-    return prim.curves && (name == "points" || name == "curveVertexCounts" || name == "widths" ||
-                           name == kUsdGroupName || find_curves_numbers(*prim.curves, name) != nullptr ||
-                           find_curves_word(*prim.curves, name) != nullptr);
+    if (find_material_number(prim, name) != nullptr) return true;
+    return prim.curves &&
+           (name == "points" || name == kUsdRestPoints || name == "curveVertexCounts" || name == "widths" ||
+            name == kUsdGroupName || find_curves_numbers(*prim.curves, name) != nullptr ||
+            find_curves_word(*prim.curves, name) != nullptr);
   }
 
   /// Takes the value of a property: what has no time goes before the first of its samples.
@@ -178,6 +187,11 @@ class CrateReader {
       ASSIGN_OR_RETURN(auto numbers, archive_.numbers(value));
       return set_xform_op(prim, name, std::move(numbers), time.has_value());
     }
+    if (std::optional<double>* const number = find_material_number(prim, name)) {
+      ASSIGN_OR_RETURN(const auto numbers, archive_.numbers(value));
+      if (!numbers.empty()) *number = numbers.front();
+      return {};
+    }
     return take_curves(name, value, time, *prim.curves);
   }
 
@@ -185,6 +199,10 @@ class CrateReader {
     if (name == "points") {
       ASSIGN_OR_RETURN(curves.points, archive_.points(value, kMaxGroomVertices));
       curves.time_code = time;
+      return {};
+    }
+    if (name == kUsdRestPoints) {
+      ASSIGN_OR_RETURN(curves.rest_points, archive_.points(value, kMaxGroomVertices));
       return {};
     }
     if (name == "curveVertexCounts") {

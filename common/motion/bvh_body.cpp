@@ -17,14 +17,16 @@ struct UsualJoint {
 constexpr UsualJoint kUsualJoints[] = {
     {"neck", {"lowerneck", "Neck"}},
     {"chest", {"Chest2", "Spine3", "Spine2", "Spine1", "Chest"}},
-    {"left_shoulder", {"LeftArm", "LeftUpperArm", "lShldr", "LeftShoulder"}},
-    {"right_shoulder", {"RightArm", "RightUpperArm", "rShldr", "RightShoulder"}},
-    {"left_elbow", {"LeftForeArm", "LeftLowerArm", "lForeArm", "LeftElbow"}},
-    {"right_elbow", {"RightForeArm", "RightLowerArm", "rForeArm", "RightElbow"}},
+    {"left_shoulder", {"LeftArm", "LeftUpperArm", "lShldr", "L UpperArm", "LeftShoulder"}},
+    {"right_shoulder", {"RightArm", "RightUpperArm", "rShldr", "R UpperArm", "RightShoulder"}},
+    {"left_elbow", {"LeftForeArm", "LeftLowerArm", "lForeArm", "L Forearm", "LeftElbow"}},
+    {"right_elbow", {"RightForeArm", "RightLowerArm", "rForeArm", "R Forearm", "RightElbow"}},
 };
 
+/// "Neck" of "mixamorig:Neck" and "Bip01 Neck", "L UpperArm" of "Bip01 L UpperArm".
 std::string_view without_prefix(std::string_view name) {
-  const size_t separator = name.find_last_of(":_");
+  size_t separator = name.find_last_of(":_");
+  if (separator == std::string_view::npos) separator = name.find(' ');
   return separator == std::string_view::npos ? name : name.substr(separator + 1);
 }
 

@@ -11,11 +11,14 @@ Result<FileGroom> load_file_groom(const FileGroomDesc& file) {
   options.path = file.path;
   options.more_paths = file.more_paths;
   options.unit_m = file.unit_m;
-  options.is_z_up = file.has_up_axis ? std::optional(file.up_axis == UpAxis::Z) : std::nullopt;
+  const UpAxis up = file.up_axis;
+  options.is_z_up = file.has_up_axis ? std::optional(up == UpAxis::Z || up == UpAxis::MinusZ) : std::nullopt;
+  options.is_upside_down = up == UpAxis::MinusY || up == UpAxis::MinusZ;
   options.yaw_deg = file.has_yaw ? std::optional(file.yaw_deg) : std::nullopt;
   if (file.has_origin) options.origin = file.origin;
   options.vertex_count = file.vertex_count;
   options.strand_vertex_count = file.strand_vertex_count;
+  options.guides = file.guides ? GuideUse::Alone : GuideUse::LeaveOut;
   if (file.has_pinning) options.pinning = file.pinning;
   FileGroom hair;
   ASSIGN_OR_RETURN(hair.placed, load_placed_groom(options));

@@ -23,7 +23,7 @@
 
 namespace strandcast {
 
-enum class UpAxis { Y, Z };
+enum class UpAxis { Y, Z, MinusY, MinusZ };
 
 /// Hair grown along the normals of a hemispherical scalp mesh.
 struct ProceduralGroomDesc {
@@ -52,6 +52,7 @@ struct FileGroomDesc {
   uint32_t vertex_count = 0;  // resample to this many; 0 = keep (rounded into the limits)
   Pinning pinning = Pinning::RootPair;
   bool has_pinning = false;          // false: as the file says
+  bool guides = false;               // guides beside other strands are the hair; false: the others are
   uint32_t strand_vertex_count = 0;  // of a .ply: points of one strand; 0 = as the file says, else guessed
 
   bool operator==(const FileGroomDesc&) const = default;
@@ -209,7 +210,7 @@ struct CameraDesc {
 struct StreamDesc {
   std::string codec = "step";  // "step" (fewest bits), "tangent", "delta" (least time) or "raw"
   bool has_codec = false;      // false: nobody chose; a server may take another where it costs too much
-  float bound_m = 1e-4f;       // announced Euclidean error bound, 2e-5 .. 5e-4
+  float bound_m = 1e-4f;       // announced Euclidean error bound, 1e-6 .. 5e-4
   uint32_t frame_width = 640, frame_height = 360;
   uint32_t jpeg_quality = 80;
   double frame_rate_hz = 15.0;  // rendered frames, at most

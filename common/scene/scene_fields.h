@@ -75,7 +75,7 @@ inline constexpr Range kGustLength{0.1, 1000.0, "m"};
 inline constexpr Range kFraction{0.0, 1.0, ""};
 inline constexpr Range kDirection{-1e3, 1e3, ""};
 inline constexpr Range kHeadPlace{-1000.0, 1000.0, "m"};
-inline constexpr Range kStreamBound{2e-5, 5e-4, "m"};
+inline constexpr Range kStreamBound{1e-6, 5e-4, "m"};
 inline constexpr Range kFrameWidth{kMinPictureSide, kMaxPictureWidth, "pixels"};
 inline constexpr Range kFrameHeight{kMinPictureSide, kMaxPictureHeight, "pixels"};
 inline constexpr Range kJpegQuality{1, 100, ""};
@@ -111,7 +111,7 @@ void visit_groom(Visitor& v, GroomDesc& groom) {
               "is empty: name the groom file, for example --set groom.file.path=FILE.tfx");
     v.number("unit_m", file->unit_m, kUnit);
     file->has_up_axis = v.chooses("up_axis", file->has_up_axis);
-    if (file->has_up_axis) v.choice("up_axis", file->up_axis, UpAxis::Z);
+    if (file->has_up_axis) v.choice("up_axis", file->up_axis, UpAxis::MinusZ);
     file->has_origin = v.chooses("origin", file->has_origin);
     if (file->has_origin) v.vector("origin", file->origin, kFileOrigin);
     v.number("vertex_count", file->vertex_count, kResampledVertexCount);
@@ -125,6 +125,7 @@ void visit_groom(Visitor& v, GroomDesc& groom) {
     v.number("strand_vertex_count", file->strand_vertex_count, kFileVertexCount);
     v.require("strand_vertex_count", file->strand_vertex_count != 1,
               "is 1, a strand has at least 2 vertices");
+    v.flag("guides", file->guides);
   });
 }
 

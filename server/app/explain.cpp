@@ -21,7 +21,6 @@
 namespace strandcast {
 namespace {
 
-constexpr int kMeasuredSteps = 13;
 constexpr int kMeasuredPictures = 3;
 
 std::string fact_text(const FeatureReason& fact) {

@@ -17,6 +17,8 @@ namespace strandcast {
 /// Lists every solver with its parameters, ranges and source.
 std::string list_solvers();
 
+inline constexpr int kMeasuredSteps = 13;
+
 struct MeasureConfig {
   std::string sim_device = "auto";                     // as ExecutorConfig
   std::string gl_device = "auto";                      // as EglContext::make

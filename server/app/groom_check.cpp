@@ -25,8 +25,9 @@ constexpr float kPixelsPerStrand = 0.6f;
 constexpr uint32_t kSphereRings = 12;
 constexpr float kBelowHairM = 0.06f;  // so much of the head is shown below the hair
 
-/// From the front, from the left side of the head, from above.
-constexpr std::array kDirections = {glm::vec3(0, 0, 1), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)};
+/// From the front, from the left side of the head, from behind, from above.
+constexpr std::array kDirections = {glm::vec3(0, 0, 1), glm::vec3(1, 0, 0), glm::vec3(0, 0, -1),
+                                    glm::vec3(0, 1, 0)};
 
 struct Box {
   glm::vec3 low{0.0f}, high{0.0f};
@@ -120,20 +121,30 @@ std::vector<SphereCollider> balls_along(const std::vector<BodyCapsule>& capsules
   return balls;
 }
 
-Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::path& folder,
-                                const MeasureConfig& config) {
-  ASSIGN_OR_RETURN(const SceneContent content, load_scene_content(scene));
-  std::error_code failure;
-  std::filesystem::create_directories(folder, failure);
-  if (failure)
-    return make_error(ErrorCode::Unavailable, "cannot make the folder {}: {}", folder.string(),
-                      failure.message());
+namespace {
+
+/// Makes the solver and takes steps with it, as a server would. Returns a sentence, and what the solver says
+/// of the hair.
+Result<std::string> step_groom(SceneDesc scene, const SceneContent& content, const MeasureConfig& config) {
+  RuntimeFacts facts;
+  facts.strand_viewers = 1;
+  scene = with_material(std::move(scene), content.material);
+  scene.stream.codec = "raw";  // what is sent is no matter here
+  ASSIGN_OR_RETURN(const Measured measured, measure_passes(scene, content, facts, config));
+  ASSIGN_OR_RETURN(const std::vector<std::string> said, explain_groom(scene, content.groom));
+  std::string text;
+  for (const std::string& sentence : said) text += sentence + "\n";
+  return text + fmt::format("{} steps are taken with {} on {}\n", kMeasuredSteps, scene.solver.name,
+                            measured.sim_device);
+}
+
+/// Draws hair alone, hair on its head, hair on what collides, and saves the picture. Returns a sentence.
+Result<std::string> draw_groom(const SceneDesc& scene, const SceneContent& content, const BodyShapes& body,
+                               const std::filesystem::path& picture, const MeasureConfig& config) {
   ASSIGN_OR_RETURN(const auto device,
                    RenderDevice::open({config.renderer, config.gl_device, config.shader_folder}));
-  // Hair alone, hair on its head, hair on what collides.
   const bool is_field = content.head_field != nullptr && content.colliders.empty();
   std::vector<SphereCollider> balls = content.colliders;
-  const BodyShapes body = shapes_of(scene.body, {});  // as far as it needs no stream
   for (const SphereCollider& ball : balls_along(body.capsules)) balls.push_back(ball);
   const std::array<Mesh, 3> heads = {Mesh{}, content.head, is_field ? content.head : mesh_of_balls(balls)};
   const Box box = box_of(content, content.head);
@@ -143,6 +154,26 @@ Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::p
   sheet.rgba.resize(4 * size_t{sheet.width} * sheet.height);
   for (uint32_t row = 0; row < heads.size(); ++row)
     RETURN_IF_ERROR(draw_row(*device, make_scene_asset(content.groom, heads[row]), scene, box, row, sheet));
+  RETURN_IF_ERROR(save_png(picture, sheet));
+  const std::string last = is_field ? "on the head once more, which collides itself"
+                                    : fmt::format("on the {} spheres that collide", content.colliders.size());
+  return fmt::format(
+      "{}: from the front, from its left side, from behind and from above; hair alone, on the head, {}\n",
+      picture.string(), last);
+}
+
+}  // namespace
+
+Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::path& folder,
+                                const MeasureConfig& config) {
+  ASSIGN_OR_RETURN(const SceneContent content, load_scene_content(scene));
+  std::error_code failure;
+  std::filesystem::create_directories(folder, failure);
+  if (failure)
+    return make_error(ErrorCode::Unavailable, "cannot make the folder {}: {}", folder.string(),
+                      failure.message());
+  const BodyShapes body = shapes_of(scene.body, {});  // as far as it needs no stream
+  ASSIGN_OR_RETURN(const std::string drawn, draw_groom(scene, content, body, folder / "groom.png", config));
   std::string text;
   for (const std::string& note : content.notes) text += note + "\n";
   if (!body.capsules.empty()) {
@@ -151,13 +182,14 @@ Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::p
     text += to_sentence(measure_inside(fixed, content.groom), body.capsules.size()) + "\n";
   }
   for (const std::string& sentence : body.missing) text += sentence + ": drawn without\n";
-  const std::filesystem::path picture = folder / "groom.png";
-  RETURN_IF_ERROR(save_png(picture, sheet));
-  const std::string last = is_field ? "on the head once more, which collides itself"
-                                    : fmt::format("on the {} spheres that collide", content.colliders.size());
-  text += fmt::format("{}: from the front, from its left side and from above; hair alone, on the head, {}\n",
-                      picture.string(), last);
+  text += drawn;
+  const Result<std::string> stepped = step_groom(scene, content, config);
+  if (stepped) text += *stepped;
   RETURN_IF_ERROR(save_file(folder / "groom.txt", std::as_bytes(std::span(text))));
+  if (!content.unlikely_unit.empty())
+    return make_error(ErrorCode::BadInput, "{} (the picture is in {})", content.unlikely_unit,
+                      folder.string());
+  if (!stepped) return stepped.error();
   return text;
 }
 

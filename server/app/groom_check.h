@@ -1,5 +1,5 @@
 // `strandcast-server --check`: draws a scene's hair and head as loaded, so that a person can see whether they
-// fit. No simulation, streams or network.
+// fit, and takes a few steps with its solver. No streams or network.
 #pragma once
 
 #include <filesystem>
@@ -17,9 +17,11 @@ namespace strandcast {
 Mesh mesh_of_balls(const std::vector<SphereCollider>& balls);
 std::vector<SphereCollider> balls_along(const std::vector<BodyCapsule>& capsules);
 
-/// Draws the scene at rest from the front, left and above: hair alone, with the head, and with the colliders.
-/// Creates the folder and writes groom.png and groom.txt to it. Returns the text: guesses with reasons, and
-/// how well head, colliders and hair agree. Needs a GL device; errors name the file or folder.
+/// Draws the scene at rest from the front, left, back and above: hair alone, with the head, and with the
+/// colliders. Creates the folder and writes groom.png and groom.txt to it. Returns the text: guesses with
+/// reasons, how well head, colliders and hair agree, and what the solver says. Needs a GL device. Errors name
+/// the file or folder, and why a server would not start; BadInput also for a unit in which no head has this
+/// hair.
 Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::path& folder,
                                 const MeasureConfig& config);
 

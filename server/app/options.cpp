@@ -113,7 +113,7 @@ void add_scene_options(CLI::App& app, ServerOptions& options, NamedFiles& named)
       ->expected(1)
       ->take_all();
   app.add_option("--check", named.checked,
-                 "hair file as for --groom: draw it as loaded, from the front, the side and above, say what "
+                 "hair file as for --groom: draw it as loaded, from four sides, take a few steps, say what "
                  "was guessed, "
                  "and leave; without a file: the hair of the scene")
       ->expected(0, 1);

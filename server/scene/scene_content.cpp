@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "common/groom/bust_skin.h"
@@ -119,14 +120,32 @@ std::vector<SphereCollider> colliders_of(const SceneDesc& scene,
   return scene.has_auto_collider ? head_colliders : std::vector<SphereCollider>{};
 }
 
+SceneDesc with_material(SceneDesc scene, const HairMaterial& material) {
+  if (scene.solver.name != "direct_rod") return scene;
+  for (const auto& [parameter, value, factor] : {std::tuple("radius_m", material.diameter, 0.5),
+                                                 {"young_modulus_pa", material.young_modulus, 1.0},
+                                                 {"density_kgpm3", material.density, 1.0},
+                                                 {"poisson_ratio", material.poisson_ratio, 1.0}})
+    if (value) scene.solver.parameters.emplace(parameter, factor * *value);
+  return scene;
+}
+
 Result<SceneContent> load_scene_content(const SceneDesc& scene) {
   SceneContent content;
   GroomPlacement placement;
+  bool has_head = true;
   if (const auto* file = std::get_if<FileGroomDesc>(&scene.groom)) {
     ASSIGN_OR_RETURN(FileGroom hair, load_file_groom(*file));
     content.groom = hair.simulated();
     content.notes = std::move(hair.placed.notes);
+    content.unlikely_unit = std::move(hair.placed.unlikely_unit);
+    content.material = hair.placed.material;
     placement = hair.placed.placement;
+    // Fur gets none, unless somebody says where it is.
+    has_head = hair.placed.is_of_head || !scene.head.mesh_path.empty() || scene.head.has_center;
+    if (!has_head)
+      content.notes.emplace_back(
+          "these roots are no head of hair: no head is put under it (head.center_m states where one is)");
   } else {
     ASSIGN_OR_RETURN(content.groom,
                      grow_hair_of(scene, std::get<ProceduralGroomDesc>(scene.groom), scene.hair));
@@ -136,7 +155,10 @@ Result<SceneContent> load_scene_content(const SceneDesc& scene) {
     if (!target) return at("target_groom", target.error());
     content.volume_target = std::make_shared<const Groom>(std::move(target).value());
   }
-  ASSIGN_OR_RETURN(Mesh head, make_head_under(scene, content.groom, placement));
+  Mesh head;
+  if (has_head) {
+    ASSIGN_OR_RETURN(head, make_head_under(scene, content.groom, placement));
+  }
   if (std::holds_alternative<FileGroomDesc>(scene.groom))
     content.groom = restyled(std::move(content.groom), scene.hair.length, scene.hair.curl);
   std::vector<FittedSphere> spheres;
@@ -144,9 +166,9 @@ Result<SceneContent> load_scene_content(const SceneDesc& scene) {
     spheres = shrink_under(fit_spheres(head, kHeadSpheres, content.groom), content.groom);
   for (const FittedSphere& sphere : spheres)
     content.head_colliders.push_back({sphere.center_m, sphere.radius_m});
-  if (std::holds_alternative<FileGroomDesc>(scene.groom) && scene.head.collider == kSphereCollider)
+  if (std::holds_alternative<FileGroomDesc>(scene.groom) && !spheres.empty())
     content.notes.push_back(to_sentence(measure_head(head, spheres, content.groom), spheres.size()));
-  if (scene.head.collider == kFieldCollider) {
+  if (scene.head.collider == kFieldCollider && !head.triangle.empty()) {
     auto field = make_distance_field(head, scene.head.field_resolution);
     if (!field) return at(scene.head.mesh_path.empty() ? "head.collider" : "head.mesh_path", field.error());
     content.notes.push_back(to_sentence(measure_inside(*field, content.groom), *field));

@@ -9,6 +9,7 @@
 #include "common/groom/distance_field.h"
 #include "common/groom/groom.h"
 #include "common/groom/mesh.h"
+#include "common/groom/stated_groom.h"
 #include "common/math/bust.h"
 #include "common/scene/scene_desc.h"
 
@@ -22,12 +23,18 @@ struct SceneContent {
   std::vector<SphereCollider> colliders;            // head space: the scene's own, or those of the head
   BustRig bust;                                     // of the head; none without shoulders
   std::vector<std::string> notes;                   // a sentence for each thing that was guessed or fitted
+  std::string unlikely_unit;                        // as PlacedGroom
+  HairMaterial material;                            // likewise
   std::shared_ptr<const Groom> volume_target;       // head space; where the scene names one
   std::shared_ptr<const DistanceField> head_field;  // head space; where the scene asks for one
 };
 
 /// Loads or grows the groom and the head. Errors name the file or option.
 Result<SceneContent> load_scene_content(const SceneDesc& scene);
+
+/// Returns the scene with the parameters of hair of this material, where the solver has these and the scene
+/// says none.
+SceneDesc with_material(SceneDesc scene, const HairMaterial& material);
 
 /// Returns the scene's colliders, or the head's if the scene lists none and does not disable them. Head
 /// space.

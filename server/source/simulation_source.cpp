@@ -185,6 +185,7 @@ class SimulationSource : public StateSource {
 Result<std::unique_ptr<StateSource>> make_simulation(SimulationConfig config, InputHub& inputs) {
   RETURN_IF_ERROR(check_solver(config.scene));
   ASSIGN_OR_RETURN(SceneContent content, load_scene_content(config.scene));
+  config.scene = with_material(std::move(config.scene), content.material);
   for (const std::string& note : content.notes) log_info("scene", "{}", note);
   if (config.scene.camera == CameraDesc{})
     config.scene.camera = first_camera(config.scene.camera, content.groom.rest_position_m);

@@ -29,7 +29,7 @@ inline void check_loaded_groom(const Groom& read) {
   const float unit_m = guess_unit_m(groom);
   CHECK(unit_m > 0.0f);
   CHECK(std::abs(guess_yaw_deg(groom).value) <= 180.0f);
-  (void)guess_z_up(groom);
+  (void)guess_up(groom);
   if (!validate(groom)) return;
   const Groom uniform = resample(groom, 5);
   CHECK(uniform.uniform_vertex_count() == 5 && validate(uniform).ok());

@@ -7,7 +7,8 @@
 namespace strandcast::hair_fuzz {
 
 extern "C" int FUZZ_ENTRY(hair)(const uint8_t* data, size_t size) {
-  if (const auto groom = read_hair(ByteView(FuzzInput(data, size).take_rest()))) check_loaded_groom(*groom);
+  if (const auto stated = read_hair(ByteView(FuzzInput(data, size).take_rest())))
+    check_loaded_groom(stated->groom);
   return 0;
 }
 

@@ -7,8 +7,8 @@
 namespace strandcast::tfx_fuzz {
 
 extern "C" int FUZZ_ENTRY(tfx)(const uint8_t* data, size_t size) {
-  if (const auto groom = read_tfx_binary(ByteView(FuzzInput(data, size).take_rest())))
-    check_loaded_groom(*groom);
+  if (const auto stated = read_tfx_binary(ByteView(FuzzInput(data, size).take_rest())))
+    check_loaded_groom(stated->groom);
   return 0;
 }
 

@@ -7,7 +7,8 @@
 namespace strandcast::tfx_text_fuzz {
 
 extern "C" int FUZZ_ENTRY(tfx_text)(const uint8_t* data, size_t size) {
-  if (const auto groom = read_tfx_text(FuzzInput(data, size).take_rest_as_text())) check_loaded_groom(*groom);
+  if (const auto stated = read_tfx_text(FuzzInput(data, size).take_rest_as_text()))
+    check_loaded_groom(stated->groom);
   return 0;
 }
 

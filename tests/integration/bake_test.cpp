@@ -5,6 +5,7 @@
 #include <cmath>
 #include <csignal>
 #include <fstream>
+#include <map>
 #include <set>
 
 #include "common/base/file.h"
@@ -23,7 +24,7 @@ using testing::HasSubstr;
 
 constexpr double kClipRateHz = 60.0, kFps = 30.0;
 constexpr int kClipFrames = 31;
-constexpr double kBoundM = 2e-5 + 2e-6;  // of the stream, and what a file of floats rounds
+constexpr double kBoundM = 1e-6 + 2e-7;  // of the stream, and what a file of floats rounds
 
 class Bake : public testing::Test {
  protected:
@@ -218,6 +219,29 @@ TEST_F(Bake, FollowersComeWithTheirGuides) {
     ids.insert(file.value("groom_id", strand));
   }
   EXPECT_EQ(ids.size(), count) << "no two have an id";
+  // Guides that a strand hangs between, by their ids, and shares: these make its root of theirs.
+  std::map<double, size_t> guide_of;
+  for (size_t strand = 0; strand < kTufts; ++strand) guide_of[file.value("groom_id", strand)] = strand;
+  std::vector<size_t> first{0};
+  for (const uint32_t points : rest->vertex_counts) first.push_back(first.back() + points);
+  size_t between = 0;
+  for (size_t strand = 0; strand < count; ++strand) {
+    glm::dvec3 root(0.0);
+    double sum = 0.0, largest = 0.0;
+    for (uint32_t k = 0; k < 3; ++k) {
+      const double share = file.value("groom_guide_weights", strand, k);
+      const auto guide = guide_of.find(file.value("groom_closest_guides", strand, k));
+      ASSERT_NE(guide, guide_of.end());
+      root += share * glm::dvec3(rest->points[first[guide->second]]);
+      sum += share;
+      largest = std::max(largest, share);
+    }
+    EXPECT_NEAR(sum, 1.0, 1e-5);
+    if (largest > 0.999) continue;  // a guide itself, or one at a parting
+    ++between;
+    EXPECT_LT(glm::distance(root, glm::dvec3(rest->points[first[strand]])), 1e-3) << strand;
+  }
+  EXPECT_GT(between, 10u);
 }
 
 TEST_F(Bake, FramesAreAtTheTimesOfTheClip) {

@@ -229,6 +229,19 @@ TEST_F(ScenarioProgram, PicturesAreRenewedBelowItsFolderOnly) {
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "out.png"));
 }
 
+// What the server draws in lockstep is sent finely once more, and that is stored: every run has its bytes.
+TEST_F(ScenarioProgram, PicturesOfTheServerAreTheSameInEveryRunInLockstep) {
+  const auto path =
+      write("frames.textproto", std::string("name: \"frames\"\n") + kStart +
+                                    "do { view { name: \"a\" mode: \"frames\" width: 96 height: 64 } }\n"
+                                    "do { feed { motion: \"builtin\" from_s: 2 } }\n"
+                                    "do { step: 30 }\n"
+                                    "do { expect { picture { golden: \"seen.png\" db_above: 98 } } }\n");
+  EXPECT_EQ(run({"--scenario", path.string(), "--renew"}), 0) << text_of("said");
+  EXPECT_EQ(run({"--scenario", path.string()}), 0) << text_of("said");
+  EXPECT_THAT(text_of("said"), HasSubstr("measured 99.0 dB")) << "no difference at all";
+}
+
 TEST_F(ScenarioProgram, AWrongFileIsExitCodeTwoAndOneSentence) {
   const auto path = write("typo.textproto", "name: \"typo\"\ndo { stepp: 1 }\n");
   EXPECT_EQ(run({"--scenario", path.string()}), 2);

@@ -1,4 +1,5 @@
 #include "common/motion/bvh.h"
+#include "common/motion/bvh_body.h"
 
 #include <algorithm>
 #include <array>
@@ -701,6 +702,16 @@ TEST(BvhRealFiles, CutAnywhereThePlayedFramesAreThoseThatAreWhole) {
                   std::count(cut.begin() + static_cast<std::ptrdiff_t>(rows_begin), cut.end(), '\n')));
     EXPECT_THAT(clip->repairs.back(), HasSubstr("994 frames are announced"));
   }
+}
+
+TEST(Bvh, JointsOfABipedOf3dsMaxAreFoundByTheirNames) {
+  const std::vector<std::string> biped = {"Bip01 Pelvis",    "Bip01 Spine1",     "Bip01 Neck",
+                                          "Bip01 Head",      "Bip01 L Clavicle", "Bip01 L UpperArm",
+                                          "Bip01 L Forearm", "Bip01 R UpperArm", "Bip01 R Forearm"};
+  const std::vector<std::pair<std::string, size_t>> expected = {{"neck", 2},          {"chest", 1},
+                                                                {"left_shoulder", 5}, {"right_shoulder", 7},
+                                                                {"left_elbow", 6},    {"right_elbow", 8}};
+  EXPECT_EQ(usual_body(biped), expected);
 }
 
 /// What of the usual joints of a body a real clip has, and where they are.

@@ -77,7 +77,7 @@ std::vector<std::string> measured_claims() {
                   1e3 * kStreamBoundsM[2], 1e3 * kStreamBoundsM[3], 1e3 * kStreamBoundsM[4]),
       fmt::format("from {:g} m and {:g} m at each bound", kViewDistancesM[0], kViewDistancesM[1]),
       fmt::format("stream.bound_m={:g}", 2e-4),
-      fmt::format("{:.5f}..{:.4f}", scene_fields::kStreamBound.minimum, scene_fields::kStreamBound.maximum),
+      fmt::format("{:.6f}..{:.4f}", scene_fields::kStreamBound.minimum, scene_fields::kStreamBound.maximum),
       fmt::format("Viewers hear of it within {:g} s", kLookChangeNs / kNsPerS),
       fmt::format("states per second, {:g}..{:.0f},000, at most", scene_fields::kStrandRate.minimum,
                   scene_fields::kStrandRate.maximum / 1000.0),

@@ -85,6 +85,7 @@ class FedMotion : public testing::Test {
     FeedOptions options;
     options.motion = clip.path.string();
     options.wind = "none";
+    options.is_keeping_facing = true;
     return options;
   }
   static MotionPeaks own_peaks(const MotionClip& clip) {
@@ -211,6 +212,56 @@ TEST_F(FedMotion, LeavesOutFramesBeforeTheMotion) {
   testing::internal::CaptureStderr();
   EXPECT_TRUE(make_feed_plan(options_for(walk)));
   EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("walk.bvh: 1 of its frames left out"));
+}
+
+/// Mean direction of the face in a second, level.
+glm::dvec3 facing_of(const FeedPlan& plan) {
+  glm::dvec3 sum(0.0);
+  for (int i = 0; i < 60; ++i) sum += plan.motion(i / 60.0).rotation * glm::dvec3(0, 0, 1);
+  return glm::normalize(sum * glm::dvec3(1, 0, 1));
+}
+
+// What is called front is so of the clip, whichever way it faced on its stage; its wind keeps its side.
+TEST_F(FedMotion, AClipThatLooksAsideIsTurnedWithItsWind) {
+  const auto path = folder_.path() / "aside.bvh", wind = folder_.path() / "wind.csv";
+  const std::string csv = "t_s,x_mps,y_mps,z_mps\n0,3,0,0\n1,3,0,0\n";
+  ASSERT_TRUE(save_file(wind, std::as_bytes(std::span(csv))));
+  const auto plan_at = [&](double yaw_deg, bool keeps) {
+    std::string text =
+        "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 4 Xposition Yposition Zposition Yrotation\nJOINT "
+        "Head\n{\nOFFSET 0 1.6 0\nCHANNELS 1 Yrotation\nEnd Site\n{\nOFFSET 0 0.2 "
+        "0\n}\n}\n}\nMOTION\nFrames: "
+        "121\nFrame Time: 0.01\n";
+    // Walks 1 m where it looks, and looks 20 degrees to both sides of that.
+    for (int i = 0; i <= 120; ++i)
+      text += fmt::format("{} 0 {} {} {}\n", 0.01 * i * std::sin(glm::radians(yaw_deg)),
+                          0.01 * i * std::cos(glm::radians(yaw_deg)), yaw_deg,
+                          20.0 * std::sin(glm::radians(3.0 * i)));
+    EXPECT_TRUE(save_file(path, std::as_bytes(std::span(text))));
+    FeedOptions options;
+    options.motion = path.string();
+    options.wind = wind.string();
+    options.blend_s = 0.0;
+    options.is_keeping_facing = keeps;
+    auto plan = make_feed_plan(options);
+    EXPECT_TRUE(plan) << plan.error().to_string();
+    return std::move(plan).value();
+  };
+  const FeedPlan ahead = plan_at(0.0, false);
+  EXPECT_EQ(ahead.wind(0.5), glm::vec3(3, 0, 0)) << "nothing to turn";
+  for (const double yaw_deg : {90.0, 180.0, -135.0, 12.0}) {
+    SCOPED_TRACE(yaw_deg);
+    const FeedPlan turned = plan_at(yaw_deg, false), kept = plan_at(yaw_deg, true);
+    const double yaw_rad = glm::radians(yaw_deg);
+    const glm::dvec3 aside(std::sin(yaw_rad), 0.0, std::cos(yaw_rad));
+    EXPECT_GT(glm::dot(facing_of(kept), aside), 0.99) << "as the file has it";
+    EXPECT_GT(facing_of(turned).z, 0.99);
+    // The same as the clip that looks ahead, wind too: it blew from 90 - yaw degrees off the face.
+    EXPECT_LT(glm::distance(turned.motion(0.7).position_m, ahead.motion(0.7).position_m), 1e-9);
+    const glm::dquat back = glm::angleAxis(-yaw_rad, glm::dvec3(0, 1, 0));
+    EXPECT_LT(glm::distance(glm::dvec3(turned.wind(0.5)), back * glm::dvec3(3, 0, 0)), 1e-5);
+    EXPECT_EQ(kept.wind(0.5), glm::vec3(3, 0, 0));
+  }
 }
 
 // The share of the frames' peaks is that of captures with a T-pose before them; the others have none.

@@ -311,7 +311,7 @@ TEST(FlowControl, UnknownAndRepeatedAcknowledgementsChangeNothing) {
 }
 
 TEST(StrandClasses, GetCheaperAndKeepTheirBounds) {
-  for (const float bound_m : {2e-5f, 5e-5f, 1e-4f, 5e-4f})
+  for (const float bound_m : {1e-6f, 2e-5f, 5e-5f, 1e-4f, 5e-4f})
     for (const double step_rate_hz : {10.0, 30.0, 60.0, 240.0}) {
       const auto classes = make_strand_classes({step_rate_hz, 0.0, bound_m, 10'000});
       ASSERT_FALSE(classes.empty());

@@ -265,15 +265,19 @@ TEST_F(AbcTest, RootCoordinatesComeFromEitherName) {
 }
 
 TEST_F(AbcTest, GuidesAreHairOnlyWhereTheyAreAlone) {
-  const auto with_guides = [&](std::vector<int16_t> flags) {
+  const auto with_guides = [&](std::vector<int16_t> flags, GuideUse use = GuideUse::LeaveOut) {
     MadeAbc file(path());
     const std::vector<glm::vec2> uv = {{0.25f, 0.5f}, {0.75f, 1.0f}};
     const std::vector<int32_t> groups = {0, 4};
     return read_abc(file.finish({file.curves({}, {},
                                              {file.param("groom_guide", AbcType::I16, 1, flags, "uni"),
                                               file.param("groom_group_id", AbcType::I32, 1, groups),
-                                              file.param("groom_root_uv", AbcType::Float, 2, uv, "uni")})}));
+                                              file.param("groom_root_uv", AbcType::Float, 2, uv, "uni")})}),
+                    use);
   };
+  const auto asked_for = with_guides({0, 1}, GuideUse::Alone);
+  expect_near(asked_for, {{1, 0, 0}, {1, 0, -1}});
+  EXPECT_THAT(asked_for->notes, Contains(HasSubstr("1 guides (groom_guide) are the hair")));
   const auto mixed = with_guides({1, 0});
   expect_near(mixed, {{1, 0, 0}, {1, 0, -1}});
   EXPECT_EQ(mixed->groom.root_uv, (std::vector<glm::vec2>{{0.75f, 1.0f}}));

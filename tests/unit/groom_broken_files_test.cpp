@@ -21,6 +21,7 @@ using test::ByteFile;
 using test::shared_data;
 using ::testing::AllOf;
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr size_t kSmallAllocations = 64 << 10;  // messages, streams, paths
@@ -75,14 +76,14 @@ TEST(BrokenTfx, TheSmallFilesThatTestsBreakAreGood) {
   const ByteFile four = small_v4();
   const auto v4 = read_tfx_binary(ByteView(four.bytes));
   ASSERT_TRUE(v4) << v4.error().to_string();
-  EXPECT_EQ(v4->rest_position_m[6], glm::vec3(1.0f, 2.0f, 0.5f));
-  EXPECT_EQ(v4->root_uv[1], glm::vec2(0.3f, 0.4f));
-  EXPECT_EQ(v4->pinned, (std::vector<uint8_t>{1, 0, 0, 0, 1, 0, 0, 0}));
+  EXPECT_EQ(v4->groom.rest_position_m[6], glm::vec3(1.0f, 2.0f, 0.5f));
+  EXPECT_EQ(v4->groom.root_uv[1], glm::vec2(0.3f, 0.4f));
+  EXPECT_EQ(v4->groom.pinned, (std::vector<uint8_t>{1, 0, 0, 0, 1, 0, 0, 0}));
   const ByteFile three = small_v3(6, 1);
   const auto v3 = read_tfx_binary(ByteView(three.bytes));
   ASSERT_TRUE(v3) << v3.error().to_string();
-  EXPECT_EQ(v3->pinned, (std::vector<uint8_t>{1, 1, 0, 0, 1, 1, 1, 1, 0, 0, 1, 1}));
-  EXPECT_EQ(v3->rest_position_m[7], glm::vec3(0.0f, 7.0f, 0.25f));
+  EXPECT_EQ(v3->groom.pinned, (std::vector<uint8_t>{1, 1, 0, 0, 1, 1, 1, 1, 0, 0, 1, 1}));
+  EXPECT_EQ(v3->groom.rest_position_m[7], glm::vec3(0.0f, 7.0f, 0.25f));
 }
 
 TEST(BrokenTfx, TruncatedAnywhereIsRefused) {
@@ -190,6 +191,29 @@ TEST(BrokenTfx, NonFiniteValuesNameStrandAndVertex) {
               AllOf(HasSubstr("strand 0 vertex 2"), HasSubstr("check the unit")));
 }
 
+TEST(BrokenTfx, MassesThatAreNoneHoldNothing) {
+  for (const float mass : {kNan, HUGE_VALF, -1.0f}) {
+    SCOPED_TRACE(mass);
+    ByteFile file;
+    file.add(4.0f).add(3u).add(4u).add(160u).zeros(144);
+    for (int i = 0; i < 12; ++i)
+      file.add(static_cast<float>(i / 4)).add(static_cast<float>(i)).add(0.0f).add(i % 4 == 0 ? 0.0f : 1.0f);
+    const auto free = read_tfx_binary(ByteView(file.bytes));
+    ASSERT_TRUE(free);
+    EXPECT_TRUE(free->notes.empty());
+    for (const size_t bad : {size_t{4}, size_t{6}}) {  // a root, and another
+      ByteFile broken = file;
+      const auto stated = read_tfx_binary(ByteView(broken.patch(160 + 16 * bad + 12, mass).bytes));
+      ASSERT_TRUE(stated) << stated.error().to_string();
+      EXPECT_EQ(stated->groom.pinned, free->groom.pinned);
+      EXPECT_THAT(stated->notes, ElementsAre(AllOf(HasSubstr("1 of 12 vertices"),
+                                                   HasSubstr(fmt::format("strand 1 vertex {}", bad % 4)))));
+    }
+    file.patch(160 + 16 * 5 + 12, mass).patch(160 + 16 * 6 + 12, mass);
+    EXPECT_FALSE(read_tfx_binary(ByteView(file.bytes))) << "more than a tenth";
+  }
+}
+
 TEST(BrokenTfx, CoordinatesOfRootsAreNoReasonToRefuseHair) {
   StatedGroom hair;
   hair.groom.offset = {0};
@@ -240,7 +264,7 @@ TEST(BrokenTfx, ARootIsPinnedWhateverItsFlagSays) {
   const ByteFile file = small_v4().patch(160 + 12, 1.0f);
   const auto groom = read_tfx_binary(ByteView(file.bytes));
   ASSERT_TRUE(groom);
-  EXPECT_EQ(groom->pinned[0], 1);
+  EXPECT_EQ(groom->groom.pinned[0], 1);
 }
 
 /// Random damage to the header: the loader either refuses or gives a groom that fits the file.
@@ -254,7 +278,7 @@ TEST(BrokenTfx, RandomHeadersNeverGiveAGroomLargerThanTheFile) {
     test::reset_largest_allocation();
     const auto groom = read_tfx_binary(ByteView(file.bytes));
     ASSERT_LE(test::largest_allocation_bytes(), file.bytes.size() + kSmallAllocations);
-    ASSERT_LE(groom ? groom->rest_position_m.size() * 12 : 0, file.bytes.size());
+    ASSERT_LE(groom ? groom->groom.rest_position_m.size() * 12 : 0, file.bytes.size());
   }
 }
 

@@ -1,12 +1,15 @@
-// What `strandcast-server --check` leaves: a picture with hair in each of its nine fields, and what was
-// guessed.
+// What `strandcast-server --check` leaves: a picture with hair in each of its twelve fields, and what was
+// guessed. What it passes, starts.
 #include "server/app/groom_check.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "common/base/file.h"
 #include "common/pictures/image_codec.h"
+#include "server/scene/scene_content.h"
 #include "tests/support/temporary_folder.h"
 
 namespace strandcast::groom_check_test {
@@ -25,7 +28,7 @@ SceneDesc small_scene() {
 
 /// Pixels of a field that are not its background, which does not change along a row.
 size_t drawn_pixels(const Image& sheet, uint32_t column, uint32_t row) {
-  const uint32_t side = sheet.width / 3;
+  const uint32_t side = sheet.height / 3;
   size_t count = 0;
   for (uint32_t y = row * side; y < (row + 1) * side; ++y)
     for (uint32_t x = column * side; x < (column + 1) * side; ++x) {
@@ -36,16 +39,17 @@ size_t drawn_pixels(const Image& sheet, uint32_t column, uint32_t row) {
   return count;
 }
 
-TEST(GroomCheck, LeavesPicturesFromThreeSides) {
+TEST(GroomCheck, LeavesPicturesFromFourSidesAndTakesSteps) {
   const TemporaryFolder folder;
   const auto text = check_groom(small_scene(), folder.path() / "new", {});
   ASSERT_TRUE(text) << text.error().to_string();
-  EXPECT_THAT(*text, HasSubstr("groom.png: from the front, from its left side and from above"));
+  EXPECT_THAT(*text, HasSubstr("groom.png: from the front, from its left side, from behind and from above"));
+  EXPECT_THAT(*text, HasSubstr("13 steps are taken with " + small_scene().solver.name + " on "));
   EXPECT_EQ(load_text(folder.path() / "new/groom.txt", 1 << 20).value(), *text);
   const auto sheet = load_png(folder.path() / "new/groom.png");
   ASSERT_TRUE(sheet) << sheet.error().to_string();
-  ASSERT_EQ(sheet->width, sheet->height);
-  for (uint32_t column = 0; column < 3; ++column) {
+  ASSERT_EQ(3 * sheet->width, 4 * sheet->height);
+  for (uint32_t column = 0; column < 4; ++column) {
     const size_t hair = drawn_pixels(*sheet, column, 0);
     EXPECT_GT(hair, 500u) << column;
     EXPECT_GT(drawn_pixels(*sheet, column, 1), hair + 500u) << column << ": with the head";
@@ -53,13 +57,59 @@ TEST(GroomCheck, LeavesPicturesFromThreeSides) {
   }
 }
 
-TEST(GroomCheck, SaysWhatItCannotRead) {
-  const TemporaryFolder folder;
+std::string straight_hair(float length) {
+  std::string text;
+  for (int strand = 0; strand < 100; ++strand) {
+    const double y = 1.0 - (strand + 0.5) / 100.0, around = 2.399963 * strand,
+                 across = std::sqrt(1.0 - y * y);
+    const glm::dvec3 out(across * std::sin(around), y, across * std::cos(around));
+    for (int vertex = 0; vertex < 4; ++vertex) {
+      const glm::dvec3 point = (0.1 + static_cast<double>(length) * vertex / 3.0) * out;
+      text += fmt::format("{} {} {}\n", point.x, point.y, point.z);
+    }
+  }
+  return "ply\nformat ascii 1.0\ncomment strand_vertex_count 4\nelement vertex 400\nproperty float x\n"
+         "property float y\nproperty float z\nend_header\n" +
+         text;
+}
+
+SceneDesc scene_of_file(const std::filesystem::path& path) {
   SceneDesc scene = small_scene();
   FileGroomDesc file;
-  file.path = "no/such.tfx";
+  file.path = path;
   scene.groom = file;
-  EXPECT_THAT(check_groom(scene, folder.path(), {}).error().to_string(), HasSubstr("such.tfx"));
+  return scene;
+}
+
+TEST(GroomCheck, FailsForAUnitInWhichNoHeadHasThisHair) {
+  const TemporaryFolder folder;
+  const std::string text = straight_hair(0.2f);
+  ASSERT_TRUE(save_file(folder.path() / "hair.ply", std::as_bytes(std::span(text))));
+  SceneDesc scene = scene_of_file(folder.path() / "hair.ply");
+  EXPECT_EQ(load_scene_content(scene).value().unlikely_unit, "");
+  const char* const part = "m long then, as on no head: groom.file.unit_m=1";
+  for (const float unit_m : {100.0f, 0.01f}) {
+    std::get<FileGroomDesc>(scene.groom).unit_m = unit_m;
+    EXPECT_THAT(load_scene_content(scene).value().unlikely_unit, HasSubstr(part)) << unit_m;
+  }
+  const auto checked = check_groom(scene, folder.path(), {});
+  ASSERT_FALSE(checked);
+  EXPECT_THAT(checked.error().to_string(), HasSubstr(part));
+  EXPECT_THAT(load_text(folder.path() / "groom.txt", 1 << 20).value(), HasSubstr(part));
+}
+
+TEST(GroomCheck, FailsWhereAServerWouldNotStart) {
+  const TemporaryFolder folder;
+  SceneDesc scene = small_scene();
+  scene.solver.name = "direct_rod";
+  scene.solver.parameters = {{"no_such_parameter", 1.0}};
+  EXPECT_THAT(check_groom(scene, folder.path(), {}).error().to_string(), HasSubstr("no_such_parameter"));
+}
+
+TEST(GroomCheck, SaysWhatItCannotRead) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(check_groom(scene_of_file("no/such.tfx"), folder.path(), {}).error().to_string(),
+              HasSubstr("such.tfx"));
   EXPECT_THAT(check_groom(small_scene(), "/proc/nowhere", {}).error().to_string(),
               HasSubstr("cannot make the folder /proc/nowhere"));
 }

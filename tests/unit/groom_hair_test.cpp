@@ -64,17 +64,18 @@ TEST(Hair, LoadsEveryCombinationOfArrays) {
       EXPECT_THAT(refusal(file), HasSubstr("no points"));
       continue;
     }
-    const auto groom = load_hair(folder.write("made.hair", file.text()));
-    ASSERT_TRUE(groom) << arrays << ": " << groom.error().to_string();
-    ASSERT_EQ(groom->strand_count(), 3u);
+    const auto stated = load_hair(folder.write("made.hair", file.text()));
+    ASSERT_TRUE(stated) << arrays << ": " << stated.error().to_string();
+    const Groom& groom = stated->groom;
+    ASSERT_EQ(groom.strand_count(), 3u);
     for (uint32_t strand = 0; strand < 3; ++strand) {
-      EXPECT_EQ(groom->vertex_count(strand), segments[strand] + 1u);
-      EXPECT_EQ(groom->length_m(strand), static_cast<float>(segments[strand]));
-      EXPECT_EQ(groom->rest_position_m[groom->offset[strand]], glm::vec3(strand, 0.0f, 0.0f));
-      EXPECT_EQ(groom->pinned[groom->offset[strand]], 1);
-      EXPECT_EQ(groom->pinned[groom->offset[strand] + 1], 0);
+      EXPECT_EQ(groom.vertex_count(strand), segments[strand] + 1u);
+      EXPECT_EQ(groom.length_m(strand), static_cast<float>(segments[strand]));
+      EXPECT_EQ(groom.rest_position_m[groom.offset[strand]], glm::vec3(strand, 0.0f, 0.0f));
+      EXPECT_EQ(groom.pinned[groom.offset[strand]], 1);
+      EXPECT_EQ(groom.pinned[groom.offset[strand] + 1], 0);
     }
-    EXPECT_EQ(groom->uniform_vertex_count(), has_segments ? 0u : 5u);
+    EXPECT_EQ(groom.uniform_vertex_count(), has_segments ? 0u : 5u);
   }
 }
 
@@ -146,9 +147,8 @@ TEST(Hair, SegmentsThatDoNotAddUpAreNamed) {
   EXPECT_THAT(refusal(file.patch(128, uint16_t{4})),
               HasSubstr("need at least 15 points, the header says 14"));
   EXPECT_THAT(refusal(file.patch(128, uint16_t{2})), HasSubstr("need 13 points, the header says 14"));
-  EXPECT_THAT(refusal(file.patch(130, uint16_t{0})), HasSubstr("strand 1 has 0 segments"));
   EXPECT_THAT(refusal(file.patch(130, uint16_t{0xffff})),
-              HasSubstr("strand 1 has 65535 segments, allowed are 1 to 4095"));
+              HasSubstr("strand 1 has 65535 segments, at most 4095 are allowed"));
   ByteFile defaults = hair_file({4, 4}, kPoints, 0xffffffffu);
   EXPECT_THAT(refusal(defaults), HasSubstr("strand 0 has 4294967295 segments"));
   defaults = hair_file({4, 4}, kPoints, 3);

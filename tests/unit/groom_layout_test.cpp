@@ -272,11 +272,11 @@ TEST(RootTriangles, RealGroomsGetOneToTwoPerStrand) {
   REQUIRE_SHARED_DATA();
   for (const char* name :
        {"Ratboy_mohawk.tfx", "TestHair1.tfx", "ponytail_side.tfx", "sintel_11400x16.tfx"}) {
-    const auto groom = load_tfx(test::shared_data() / "grooms" / name);
-    ASSERT_TRUE(groom);
-    const auto triangles = make_root_triangles(*groom);
-    expect_proper(*groom, triangles);
-    const double ratio = static_cast<double>(triangles.size()) / groom->strand_count();
+    const auto stated = load_tfx(test::shared_data() / "grooms" / name);
+    ASSERT_TRUE(stated);
+    const auto triangles = make_root_triangles(stated->groom);
+    expect_proper(stated->groom, triangles);
+    const double ratio = static_cast<double>(triangles.size()) / stated->groom.strand_count();
     EXPECT_GT(ratio, 0.9) << name;
     EXPECT_LT(ratio, 2.0) << name;
   }

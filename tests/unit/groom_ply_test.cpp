@@ -180,6 +180,18 @@ TEST(Ply, CommentsStateUnitAxisAndCount) {
   EXPECT_FLOAT_EQ(load_placed_groom(options)->placement.unit_m, 1.0f) << "what a person says goes first";
 }
 
+TEST(Ply, AStrandOfOnePointIsLeftOutAndDecimalCommasAreRead) {
+  const std::string strands = header("ascii", kFivePoints + "element strand 2\nproperty int nsegs\n");
+  std::string rows = kFiveRows;
+  std::replace(rows.begin(), rows.end(), '.', ',');
+  const auto groom = read(strands + rows + "3\n0\n");
+  ASSERT_TRUE(groom) << groom.error().to_string();
+  EXPECT_EQ(groom->groom.offset, (std::vector<uint32_t>{0, 4}));
+  EXPECT_EQ(groom->groom.rest_position_m[2], glm::vec3(0.0f, 0.25f, -1.5f));
+  EXPECT_THAT(groom->notes, ::testing::ElementsAre(HasSubstr("2 numbers have a decimal comma"),
+                                                   HasSubstr("1 strands of fewer than 2 points")));
+}
+
 TEST(Ply, WhatIsWrongIsNamed) {
   EXPECT_THAT(refusal("plx\n"), HasSubstr("does not begin with the line 'ply'"));
   EXPECT_THAT(refusal("ply\nformat ascii 1.0\n"), HasSubstr("no line 'end_header'"));
@@ -196,7 +208,8 @@ TEST(Ply, WhatIsWrongIsNamed) {
   const std::string strands = kFivePoints + "element strand 2\nproperty int nsegs\n";
   EXPECT_THAT(refusal(header("ascii", strands) + kFiveRows + "2\n2\n"),
               HasSubstr("need 6 points, there are 5"));
-  EXPECT_THAT(refusal(header("ascii", strands) + kFiveRows + "4\n0\n"), HasSubstr("strand 1 has 1 vertices"));
+  EXPECT_THAT(refusal(header("ascii", strands) + kFiveRows + "-2\n5\n"),
+              HasSubstr("strand 0 has -1 vertices"));
   const std::string lists = kFivePoints + "element strand 1\nproperty list int int vertex_index\n";
   EXPECT_THAT(refusal(header("ascii", lists) + kFiveRows + "2 0 5\n"),
               HasSubstr("names vertex 5, there are 5"));

@@ -35,9 +35,15 @@ int pins_per_root(const Groom& groom) {
   return common;
 }
 
+/// What the loader makes of a file, before any unit or axis.
+Result<Groom> read_strands(const char* name) {
+  ASSIGN_OR_RETURN(StatedGroom stated, load_tfx(shared_data() / "grooms" / name));
+  return std::move(stated.groom);
+}
+
 TEST(RealGroom, MohawkHasItsCountsPinsAndShortestStrand) {
   REQUIRE_SHARED_DATA();
-  const auto groom = load_tfx(shared_data() / "grooms/Ratboy_mohawk.tfx");
+  const auto groom = read_strands("Ratboy_mohawk.tfx");
   ASSERT_TRUE(groom) << groom.error().to_string();
   EXPECT_EQ(groom->strand_count(), 2228u);
   EXPECT_EQ(groom->uniform_vertex_count(), 32u);
@@ -51,7 +57,7 @@ TEST(RealGroom, MohawkHasItsCountsPinsAndShortestStrand) {
 
 TEST(RealGroom, SintelHasItsCountsSinglePinAndMedianLength) {
   REQUIRE_SHARED_DATA();
-  const auto groom = load_tfx(shared_data() / "grooms/sintel_11400x16.tfx");
+  const auto groom = read_strands("sintel_11400x16.tfx");
   ASSERT_TRUE(groom) << groom.error().to_string();
   EXPECT_EQ(groom->strand_count(), 11400u);
   EXPECT_EQ(groom->uniform_vertex_count(), 16u);
@@ -62,7 +68,7 @@ TEST(RealGroom, SintelHasItsCountsSinglePinAndMedianLength) {
 
 TEST(RealGroom, TestHairHasStrandsOfLengthEleven) {
   REQUIRE_SHARED_DATA();
-  const auto groom = load_tfx(shared_data() / "grooms/TestHair1.tfx");
+  const auto groom = read_strands("TestHair1.tfx");
   ASSERT_TRUE(groom) << groom.error().to_string();
   EXPECT_EQ(groom->strand_count(), 10027u);
   EXPECT_EQ(groom->uniform_vertex_count(), 4u);
@@ -74,8 +80,8 @@ TEST(RealGroom, TestHairHasStrandsOfLengthEleven) {
 
 TEST(RealGroom, PonytailPartsHaveTheirCounts) {
   REQUIRE_SHARED_DATA();
-  const auto front = load_tfx(shared_data() / "grooms/ponytail_front_top.tfx");
-  const auto side = load_tfx(shared_data() / "grooms/ponytail_side.tfx");
+  const auto front = read_strands("ponytail_front_top.tfx");
+  const auto side = read_strands("ponytail_side.tfx");
   ASSERT_TRUE(front) << front.error().to_string();
   ASSERT_TRUE(side) << side.error().to_string();
   EXPECT_EQ(front->strand_count(), 876u);

@@ -9,6 +9,8 @@ namespace strandcast::groom_tfx_text_test {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 std::string header(int strand_count, int both_ends) {
@@ -22,9 +24,13 @@ const char kTwoStrands[] =
     "strand 0 numVerts 3 texcoord 0.250000 000000\n0 0 0\n0 1 0\n0 2.5e-1 -1.5\n"
     "strand 1 numVerts 2 texcoord .5 1\n1 0 0\n1 +1 0\n";
 
-Result<Groom> load(const std::string& text) {
+Result<StatedGroom> load_stated(const std::string& text) {
   static const TemporaryFolder folder;
   return load_tfx(folder.write("made.tfx", text));
+}
+Result<Groom> load(const std::string& text) {
+  ASSIGN_OR_RETURN(StatedGroom stated, load_stated(text));
+  return std::move(stated.groom);
 }
 std::string refusal(const std::string& text) {
   const auto groom = load(text);
@@ -102,17 +108,64 @@ TEST(TfxText, NamesLineAndOffendingWord) {
               HasSubstr("'strand' follows the last of 1"));
   EXPECT_THAT(refusal(replaced(good, "numStrands 2\n", "")), HasSubstr("before 'numStrands'"));
   EXPECT_THAT(refusal(replaced(good, "Immovable 0", "Immovable 7")), HasSubstr("bothEndsImmovable is 7"));
-  EXPECT_THAT(refusal(replaced(good, "numVerts 3", "numVerts 4")), HasSubstr("'strand'"));
+  EXPECT_THAT(refusal(replaced(good, "numVerts 3", "numVerts 4")),
+              HasSubstr("strand 0 ends at vertex 3 of 4; 1 of 2 strands cannot be used"));
+  EXPECT_THAT(refusal(replaced(good, "numVerts 3", "numVerts 2")),
+              HasSubstr("'0' follows the last of 2 vertices of strand 0"));
   EXPECT_THAT(refusal(replaced(good, "numVerts 3", "numVerts 4294967295")),
-              HasSubstr("allowed are 2 to 4096"));
-  EXPECT_THAT(refusal(replaced(good, "numVerts 3", "numVerts 1")), HasSubstr("numVerts is 1"));
-  EXPECT_THAT(refusal(replaced(good, "strand 1", "strand 5")), HasSubstr("strand 5 found where strand 1"));
+              HasSubstr("at most 4096 are allowed"));
   EXPECT_THAT(refusal(replaced(good, "texcoord", "texture")), HasSubstr("'texture'"));
   EXPECT_THAT(refusal(replaced(good, "0 1 0", "0 x 0")), AllOf(HasSubstr("line 13"), HasSubstr("'x'")));
   EXPECT_THAT(refusal(replaced(good, "0 1 0", "0 1e99 0")), HasSubstr("'1e99'"));
   EXPECT_THAT(refusal(replaced(good, "0 1 0", "0 1")), HasSubstr("''"));
   EXPECT_THAT(refusal(replaced(good, "0 1 0", "0 1 0 4")), HasSubstr("'4'"));
   EXPECT_THAT(refusal("version"), HasSubstr("''"));
+}
+
+// One strand in a tenth may be broken, whatever is wrong with it; the others are as without it.
+TEST(TfxText, BrokenStrandsAreLeftOutAndCounted) {
+  std::string whole;
+  const auto strand = [](int i) {
+    return fmt::format("strand {} numVerts 3 texcoord 0.5 0.25\n{} 0 0\n{} 1 0\n{} 2.5 0\n", i, i, i, i);
+  };
+  for (int i = 1; i < 20; ++i) whole += strand(i);
+  const std::string broken_ones[] = {
+      "strand 0 numVerts 3 texcoord 0.5 0.25\n0 0 0\n0 1 0\n",                // a row too few
+      "strand 0 numVerts 3 texcoord 0.5 0.25\n0 0 0\n0 1 0\n0 2 0\n0 3 0\n",  // a row too many
+      "strand 0 numVerts 3 texcoord 0.5 0.25\n0 0 0\n0 one 0\n0 2 0\n",       // no number
+      "strand 0 numVerts 3 texcoord 0.5 0.25\n0 0 0\n0 1 0 7\n0 2 0\n",       // a number too many
+      "strand zero numVerts 3 texcoord 0.5 0.25\n0 0 0\n0 1 0\n0 2 0\n",      // no strand number
+      "strand 0 numVerts 9999 texcoord 0.5 0.25\n0 0 0\n0 1 0\n0 2 0\n",      // too many vertices
+      "",                                                                     // not there
+  };
+  const auto expected = load(header(19, 0) + whole);
+  ASSERT_TRUE(expected);
+  for (const std::string& broken : broken_ones) {
+    SCOPED_TRACE(broken);
+    for (const std::string& text : {broken + whole, whole + broken}) {
+      const auto stated = load_stated(header(20, 0) + text);
+      ASSERT_TRUE(stated) << stated.error().to_string();
+      EXPECT_EQ(stated->groom.rest_position_m, expected->rest_position_m);
+      EXPECT_EQ(stated->groom.offset, expected->offset);
+      EXPECT_EQ(stated->groom.root_uv.size(), 19u);
+      EXPECT_THAT(stated->notes, ElementsAre(AllOf(HasSubstr("1 of 20 strands"), HasSubstr("line "))));
+    }
+  }
+  GroomFileOptions options;
+  const TemporaryFolder folder;
+  options.path = folder.write("one.tfx", header(20, 0) + "strand 0 numVerts 1 texcoord 0 0\n5 5 5\n" + whole);
+  const auto placed = load_placed_groom(options);
+  ASSERT_TRUE(placed) << placed.error().to_string();
+  EXPECT_THAT(placed->notes, Contains(HasSubstr("1 strands of fewer than 2 points")));
+}
+
+TEST(TfxText, DecimalCommasAreRead) {
+  std::string commas = kTwoStrands;
+  std::replace(commas.begin(), commas.end(), '.', ',');
+  const auto stated = load_stated(header(2, 0) + commas);
+  ASSERT_TRUE(stated) << stated.error().to_string();
+  EXPECT_EQ(stated->groom.rest_position_m, load(header(2, 0) + kTwoStrands)->rest_position_m);
+  EXPECT_THAT(stated->notes, ElementsAre(HasSubstr("decimal commas")));
 }
 
 TEST(TfxText, GarbageIsRefusedWithPrintableErrors) {

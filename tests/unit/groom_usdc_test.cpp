@@ -3,6 +3,7 @@
 #include <cmath>
 #include <random>
 
+#include "client/export/export_strands.h"
 #include "common/groom/groom_file.h"
 #include "common/groom/usd_loader.h"
 #include "common/groom/usd_stage.h"
@@ -10,6 +11,7 @@
 #include "common/groom/usdc_coding.h"
 #include "tests/fuzz/groom_checks.h"
 #include "tests/support/largest_allocation.h"
+#include "tests/support/made_states.h"
 #include "tests/support/made_usdc.h"
 #include "tests/support/temporary_folder.h"
 
@@ -587,6 +589,41 @@ TEST(Usdc, EveryDamagedByteGivesASentenceOrASoundGroom) {
     }
   }
   EXPECT_GT(refused, whole.size() / 4);
+}
+
+// Thickness, stiffness and rest shape as the proposal for deformable bodies of USD's physics has them.
+TEST(Usdc, WhatHairIsMadeOfComesBackInEveryFormOfUsd) {
+  using namespace export_test;
+  const TemporaryFolder folder;
+  const std::atomic<bool> never{false};
+  auto origin = std::make_shared<ExportOrigin>();
+  for (uint32_t strand = 0; strand < kStrands; ++strand) origin->place.push_back(strand);
+  origin->material = {7e-5, 4e9, 1250.0, 0.25};
+  for (const std::string extension : {".usda", ".usdc", ".usdz"})
+    for (const double unit_m : {1.0, 0.01, 0.0254}) {
+      SCOPED_TRACE(extension);
+      MadeStates states(3);
+      states.scene_.origin = origin;
+      ExportOptions options;
+      options.path = folder.path() / ("hair" + extension);
+      options.unit_m = unit_m;
+      options.is_quiet = true;
+      ASSERT_TRUE(export_strands(states, options, never));
+      GroomFileOptions again;
+      again.path = options.path;
+      const auto placed = load_placed_groom(again);
+      ASSERT_TRUE(placed) << placed.error().to_string();
+      EXPECT_NEAR(placed->material.diameter.value_or(0.0), 7e-5, 1e-10);
+      EXPECT_NEAR(placed->material.young_modulus.value_or(0.0), 4e9, 1e4);
+      EXPECT_NEAR(placed->material.density.value_or(0.0), 1250.0, 1e-2);
+      EXPECT_NEAR(placed->material.poisson_ratio.value_or(0.0), 0.25, 1e-6);
+      EXPECT_THAT(placed->notes, Contains(HasSubstr("rest shape of its curve physics")));
+      EXPECT_EQ(placed->groom.strand_count(), kStrands);
+      // Without a word of its files there is nothing to say.
+      MadeStates silent(3);
+      ASSERT_TRUE(export_strands(silent, options, never));
+      EXPECT_FALSE(load_placed_groom(again)->material.is_known());
+    }
 }
 
 }  // namespace

@@ -286,8 +286,31 @@ TEST(Placement, EveryQuarterTurnIsFoundAgain) {
       EXPECT_EQ(turn.place(turned.rest_position_m[i]), groom.rest_position_m[i]) << yaw_deg;
     // The same hair lying on its back: +Z of the file is up.
     const Groom lying = moved(turned, [](const glm::vec3& p) { return glm::vec3(p.x, -p.z, p.y); });
-    EXPECT_FALSE(guess_z_up(turned).value) << yaw_deg;
-    EXPECT_TRUE(guess_z_up(lying).value) << yaw_deg;
+    EXPECT_STREQ(name_of(guess_up(turned).value), "+Y") << yaw_deg;
+    EXPECT_STREQ(name_of(guess_up(lying).value), "+Z") << yaw_deg;
+  }
+}
+
+TEST(Placement, EverySideThatIsUpIsFoundAndTurnedUp) {
+  const Groom groom = full_head();
+  for (const UpSide& side : {UpSide{false, false}, {true, false}, {false, true}, {true, true}}) {
+    GroomPlacement upright;
+    upright.is_z_up = side.is_z_up;
+    upright.is_upside_down = side.is_upside_down;
+    // The file has the hair so that this placement puts it upright.
+    glm::mat3 head_from_file(0.0f);
+    for (int axis = 0; axis < 3; ++axis) {
+      glm::vec3 unit(0.0f);
+      unit[axis] = 1.0f;
+      head_from_file[axis] = upright.turn(unit);
+    }
+    EXPECT_NEAR(glm::determinant(head_from_file), 1.0f, 1e-6f) << "a turn, no mirror";
+    const Groom in_file =
+        moved(groom, [&](const glm::vec3& p) { return glm::transpose(head_from_file) * p; });
+    const Guess<UpSide> guess = guess_up(in_file);
+    EXPECT_STREQ(name_of(guess.value), name_of(side));
+    EXPECT_EQ(guess.reason.empty(), !side.is_z_up && !side.is_upside_down);
+    EXPECT_LT(glm::distance(upright.turn(in_file.rest_position_m[7]), groom.rest_position_m[7]), 1e-6f);
   }
 }
 
@@ -299,6 +322,25 @@ TEST(Placement, AFaceBetweenTwoQuarterTurnsIsFound) {
     const Groom turned = moved(groom, [&](const glm::vec3& p) { return turn.place(p); });
     EXPECT_NEAR(guess_yaw_deg(turned).value, -yaw_deg, 6.0f);
   }
+}
+
+TEST(Placement, FurOfABodyIsNoHeadOfHair) {
+  const Groom head = full_head();
+  EXPECT_TRUE(is_hair_of_head(head));
+  EXPECT_TRUE(is_hair_of_head(picked(head, [](const glm::vec3& p) { return p.x > 0.0f; }))) << "half of one";
+  // The same on a long head; then roots all around a trunk that is three times as long as it is wide.
+  EXPECT_TRUE(
+      is_hair_of_head(moved(head, [](const glm::vec3& p) { return glm::vec3(p.x, p.y, 1.3f * p.z); })));
+  Groom body;
+  body.offset = {0};
+  for (int i = 0; i < 400; ++i) {
+    // Fibonacci's sphere, as a cigar.
+    const double y = 1.0 - (2.0 * i + 1.0) / 400.0, around = 2.399963 * i, across = std::sqrt(1.0 - y * y);
+    const glm::vec3 out(glm::dvec3(across * std::sin(around), y, 3.0 * across * std::cos(around)));
+    body.rest_position_m.insert(body.rest_position_m.end(), {out, 1.05f * out});
+    body.offset.push_back(static_cast<uint32_t>(body.rest_position_m.size()));
+  }
+  EXPECT_FALSE(is_hair_of_head(body));
 }
 
 TEST(Placement, QuarterTurnsAgreeWithAnyOtherAngle) {
@@ -324,7 +366,7 @@ TEST(Placement, HairAllAroundHasNoFace) {
   }
   EXPECT_TRUE(guess_yaw_deg(fur).reason.empty());
   EXPECT_EQ(guess_yaw_deg(fur).value, 0.0f);
-  EXPECT_FALSE(guess_z_up(fur).value);
+  EXPECT_TRUE(guess_up(fur).reason.empty());
 }
 
 TEST(Placement, AStatedTurnMovesHairAboutTheOrigin) {

@@ -257,8 +257,8 @@ TEST(SceneContent, WhatWasGuessedIsSaid) {
   EXPECT_EQ(stated->groom.rest_position_m, guessed->groom.rest_position_m);
 }
 
-/// Strands of two vertices out of a ball about the origin, as a .hair file.
-test::ByteFile hair_on_a_ball(float radius_m) {
+/// Strands of two vertices out of a ball about the origin, which is `longer` along +Z, as a .hair file.
+test::ByteFile hair_on_a_ball(float radius_m, float longer = 1.0f) {
   constexpr uint32_t kStrands = 40, kPoints = 2;
   test::ByteFile file;
   for (const char c : {'H', 'A', 'I', 'R'}) file.add(c);
@@ -269,7 +269,9 @@ test::ByteFile hair_on_a_ball(float radius_m) {
     const float level = std::sqrt(1.0f - height * height);
     const float angle = 2.4f * static_cast<float>(s);
     for (const float away_m : {radius_m, radius_m + 0.1f})
-      file.add(away_m * level * std::cos(angle)).add(away_m * level * std::sin(angle)).add(away_m * height);
+      file.add(away_m * level * std::cos(angle))
+          .add(away_m * level * std::sin(angle))
+          .add(longer * away_m * height);
   }
   return file;
 }
@@ -294,6 +296,47 @@ TEST(SceneContent, AMeshIsTurnedWithItsNormals) {
   for (size_t i = 0; i < 3; ++i)
     EXPECT_GT(glm::dot(glm::normalize(content->head.position_m[i]), content->head.normal[i]), 0.99f);
   EXPECT_GT(content->head.position_m[0].y, 0.05f) << "what was +Z is up";
+}
+
+TEST(SceneContent, FurGetsNoHeadUnlessOneIsStated) {
+  using testing::Contains;
+  using testing::HasSubstr;
+  const TemporaryFolder folder;
+  SceneDesc scene = built_in_scene();
+  scene.head.radius_m = 0.0f;
+  FileGroomDesc file;
+  file.unit_m = 1.0f;
+  for (const auto& [longer, has_head] : {std::pair(1.0f, true), std::pair(4.0f, false)}) {
+    file.path = folder.write("ball.hair", hair_on_a_ball(0.1f, longer).text());
+    scene.groom = file;
+    const auto content = load_scene_content(scene);
+    ASSERT_TRUE(content) << content.error().to_string();
+    EXPECT_EQ(!content->head.triangle.empty(), has_head) << longer;
+    EXPECT_EQ(!content->colliders.empty(), has_head) << longer;
+    const auto says_so = Contains(HasSubstr("no head is put under it"));
+    if (has_head) {
+      EXPECT_THAT(content->notes, testing::Not(says_so));
+    } else {
+      EXPECT_THAT(content->notes, says_so);
+    }
+  }
+  scene.head.has_center = true;
+  const auto stated = load_scene_content(scene);
+  ASSERT_TRUE(stated) << stated.error().to_string();
+  EXPECT_FALSE(stated->head.triangle.empty());
+  EXPECT_FALSE(stated->colliders.empty());
+}
+
+TEST(SceneContent, ARodTakesWhatItsFileSaysAndTheSceneGoesBefore) {
+  SceneDesc scene = built_in_scene();
+  scene.solver = {"direct_rod", {{"density_kgpm3", 1100.0}}};
+  const HairMaterial material{8e-5, 2e9, 1250.0, {}};
+  const std::map<std::string, double> expected = {
+      {"radius_m", 4e-5}, {"young_modulus_pa", 2e9}, {"density_kgpm3", 1100.0}};
+  EXPECT_EQ(with_material(scene, material).solver.parameters, expected);
+  EXPECT_EQ(with_material(scene, {}).solver.parameters, scene.solver.parameters);
+  scene.solver = {"dftl", {}};
+  EXPECT_TRUE(with_material(scene, material).solver.parameters.empty());
 }
 
 TEST(SceneContent, MissingFilesAreNamed) {

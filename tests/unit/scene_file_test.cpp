@@ -30,7 +30,7 @@ SceneDesc unusual_scene() {
   FileGroomDesc file{.path = "../a folder/x.tfx",
                      .more_paths = {"b.tfx", "/c.hair"},
                      .unit_m = 0.1f,
-                     .up_axis = UpAxis::Z,
+                     .up_axis = UpAxis::MinusZ,
                      .has_up_axis = true,
                      .yaw_deg = -37.5f,
                      .has_yaw = true,
@@ -38,6 +38,7 @@ SceneDesc unusual_scene() {
                      .has_origin = true};
   file.vertex_count = 24;
   file.strand_vertex_count = 100;
+  file.guides = true;
   file.pinning = Pinning::BothEnds;
   file.has_pinning = true;
   s.groom = file;
@@ -315,11 +316,11 @@ TEST(SceneFile, RangeErrorsNamePlacePathValueAndRange) {
 
 TEST(SceneFile, RangeEndsAreIncluded) {
   for (const char* text :
-       {"stream { bound_m: 2e-5 }", "stream { bound_m: 5e-4 }", "step_rate_hz: 1000",
+       {"stream { bound_m: 1e-6 }", "stream { bound_m: 5e-4 }", "step_rate_hz: 1000",
         "groom { procedural { length_m: 0.005 } }", "groom { procedural { strand_count: 200000 } }"})
     EXPECT_EQ(error_of(text), "no error") << text;
   for (const char* text :
-       {"stream { bound_m: 1.99e-5 }", "stream { bound_m: 5.01e-4 }", "step_rate_hz: 1000.001"})
+       {"stream { bound_m: 9.9e-7 }", "stream { bound_m: 5.01e-4 }", "step_rate_hz: 1000.001"})
     EXPECT_NE(error_of(text), "no error") << text;
 }
 
@@ -393,7 +394,7 @@ TEST(SceneFile, OverrideErrorsNameTheAssignmentAndKnownFields) {
   EXPECT_THAT(error_of("", {"camera=3"}), HasSubstr("known: offset_m, target_m, fov_y_rad"));
   EXPECT_THAT(error_of("", {"camera={ fov_y_rad: 9 }"}),
               StartsWith("--set camera={ fov_y_rad: 9 }: camera.fov_y_rad"));
-  EXPECT_THAT(error_of("", {"groom.file.up_axis=X"}), HasSubstr("(known: Y, Z)"));
+  EXPECT_THAT(error_of("", {"groom.file.up_axis=X"}), HasSubstr("(known: Y, Z, MINUS_Y, MINUS_Z)"));
   EXPECT_THAT(error_of("", {"colliders.5.radius_m=1"}), HasSubstr("not an index"));
   EXPECT_THAT(error_of("", {"colliders.-1.radius_m=1"}), HasSubstr("not an index"));
   EXPECT_THAT(error_of("", {"colliders.99999999999999999999.radius_m=1"}), HasSubstr("not an index"));

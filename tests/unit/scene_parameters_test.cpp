@@ -34,7 +34,7 @@ TEST(SceneParameters, HaveUnitRangeDefaultAndValue) {
   EXPECT_EQ(bound->unset_value, "0.0001");
   EXPECT_EQ(bound->unit, "m");
   EXPECT_TRUE(bound->has_range && bound->is_live);
-  EXPECT_EQ(bound->minimum, 2e-5);
+  EXPECT_EQ(bound->minimum, 1e-6);
   EXPECT_EQ(bound->maximum, 5e-4);
   const ParameterInfo* strands = find(list, "groom.procedural.strand_count");
   ASSERT_NE(strands, nullptr);

@@ -122,7 +122,7 @@ TEST(StrandStreams, EveryClassOfEveryCodecHasAnIdOfItsOwn) {
 TEST(StrandStreams, AreFew) {
   size_t most = 0;
   for (const double step_rate_hz : {10.0, 60.0, 240.0, 1'000.0})
-    for (const float bound_m : {2e-5f, 1e-4f, 5e-4f})
+    for (const float bound_m : {1e-6f, 2e-5f, 1e-4f, 5e-4f})
       for (const uint32_t strands : {1u, 500u, 200'000u})
         most = std::max(most, make_strand_classes({step_rate_hz, 0.0, bound_m, strands}).size());
   EXPECT_EQ(most, 9u);

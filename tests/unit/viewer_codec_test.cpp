@@ -282,7 +282,7 @@ TEST(ServedCodecs, ASecondOneTakesTheSameStates) {
 // A codec that not every viewer can decode has one behind it that every viewer can.
 TEST(ServedCodecs, WhatPredictsHasAFallbackThatDoesNot) {
   for (const StrandCodecInfo& codec : strand_codecs()) {
-    for (const float bound_m : {2e-5f, 1e-4f, 3e-4f, 5e-4f}) {
+    for (const float bound_m : {1e-6f, 2e-5f, 1e-4f, 3e-4f, 5e-4f}) {
       const auto served = served_codecs(codec, bound_m);
       ASSERT_TRUE(served.ok()) << codec.name;
       EXPECT_FALSE(served->back().predicts) << codec.name;

@@ -114,7 +114,7 @@ TEST(WireDocument, GivesTheRangesThatMessagesName) {
       {"kJpegQuality", fields::kJpegQuality}};
   const auto text_of = [](double value) {
     if (value >= 1000.0) return with_commas(static_cast<uint64_t>(value));
-    return std::regex_replace(fmt::format("{:.5f}", value), std::regex("\\.?0+$"), "");
+    return std::regex_replace(fmt::format("{:.6f}", value), std::regex("\\.?0+$"), "");
   };
   const std::string text = document();
   for (const auto& [name, range] : ranges)

@@ -20,6 +20,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kExpectPoll{50};
+constexpr double kStillS = 1.5, kLongestStillS = 15.0;  // without another picture; of waiting for that
 constexpr size_t kMaxExpectedChars = 300;
 constexpr double kRefusalTimeoutS = 10.0;
 constexpr size_t kHashChars = 16;
@@ -311,13 +312,27 @@ void ScenarioRun::expect_back(const ScenarioExpect& expect) {
          is_there);
 }
 
+/// In lockstep the server sends its picture once more, finely, and then no other until the next step.
+ViewerPicture ScenarioRun::still_picture(const ScenarioViewer& who) {
+  ViewerPicture seen = who.picture();
+  if (!is_lockstep_ || seen.mode != StreamMode::Frames) return seen;
+  double changed_s = elapsed_s();
+  await(kLongestStillS, [&] {
+    ViewerPicture next = who.picture();
+    if (next.image != seen.image) changed_s = elapsed_s();
+    seen = std::move(next);
+    return elapsed_s() >= changed_s + kStillS;
+  });
+  return seen;
+}
+
 void ScenarioRun::expect_picture(const ScenarioExpect& expect) {
   const ScenarioViewer& who = **viewer(expect.viewer);
   const std::string what = "picture of " + who.view().name;
   const std::filesystem::path& golden_path = expect.picture->golden;
   const std::string wanted =
       fmt::format("within {:g} dB of {}", expect.picture->db_above, golden_path.filename().string());
-  const auto seen = draw(who.picture(), {who.view().width, who.view().height});
+  const auto seen = draw(still_picture(who), {who.view().width, who.view().height});
   if (!seen) return report(what, wanted, seen.error().to_string(), false);
   // Others that share it compare with what the first of them wrote.
   if (options_.renews_goldens && renewed_.insert(golden_path).second) {

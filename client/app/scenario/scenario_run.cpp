@@ -400,7 +400,9 @@ Status ScenarioRun::carry_out(const ScenarioLink& link) {
 Status ScenarioRun::carry_out(const ScenarioView& view) {
   if (viewers_.contains(view.name))
     return make_error(ErrorCode::BadInput, "there is a viewer '{}' already", view.name);
-  ASSIGN_OR_RETURN(const ClientConfig config, config_for(Role::Viewer));
+  ASSIGN_OR_RETURN(ClientConfig config, config_for(Role::Viewer));
+  // Each of these stands alone: what was sent before does not show in it.
+  if (is_lockstep_) config.hello.picture_codecs = codec_bit(PictureCodec::Jpeg);
   const bool changes =
       std::any_of(scenario_.actions.begin(), scenario_.actions.end(),
                   [](const auto& action) { return std::holds_alternative<ScenarioLink>(action.work); });

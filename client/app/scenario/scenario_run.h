@@ -97,6 +97,7 @@ class ScenarioRun {
   void expect_span(const ScenarioExpect& expect);
   void expect_stretch(const std::string& name, const MeasuredSpan::Seen& seen, double limit);
   void expect_picture(const ScenarioExpect& expect);
+  ViewerPicture still_picture(const ScenarioViewer& who);
   void expect_metric(const ScenarioMetric& metric);
   void expect_back(const ScenarioExpect& expect);
   void expect_pace(const ScenarioExpect& expect);
