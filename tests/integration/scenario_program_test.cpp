@@ -171,6 +171,24 @@ TEST_F(ScenarioProgram, AStateIsComparedWithAKeptOne) {
                     testing::ContainsRegex("FAIL  line 7    .*none.txt.*--renew writes it")));
 }
 
+// It takes the states that one of the scenario's own took: samples come with the steps, not with the clock.
+TEST_F(ScenarioProgram, ARunningServerInLockstepIsFedStepByStep) {
+  const auto path = write("same.textproto", std::string("name: \"same\"\n") + kStart +
+                                                "do { feed { motion: \"shake\" } }\ndo { step: 12 }\n"
+                                                "do { expect { hash_file: \"hash.txt\" } }\n");
+  EXPECT_EQ(run({"--scenario", path.string(), "--renew"}), 0) << text_of("said");
+  const test::ChildProcess server(
+      STRANDCAST_SERVER_PROGRAM,
+      {"--lockstep", "--port", "0", "--port-file", (folder_.path() / "port").string(), "--set",
+       "groom.procedural.strand_count=20"},
+      folder_.path() / "server.log");
+  ASSERT_TRUE(eventually([&] { return !text_of("port").empty(); })) << text_of("server.log");
+  EXPECT_EQ(run({"--scenario", path.string(), "--connect",
+                 "127.0.0.1:" + std::to_string(std::stoi(text_of("port")))}),
+            0)
+      << text_of("said");
+}
+
 // Nothing comes through a line that stalls; it comes when the line is whole again.
 TEST_F(ScenarioProgram, WhatIsWrongWithALineIsSeen) {
   const auto path = write("line.textproto", std::string("name: \"line\"\n") + kStart +

@@ -79,6 +79,7 @@ Status ScenarioRun::carry_out(const ScenarioAction& action) {
 }
 
 Status ScenarioRun::carry_out(const ScenarioStart& start) {
+  is_lockstep_ = start.is_lockstep;
   if (options_.running) return {};  // the one that runs is used
   if (server_ != nullptr) return make_error(ErrorCode::BadInput, "a server was started already");
   ASSIGN_OR_RETURN(folder_, make_temporary_folder());
@@ -88,7 +89,6 @@ Status ScenarioRun::carry_out(const ScenarioStart& start) {
     config.arguments.insert(config.arguments.end(), {"--set", assignment});
   if (start.is_lockstep) config.arguments.emplace_back("--lockstep");
   config.arguments.insert(config.arguments.end(), start.options.begin(), start.options.end());
-  is_lockstep_ = start.is_lockstep;
   server_ = std::make_unique<ServerProcess>(std::move(config));
   RETURN_IF_ERROR(server_->start(std::min(left_s(), kStartTimeoutS), *options_.stop));
   if (start.has_relay) RETURN_IF_ERROR(start_relay());
@@ -328,10 +328,12 @@ void ScenarioRun::trace() {
   const double passed_s = time_s - traced_s_;
   if (passed_s < kTraceS || result_.trace.size() >= kMaxTraceSamples) return;
   traced_s_ = time_s;
+  const double shown_s =
+      is_lockstep_ && client_ ? static_cast<double>(tick_) / client_->welcome().step_rate_hz : time_s;
   for (const auto& [name, viewer] : viewers_) {
     const ViewerLook look = viewer->look();
     const ViewerCounts& before = traced_[name];
-    TraceSample sample{time_s, name};
+    TraceSample sample{shown_s, name};
     sample.stretch = look.largest_stretch;
     sample.hz = static_cast<double>(look.counts.frames - before.frames) / passed_s;
     sample.kbit = static_cast<double>(look.counts.received_bytes - before.received_bytes) * kBitsPerByte *
@@ -339,8 +341,8 @@ void ScenarioRun::trace() {
     traced_[name] = look.counts;
     result_.trace.push_back(sample);
   }
-  if (status_ns_ == 0) return;
-  TraceSample sample{time_s, {}};
+  if (status_ns_ == 0 || is_lockstep_) return;
+  TraceSample sample{shown_s, {}};
   sample.realtime = status_.realtime_factor;
   result_.trace.push_back(sample);
 }
