@@ -35,7 +35,7 @@ struct ClientConfig {
   std::filesystem::path tls_authorities;  // PEM, for an address with TLS; empty: the system's
   std::string path = "/v1";
   Hello hello;
-  /// Of a ViewerSession: a slow link delays and drops states, and never thins them. It acknowledges nothing
+  /// A slow link delays and drops states of a ViewerSession, and does not thin them: it acknowledges nothing
   /// then.
   bool keeps_all_strands = false;
   std::chrono::milliseconds connect_timeout{5000};  // name, TCP and WebSocket handshake together

@@ -177,14 +177,15 @@ TEST_F(ScenarioProgram, ARunningServerInLockstepIsFedStepByStep) {
                                                 "do { feed { motion: \"shake\" } }\ndo { step: 12 }\n"
                                                 "do { expect { hash_file: \"hash.txt\" } }\n");
   EXPECT_EQ(run({"--scenario", path.string(), "--renew"}), 0) << text_of("said");
+  const std::string token = (folder_.path() / "token").string();
   const test::ChildProcess server(
       STRANDCAST_SERVER_PROGRAM,
       {"--lockstep", "--port", "0", "--port-file", (folder_.path() / "port").string(), "--set",
-       "groom.procedural.strand_count=20"},
+       "groom.procedural.strand_count=20", "--token-file", token},
       folder_.path() / "server.log");
   ASSERT_TRUE(eventually([&] { return !text_of("port").empty(); })) << text_of("server.log");
   EXPECT_EQ(run({"--scenario", path.string(), "--connect",
-                 "127.0.0.1:" + std::to_string(std::stoi(text_of("port")))}),
+                 "127.0.0.1:" + std::to_string(std::stoi(text_of("port"))), "--token-file", token}),
             0)
       << text_of("said");
 }

@@ -82,7 +82,7 @@ look.skin_color 0 1 { r: 0.55 g: 0.38 b: 0.29 }
 camera.offset_m -100 100 { x: 0.22 y: 0.07 z: 0.62 }
 camera.target_m -100 100 { x: 0 y: -0.055 z: 0 }
 camera.fov_y_rad 0.02 2.8 0.61
-stream.bound_m 2e-05 0.0005 0.0001
+stream.bound_m 1e-06 0.0005 0.0001
 stream.frame_width 16 3840 640
 stream.frame_height 16 2160 360
 stream.jpeg_quality 1 100 80

@@ -97,7 +97,7 @@ export const simulationSections: readonly Section[] = [
   ] },
   { title: 'Stream', fields: [
     f('stream.strand_rate_hz', 'states, at most (0: every step)', ['kStrandRate', 0, 1000, 'Hz'], 120),
-    f('stream.bound_m', 'error, at most', ['kStreamBound', 2e-5, 5e-4, 'm']),
+    f('stream.bound_m', 'error, at most', ['kStreamBound', 1e-6, 5e-4, 'm']),
   ] },
 ];
 
