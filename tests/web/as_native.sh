@@ -20,8 +20,8 @@ echo "$(wc -l <"$work/lanes") functions of lanes as native"
 for tape in kept hostile tiny full; do
   "$build/bin/record_tapes" "$tape" "$work/$tape.tape"
 done
-sizes=(2000x16); rounds=1; exact="300x16 150"
-[ "${STRANDCAST_TEST_GRID:-small}" != whole ] || { sizes+=(10000x16); rounds=3; exact="1100x16 36000"; }
+sizes=(2000x16); rounds=1; exact="300x16 150"; frames=100
+[ "${STRANDCAST_TEST_GRID:-small}" != whole ] || { sizes+=(10000x16); rounds=3; exact="1100x16 36000"; frames=300; }
 for quality in fast full; do
   # shellcheck disable=SC2086
   "$build/bin/record_tapes" exact "$work/exact_$quality.tape" $quality $exact
@@ -29,7 +29,7 @@ done
 for size in "${sizes[@]}"; do
   for stream in "dftl step" "direct_rod step" "dftl tangent"; do
     # shellcheck disable=SC2086
-    "$build/bin/record_tapes" stream "$work/${stream// /_}_$size.tape" $stream "$size" 300
+    "$build/bin/record_tapes" stream "$work/${stream// /_}_$size.tape" $stream "$size" "$frames"
   done
 done
 "$node" "$here/play.mjs" "$modules/strand_core.wasm" --rounds "$rounds" "$work"/*.tape
