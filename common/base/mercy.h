@@ -15,8 +15,10 @@ inline constexpr uint64_t kMostBadShare = 10;
 
 class BadItems {
  public:
-  void add(Error problem) {
-    if (count_++ == 0) first_ = std::move(problem);
+  /// Counts `count` items, 1 or more, of which `problem` says what is wrong with the first.
+  void add(Error problem, uint64_t count = 1) {
+    if (count_ == 0) first_ = std::move(problem);
+    count_ += count;
   }
   uint64_t count() const { return count_; }
   /// Returns the first of them; count() is not 0.

@@ -1,10 +1,12 @@
 #include "common/groom/ply_loader.h"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 #include <utility>
 
 #include "common/base/file.h"
+#include "common/base/mercy.h"
 #include "common/groom/ply_table.h"
 #include "common/groom/text_scan.h"
 #include "common/groom/usable_strands.h"
@@ -20,8 +22,26 @@ struct PlyRowsRead {
   std::vector<std::vector<uint32_t>> strand_vertices;  // of lists
   std::vector<uint32_t> strand_counts;                 // vertices of each
   std::vector<std::pair<uint32_t, uint32_t>> edges;
-  uint64_t face_count = 0, decimal_commas = 0;
+  uint64_t face_count = 0;
+  std::vector<std::string> notes;
 };
+
+/// Calls `take` for every row. Where the file ends before a tenth of the rows at most, that is noted.
+template <class Take>
+Status take_rows(PlyRows& rows, const PlyElement& element, std::vector<std::string>& notes, Take take) {
+  for (uint64_t row = 0; row < element.row_count; ++row) {
+    if (const Status is_there = rows.read(element, row); !is_there) {
+      if (!rows.has_ended()) return is_there;
+      BadItems missing;
+      missing.add(is_there.error(), element.row_count - row);
+      RETURN_IF_ERROR(missing.judge(element.row_count, "rows"));
+      notes.push_back(missing.sentence(element.row_count, "rows", "since the file is cut off"));
+      return {};
+    }
+    RETURN_IF_ERROR(take(row));
+  }
+  return {};
+}
 
 bool is_strand_element(const std::string& name) {
   return name == "strand" || name == "strands" || name == "curve" || name == "curves" || name == "polyline";
@@ -38,12 +58,14 @@ Status read_points(PlyRows& rows, const PlyElement& element, PlyRowsRead& read) 
   if (element.row_count > kMaxGroomVertices)
     return make_error(ErrorCode::LimitExceeded, "{} points, at most {} are allowed", element.row_count,
                       kMaxGroomVertices);
-  for (uint64_t row = 0; row < element.row_count; ++row) {
-    RETURN_IF_ERROR(rows.read(element, row));
+  RETURN_IF_ERROR(take_rows(rows, element, read.notes, [&](uint64_t) -> Status {
     glm::vec3 point;
     for (int i = 0; i < 3; ++i) point[i] = static_cast<float>(rows.value(axis[static_cast<size_t>(i)]));
     read.points.push_back(point);
-  }
+    return {};
+  }));
+  // Strands that a cut file does not have to their end are left out as those with a broken point are.
+  read.points.resize(element.row_count, glm::vec3(std::numeric_limits<float>::quiet_NaN()));
   return {};
 }
 
@@ -64,8 +86,7 @@ Status read_strands(PlyRows& rows, const PlyElement& element, PlyRowsRead& read)
   if (element.row_count > kMaxStrandCount)
     return make_error(ErrorCode::LimitExceeded, "{} strands, at most {} are allowed", element.row_count,
                       kMaxStrandCount);
-  for (uint64_t row = 0; row < element.row_count; ++row) {
-    RETURN_IF_ERROR(rows.read(element, row));
+  return take_rows(rows, element, read.notes, [&](uint64_t row) -> Status {
     const double count = list ? static_cast<double>(rows.list(*list).size())
                               : rows.value(segments ? *segments : *vertices) + (segments ? 1.0 : 0.0);
     if (!(count >= 0.0 && count <= kMaxSourceVertexCount))
@@ -73,15 +94,15 @@ Status read_strands(PlyRows& rows, const PlyElement& element, PlyRowsRead& read)
                         kMaxSourceVertexCount);
     if (!list) {
       read.strand_counts.push_back(static_cast<uint32_t>(count));
-      continue;
+      return {};
     }
     std::vector<uint32_t>& strand = read.strand_vertices.emplace_back();
     for (const double value : rows.list(*list)) {
       ASSIGN_OR_RETURN(const uint32_t index, vertex_index(value, "strand", row));
       strand.push_back(index);
     }
-  }
-  return {};
+    return {};
+  });
 }
 
 Status read_edges(PlyRows& rows, const PlyElement& element, PlyRowsRead& read) {
@@ -91,13 +112,12 @@ Status read_edges(PlyRows& rows, const PlyElement& element, PlyRowsRead& read) {
   if (element.row_count > kMaxGroomVertices)
     return make_error(ErrorCode::LimitExceeded, "{} edges, at most {} are allowed", element.row_count,
                       kMaxGroomVertices);
-  for (uint64_t row = 0; row < element.row_count; ++row) {
-    RETURN_IF_ERROR(rows.read(element, row));
+  return take_rows(rows, element, read.notes, [&](uint64_t row) -> Status {
     ASSIGN_OR_RETURN(const uint32_t from, vertex_index(rows.value(*first), "edge", row));
     ASSIGN_OR_RETURN(const uint32_t to, vertex_index(rows.value(*second), "edge", row));
     read.edges.emplace_back(from, to);
-  }
-  return {};
+    return {};
+  });
 }
 
 Result<PlyRowsRead> read_rows(std::string_view file, const PlyHeader& header) {
@@ -115,18 +135,24 @@ Result<PlyRowsRead> read_rows(std::string_view file, const PlyHeader& header) {
       RETURN_IF_ERROR(read_edges(rows, element, read));
     } else {
       if (element.name == "face") read.face_count = element.row_count;
-      for (uint64_t row = 0; row < element.row_count; ++row) RETURN_IF_ERROR(rows.read(element, row));
+      RETURN_IF_ERROR(take_rows(rows, element, read.notes, [](uint64_t) { return Status(); }));
     }
   }
-  read.decimal_commas = rows.decimal_commas();
-  if (rows.left_bytes() > 0)
-    return make_error(ErrorCode::BadInput, "{} bytes are left after the last row", rows.left_bytes());
+  if (rows.decimal_commas() > 0)
+    read.notes.push_back(fmt::format("{} numbers have a decimal comma", rows.decimal_commas()));
+  if (const size_t left = rows.left_bytes(); left > 0) {
+    BadItems beyond;
+    beyond.add(make_error(ErrorCode::BadInput, "{} bytes are left after the last row", left), left);
+    RETURN_IF_ERROR(beyond.judge(file.size(), "bytes"));
+    read.notes.push_back(fmt::format("{} bytes after the last row are left out", left));
+  }
   if (read.points.empty()) return make_error(ErrorCode::BadInput, "there are no points");
   return read;
 }
 
-/// Strands one behind the other, all points of the file in its order.
-Result<Groom> strands_of_counts(std::vector<glm::vec3> points, const std::vector<uint32_t>& counts) {
+/// Strands one after the other in the order of the file's points; a tenth of these at most may be left.
+Result<Groom> strands_of_counts(std::vector<glm::vec3> points, const std::vector<uint32_t>& counts,
+                                std::vector<std::string>& notes) {
   Groom groom;
   groom.offset.push_back(0);
   uint64_t total = 0;
@@ -134,8 +160,16 @@ Result<Groom> strands_of_counts(std::vector<glm::vec3> points, const std::vector
     total += count;
     groom.offset.push_back(static_cast<uint32_t>(std::min<uint64_t>(total, kNoVertex)));
   }
-  if (total != points.size())
-    return make_error(ErrorCode::BadInput, "the strands need {} points, there are {}", total, points.size());
+  const Error is_another =
+      make_error(ErrorCode::BadInput, "the strands need {} points, there are {}", total, points.size());
+  if (total > points.size()) return is_another;
+  if (total < points.size()) {
+    BadItems left;
+    left.add(is_another, points.size() - total);
+    RETURN_IF_ERROR(left.judge(points.size(), "points"));
+    notes.push_back(fmt::format("{} points that no strand has are left out", left.count()));
+    points.resize(total);
+  }
   groom.rest_position_m = std::move(points);
   return groom;
 }
@@ -246,7 +280,8 @@ Statements statements_of(const std::vector<std::string>& comments) {
 }
 
 /// Bare points: so many of them to a strand.
-Result<Groom> strands_of_points(std::vector<glm::vec3> points, uint32_t count) {
+Result<Groom> strands_of_points(std::vector<glm::vec3> points, uint32_t count,
+                                std::vector<std::string>& notes) {
   if (count < kMinVertexCount || count > kMaxSourceVertexCount || points.size() % count != 0)
     return make_error(ErrorCode::BadInput,
                       "{} points are no strands of {} each; groom.file.strand_vertex_count says how many a "
@@ -256,22 +291,22 @@ Result<Groom> strands_of_points(std::vector<glm::vec3> points, uint32_t count) {
     return make_error(ErrorCode::LimitExceeded, "{} strands, at most {} are allowed", points.size() / count,
                       kMaxStrandCount);
   const std::vector<uint32_t> counts(points.size() / count, count);
-  return strands_of_counts(std::move(points), counts);
+  return strands_of_counts(std::move(points), counts, notes);
 }
 
 Result<Groom> strands_of(PlyRowsRead read, uint32_t asked_count, uint32_t said_count,
                          std::vector<std::string>& notes) {
-  if (asked_count != 0) return strands_of_points(std::move(read.points), asked_count);
+  if (asked_count != 0) return strands_of_points(std::move(read.points), asked_count, notes);
   if (!read.strand_vertices.empty()) return strands_of_lists(read.points, read.strand_vertices);
   if (!read.strand_counts.empty()) {
     // Where there are faces too, points behind the strands are theirs.
     const auto on_strands =
         std::accumulate(read.strand_counts.begin(), read.strand_counts.end(), uint64_t{0});
     if (read.face_count > 0 && on_strands < read.points.size()) read.points.resize(on_strands);
-    return strands_of_counts(std::move(read.points), read.strand_counts);
+    return strands_of_counts(std::move(read.points), read.strand_counts, notes);
   }
   if (!read.edges.empty()) return strands_of_edges(read.points, read.edges, notes);
-  if (said_count != 0) return strands_of_points(std::move(read.points), said_count);
+  if (said_count != 0) return strands_of_points(std::move(read.points), said_count, notes);
   if (read.face_count > 0)
     return make_error(
         ErrorCode::BadInput,
@@ -285,7 +320,7 @@ Result<Groom> strands_of(PlyRowsRead read, uint32_t asked_count, uint32_t said_c
                       read.points.size());
   notes.push_back(fmt::format("{} points per strand: {} (groom.file.strand_vertex_count states it)",
                               guess.value, guess.reason));
-  return strands_of_points(std::move(read.points), guess.value);
+  return strands_of_points(std::move(read.points), guess.value, notes);
 }
 
 }  // namespace
@@ -327,8 +362,7 @@ Result<StatedGroom> read_ply(std::span<const std::byte> file, uint32_t strand_ve
   ASSIGN_OR_RETURN(PlyRowsRead read, read_rows(text, header));
   const Statements said = statements_of(header.comment);
   StatedGroom stated;
-  if (read.decimal_commas > 0)
-    stated.notes.push_back(fmt::format("{} numbers have a decimal comma", read.decimal_commas));
+  stated.notes = std::move(read.notes);
   stated.unit_m = said.unit_m;
   stated.is_z_up = said.is_z_up;
   stated.unit_reason = stated.up_axis_reason = "a comment of the file says so";

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "common/groom/ply_loader.h"
 #include "common/groom/text_scan.h"
@@ -164,10 +165,15 @@ Result<PlyHeader> read_ply_header(std::string_view file) {
   return header;
 }
 
+Error PlyRows::ended(std::string_view what) {
+  has_ended_ = true;
+  return make_error(ErrorCode::BadInput, "{}", what);
+}
+
 Result<double> PlyRows::next_word(PlyType type) {
   constexpr std::string_view kSpace = " \t\r\n\v\f";
   at_ = std::min(text_.find_first_not_of(kSpace, at_), text_.size());
-  if (at_ == text_.size()) return make_error(ErrorCode::BadInput, "the file ends there");
+  if (at_ == text_.size()) return ended("the file ends there");
   const size_t end = std::min(text_.find_first_of(kSpace, at_), text_.size());
   const std::string_view word = text_.substr(at_, end - at_);
   at_ = end;
@@ -178,8 +184,9 @@ Result<double> PlyRows::next_word(PlyType type) {
     value = parse_number<double>(with_point);
     decimal_commas_ += value ? 1 : 0;
   }
-  if (!value) return make_error(ErrorCode::BadInput, "{} is no number", quoted(word));
   const bool is_whole = type < PlyType::Float32;
+  if (!value && !is_whole) return std::numeric_limits<double>::quiet_NaN();
+  if (!value) return make_error(ErrorCode::BadInput, "{} is no number", quoted(word));
   if (is_whole && *value != std::floor(*value))
     return make_error(ErrorCode::BadInput, "{} is no whole number", quoted(word));
   return *value;
@@ -188,7 +195,7 @@ Result<double> PlyRows::next_word(PlyType type) {
 Result<double> PlyRows::next(PlyType type) {
   if (format_ == PlyFormat::Text) return next_word(type);
   const size_t bytes = named(type).bytes;
-  if (text_.size() - at_ < bytes) return make_error(ErrorCode::BadInput, "the file ends there");
+  if (text_.size() - at_ < bytes) return ended("the file ends there");
   uint64_t bits = 0;
   for (size_t i = 0; i < bytes; ++i) {
     const auto byte = static_cast<uint8_t>(text_[at_ + i]);
@@ -224,8 +231,9 @@ Status PlyRows::read(const PlyElement& element, uint64_t row) {
       if (!read_count) return fail(read_count.error());
       count = *read_count;
       // Every value takes a byte at least, so that a length beyond the rest of the file allocates nothing.
-      if (!(count >= 0.0 && count <= static_cast<double>(text_.size() - at_)))
-        return fail(make_error(ErrorCode::BadInput, "a list of {} values, the file ends before", count));
+      if (!(count >= 0.0)) return fail(make_error(ErrorCode::BadInput, "a list of {} values", count));
+      if (count > static_cast<double>(text_.size() - at_))
+        return fail(ended(fmt::format("a list of {} values, the file ends before", count)));
     }
     for (double i = 0.0; i < count; i += 1.0) {
       const auto value = next(property.type);

@@ -51,19 +51,23 @@ class PlyRows {
   PlyRows(std::string_view file, const PlyHeader& header)
       : text_(file), at_(header.body_at), format_(header.format) {}
 
-  /// Reads the next row of `element`: the values of all properties, lists flattened. Errors name element, row
-  /// and property. The spans stay valid until the next call.
+  /// Reads the next row of `element`: the values of all properties, lists flattened. In text, what is no
+  /// number is NaN where a fraction may stand. Errors name element, row and property. Spans are valid until
+  /// the next call.
   Status read(const PlyElement& element, uint64_t row);
   double value(size_t property) const { return value_[begin_[property]]; }
   std::span<const double> list(size_t property) const {
     return std::span(value_).subspan(begin_[property], begin_[property + 1] - begin_[property]);
   }
+  /// Returns true after a read failed because the file is cut off.
+  bool has_ended() const { return has_ended_; }
   /// Returns the number of unread bytes after the last row; white space does not count in text files.
   size_t left_bytes() const;
   /// Returns how many numbers of a text file had a decimal comma.
   uint64_t decimal_commas() const { return decimal_commas_; }
 
  private:
+  Error ended(std::string_view what);
   Result<double> next(PlyType type);
   Result<double> next_word(PlyType type);
 
@@ -71,6 +75,7 @@ class PlyRows {
   size_t at_;
   PlyFormat format_;
   uint64_t decimal_commas_ = 0;
+  bool has_ended_ = false;
   std::vector<double> value_;
   std::vector<size_t> begin_;  // (properties + 1) where each one's values begin
 };

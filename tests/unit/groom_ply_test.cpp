@@ -112,7 +112,9 @@ TEST(Ply, BinaryOfBothByteOrdersIsTheSameAsText) {
     EXPECT_EQ(groom->groom.offset, (std::vector<uint32_t>{0, 3, 5}));
     for (size_t size = 0; size < text.size(); ++size)
       ASSERT_NE(refusal(text.substr(0, size)), "accepted") << size << " bytes of " << text.size();
-    EXPECT_THAT(refusal(text + "xy"), HasSubstr("2 bytes are left after the last row"));
+    EXPECT_THAT(read(text + "xy")->notes, ::testing::ElementsAre("2 bytes after the last row are left out"));
+    EXPECT_THAT(refusal(text + std::string(text.size(), 'x')),
+                HasSubstr("bytes are left after the last row"));
   }
 }
 
@@ -192,11 +194,53 @@ TEST(Ply, AStrandOfOnePointIsLeftOutAndDecimalCommasAreRead) {
                                                    HasSubstr("1 strands of fewer than 2 points")));
 }
 
+TEST(Ply, AFileThatIsCutOffGivesWhatItHas) {
+  const std::vector<glm::vec3> points = hanging(50, 20);
+  const std::string whole = bare(points);
+  // The last 2 of 50 strands, and a part of the one before them.
+  std::string cut = whole;
+  for (int row = 0; row < 45; ++row) cut.resize(cut.rfind('\n', cut.size() - 2) + 1);
+  const auto groom = read(cut);
+  ASSERT_TRUE(groom) << groom.error().to_string();
+  EXPECT_EQ(groom->groom.strand_count(), 47u);
+  EXPECT_EQ(groom->groom.rest_position_m, std::vector<glm::vec3>(points.begin(), points.begin() + 47 * 20));
+  EXPECT_THAT(groom->notes,
+              ::testing::Contains(HasSubstr("45 of 1000 rows cannot be used, since the file is cut "
+                                            "off; the first: vertex 955 x: the file ends there")));
+  EXPECT_THAT(refusal(whole.substr(0, whole.size() / 2)), HasSubstr("a tenth at most may be so"));
+}
+
+TEST(Ply, AWordThatIsNoNumberCostsItsStrandAlone) {
+  const std::vector<glm::vec3> points = hanging(50, 20);
+  std::string text = bare(points);
+  const size_t last_row = text.rfind('\n', text.size() - 2) + 1;
+  text.replace(last_row, text.find(' ', last_row) - last_row, "-1.#IND");
+  const auto groom = read(text);
+  ASSERT_TRUE(groom) << groom.error().to_string();
+  EXPECT_EQ(groom->groom.rest_position_m, std::vector<glm::vec3>(points.begin(), points.end() - 20));
+  EXPECT_THAT(groom->notes, ::testing::Contains(HasSubstr("1 of 50 strands cannot be used")));
+}
+
+TEST(Ply, PointsOfNoStrandAreLeftOutWhereTheyAreFew) {
+  const std::vector<glm::vec3> points = hanging(11, 2);
+  std::string text = bare(points);
+  const std::string end = "end_header\n";
+  text.insert(text.find(end), "element strand 10\nproperty int nverts\n");
+  for (int strand = 0; strand < 10; ++strand) text += "2\n";
+  const auto groom = read(text);
+  ASSERT_TRUE(groom) << groom.error().to_string();
+  EXPECT_EQ(groom->groom.strand_count(), 10u);
+  EXPECT_THAT(groom->notes, ::testing::ElementsAre("2 points that no strand has are left out"));
+}
+
 TEST(Ply, WhatIsWrongIsNamed) {
   EXPECT_THAT(refusal("plx\n"), HasSubstr("does not begin with the line 'ply'"));
   EXPECT_THAT(refusal("ply\nformat ascii 1.0\n"), HasSubstr("no line 'end_header'"));
   EXPECT_THAT(refusal(header("ascii", kFivePoints) + "0 0 0\n0 1 x\n"),
-              HasSubstr("vertex 1 z: 'x' is no number"));
+              HasSubstr("vertex 2 x: the file ends there; 3 of 5 rows cannot be used"));
+  EXPECT_THAT(
+      refusal(header("ascii", kFivePoints + "element strand 2\nproperty int nsegs\n") + kFiveRows + "x 1"),
+      HasSubstr("strand 0 nsegs: 'x' is no number"));
   EXPECT_THAT(refusal(header("binary_middle_endian", kFivePoints)), HasSubstr("line 2: the format is"));
   EXPECT_THAT(refusal(header("ascii", "element vertex 5\nproperty float x\nproperty float y\n") + kFiveRows),
               HasSubstr("no property 'z'"));
