@@ -40,44 +40,28 @@ struct Place {
 using PlaceToWrite = Place<pb::Message>;
 using PlaceToRead = Place<const pb::Message>;
 
-/// Finds fields by name, which must be a literal. Elements of a list ask for the same fields in the same
-/// order, so only the first element searches.
-class FieldFinder {
- public:
-  struct Field {
-    const char* name;
-    const pb::FieldDescriptor* descriptor;
-    bool may_be_missing;  // and then keeps its default; what cannot be is 0
-  };
-
-  Field find(const pb::Descriptor* type, const char* name) {
-    if (next_ < found_.size() && found_[next_].name == name &&
-        found_[next_].descriptor->containing_type() == type)
-      return found_[next_++];
-    const auto* descriptor = type->FindFieldByName(name);
-    CHECK(descriptor != nullptr);
-    const Field field{name, descriptor, descriptor->has_presence()};
-    if (is_list_ && next_ == found_.size()) {
-      found_.push_back(field);
-      ++next_;
-    }
-    return field;
-  }
-  void begin_element() {
-    is_list_ = true;
-    next_ = 0;
-  }
-  void end_list() {
-    is_list_ = false;
-    next_ = 0;
-    found_.clear();
-  }
-
- private:
-  std::vector<Field> found_;
-  size_t next_ = 0;
-  bool is_list_ = false;
+/// A field of a message; `name` and `type` are what it was found by.
+struct FoundField {
+  const char* name = nullptr;
+  const pb::Descriptor* type = nullptr;
+  const pb::FieldDescriptor* descriptor = nullptr;
+  bool may_be_missing = false;  // and then keeps its default; what cannot be is 0
 };
+
+/// Finds a field by its name, which must be a literal: each thread remembers by its address what it has
+/// found, since protobuf takes longer to find a field than to read it.
+inline const FoundField& find_field(const pb::Descriptor* type, const char* name) {
+  constexpr size_t kRemembered = 2048;  // some times as many as there are fields
+  thread_local std::array<FoundField, kRemembered> remembered;
+  constexpr uintptr_t kMix = 0x9e3779b97f4a7c15u;  // 2^64 over the golden ratio
+  const uintptr_t key = (reinterpret_cast<uintptr_t>(type) + reinterpret_cast<uintptr_t>(name)) * kMix;
+  FoundField& field = remembered[key >> (8 * sizeof(key) - 11)];
+  static_assert(kRemembered == 1u << 11);
+  if (field.name == name && field.type == type) return field;
+  const auto* descriptor = type->FindFieldByName(name);
+  CHECK(descriptor != nullptr);
+  return field = {name, type, descriptor, descriptor->has_presence()};
+}
 
 using PartNames = std::array<const char*, 3>;
 constexpr PartNames kVectorParts = {"x", "y", "z"};
@@ -134,7 +118,6 @@ class MessageWriter {
     const auto& field = field_of(name);
     std::optional<PlaceToWrite> place;
     for (T& value : values) {
-      finder_.begin_element();
       pb::Message& element = *at_.reflection->AddMessage(at_.message, &field);
       if (place)
         place->message = &element;  // all of one type
@@ -142,7 +125,6 @@ class MessageWriter {
         place.emplace(element);
       descend(*place, [&] { body(value); });
     }
-    finder_.end_list();
   }
   void places(const char* name, const std::vector<glm::vec3>& values, size_t) {
     if (values.empty()) return;
@@ -180,7 +162,7 @@ class MessageWriter {
   void require(const char*, bool, const char*) {}
 
  private:
-  const pb::FieldDescriptor& field_of(const char* name) { return *finder_.find(at_.type, name).descriptor; }
+  const pb::FieldDescriptor& field_of(const char* name) { return *find_field(at_.type, name).descriptor; }
 
   void parts(const char* name, const glm::vec3& whole, const PartNames& names) {
     group(name, [&] {
@@ -195,7 +177,6 @@ class MessageWriter {
   }
 
   PlaceToWrite at_;
-  FieldFinder finder_;
 };
 
 /// Reads fields from a message and checks them; keeps the first error, which names the field and its group.
@@ -207,12 +188,12 @@ class MessageReader {
 
   template <class T>
   void value(const char* name, T& value) {
-    const auto field = finder_.find(at_.type, name);
+    const FoundField& field = find_field(at_.type, name);
     if (is_given(field)) value = static_cast<T>(get<T>(*field.descriptor));
   }
   template <class T>
   void number(const char* name, T& value, const Range& range) {
-    const auto field = finder_.find(at_.type, name);
+    const FoundField& field = find_field(at_.type, name);
     const auto given = is_given(field) ? get<T>(*field.descriptor) : value;
     value = static_cast<T>(given);
     check(name, static_cast<double>(given), range);
@@ -235,7 +216,7 @@ class MessageReader {
     value = static_cast<Enum>(given - first);
   }
   void text(const char* name, std::string& value, size_t limit) {
-    const auto field = finder_.find(at_.type, name);
+    const FoundField& field = find_field(at_.type, name);
     if (!is_given(field)) return;
     value = at_.reflection->GetString(*at_.message, field.descriptor);
     check_printable(name, value);
@@ -271,7 +252,6 @@ class MessageReader {
     values.resize(size);
     std::optional<PlaceToRead> place;
     for (size_t i = 0; i < size; ++i) {
-      finder_.begin_element();
       const auto& element = at_.reflection->GetRepeatedMessage(*at_.message, &field, static_cast<int>(i));
       if (place)
         place->message = &element;  // all of one type
@@ -279,7 +259,6 @@ class MessageReader {
         place.emplace(element);
       descend(name, *place, [&] { body(values[i]); });
     }
-    finder_.end_list();
   }
   void places(const char* name, std::vector<glm::vec3>& values, size_t limit) {
     read_places(name, values, limit, [this](const pb::FieldDescriptor& field, int i) {
@@ -345,7 +324,7 @@ class MessageReader {
   }
 
   /// A missing field of a look or camera keeps its default; any other missing field becomes 0.
-  bool is_given(const FieldFinder::Field& field) const {
+  bool is_given(const FoundField& field) const {
     return !field.may_be_missing || at_.reflection->HasField(*at_.message, field.descriptor);
   }
 
@@ -365,7 +344,7 @@ class MessageReader {
                  ? static_cast<T>(at_.reflection->GetFloat(*at_.message, &field))
                  : static_cast<T>(at_.reflection->GetDouble(*at_.message, &field));
   }
-  const pb::FieldDescriptor& field_of(const char* name) { return *finder_.find(at_.type, name).descriptor; }
+  const pb::FieldDescriptor& field_of(const char* name) { return *find_field(at_.type, name).descriptor; }
   std::string get_string(const char* name) {
     return at_.reflection->GetString(*at_.message, &field_of(name));
   }
@@ -397,7 +376,7 @@ class MessageReader {
     const auto& field = field_of(name);
     const PlaceToRead inner(at_.reflection->GetMessage(*at_.message, &field));
     for (int i = 0; i < 3; ++i) {
-      const auto* part = finder_.find(inner.type, names[static_cast<size_t>(i)]).descriptor;
+      const auto* part = find_field(inner.type, names[static_cast<size_t>(i)]).descriptor;
       if (inner.reflection->HasField(*inner.message, part))
         whole[i] = static_cast<float>(inner.reflection->GetDouble(*inner.message, part));
       check(name, whole[i], range);
@@ -420,7 +399,6 @@ class MessageReader {
   }
 
   PlaceToRead at_;
-  FieldFinder finder_;
   const char* group_ = nullptr;  // that the message is
   std::optional<Error> error_;
 };
