@@ -10,6 +10,7 @@
 #include "common/client/reconnect_policy.h"
 #include "common/client/viewer_connection_private.h"
 #include "common/log/log.h"
+#include "common/strands/asset/layout.h"
 
 namespace strandcast {
 namespace {
@@ -240,7 +241,9 @@ void ViewerClient::Connection::greet() {
                              "the server speaks protocol '{}', this program needs '{}'",
                              one_line(view(chosen)), kWebSocketProtocol));
   set_deadline(config_.welcome_timeout, "sent no Welcome");
-  if (auto sent = send(encode(ClientMessage(config_.hello))); !sent) return finish(sent.error());
+  Hello hello = config_.hello;
+  hello.asset_layout = static_cast<uint32_t>(kNewestAssetLayout);
+  if (auto sent = send(encode(ClientMessage(hello))); !sent) return finish(sent.error());
   read_next();
 }
 

@@ -3,14 +3,20 @@
 #include <cmath>
 
 #include "common/base/check.h"
+#include "common/strands/asset/head.h"
+#include "common/strands/asset/lattice.h"
+#include "common/strands/asset/layout.h"
+#include "common/strands/asset/strands.h"
+#include "common/strands/asset/triangles.h"
 #include "common/strands/byte_io.h"
 #include "common/strands/zstd_block.h"
 
 namespace strandcast {
 namespace {
 
-constexpr uint32_t kAssetLayout = 1;
 constexpr int kAssetLevel = 3;
+/// Parts of the layout Numbers, in their order.
+enum class Part : uint8_t { Strands = 1, Triangles = 2, Head = 3 };
 
 static_assert(sizeof(glm::vec3) == 12 && sizeof(glm::uvec3) == 12, "copied as they lie in memory");
 constexpr size_t kItemBytes = 12;
@@ -76,17 +82,21 @@ Status check_indices(const char* what, const std::vector<glm::uvec3>& triangles,
   return {};
 }
 
-}  // namespace
-
-std::vector<std::byte> encode_scene_asset(const SceneAsset& asset) {
-  AssetCounts counts;
-  counts.strands = asset.strand_count;
-  counts.vertices = asset.vertex_count;
-  counts.triangles = static_cast<uint32_t>(asset.triangle.size());
-  counts.mesh_vertices = static_cast<uint32_t>(asset.head.position_m.size());
-  counts.mesh_triangles = static_cast<uint32_t>(asset.head.triangle.size());
+AssetCounts counts_of(const SceneAsset& asset) {
   CHECK(asset.head.normal.size() == asset.head.position_m.size());
+  return {asset.strand_count, asset.vertex_count, static_cast<uint32_t>(asset.triangle.size()),
+          static_cast<uint32_t>(asset.head.position_m.size()),
+          static_cast<uint32_t>(asset.head.triangle.size())};
+}
 
+void put_counts(AssetLayout layout, const AssetCounts& counts, std::vector<std::byte>& payload) {
+  ByteWriter writer(payload);
+  for (const uint32_t number : {static_cast<uint32_t>(layout), counts.strands, counts.vertices,
+                                counts.triangles, counts.mesh_vertices, counts.mesh_triangles})
+    writer.put(number);
+}
+
+std::vector<std::byte> encode_floats(const SceneAsset& asset, const AssetCounts& counts) {
   std::vector<std::byte> content;
   content.reserve(counts.content_bytes());
   ByteWriter content_writer(content);
@@ -96,14 +106,110 @@ std::vector<std::byte> encode_scene_asset(const SceneAsset& asset) {
   content_writer.put_bytes(std::as_bytes(std::span(asset.head.normal)));
   content_writer.put_bytes(std::as_bytes(std::span(asset.head.triangle)));
   CHECK(content.size() == counts.content_bytes());
-
   std::vector<std::byte> payload;
-  ByteWriter writer(payload);
-  for (const uint32_t number : {kAssetLayout, counts.strands, counts.vertices, counts.triangles,
-                                counts.mesh_vertices, counts.mesh_triangles})
-    writer.put(number);
+  put_counts(AssetLayout::Floats, counts, payload);
   ZstdCompressor().append(content, kAssetLevel, payload);
   return payload;
+}
+
+/// Moves points between the order of an asset, strand fastest, and strands one after the other.
+template <class Point>
+std::vector<Point> turned(const std::vector<Point>& points, size_t row_count, size_t column_count) {
+  std::vector<Point> result(points.size());
+  for (size_t row = 0; row < row_count; ++row)
+    for (size_t column = 0; column < column_count; ++column)
+      result[column * row_count + row] = points[row * column_count + column];
+  return result;
+}
+
+void put_part(Part part, const std::vector<std::byte>& body, std::vector<std::byte>& payload) {
+  ByteWriter writer(payload);
+  writer.put(static_cast<uint8_t>(part));
+  writer.put(static_cast<uint32_t>(body.size()));
+  writer.put_bytes(body);
+}
+
+/// Returns nothing where the asset cannot be told by numbers.
+std::vector<std::byte> encode_numbers(const SceneAsset& asset, const AssetCounts& counts) {
+  if (!check(counts) || !check_indices("", asset.triangle, counts.strands) ||
+      !check_indices("", asset.head.triangle, counts.mesh_vertices) ||
+      (asset.head.triangle.empty() && !asset.head.position_m.empty()))
+    return {};
+  auto points = asset::to_lattice(asset.rest_position_m);
+  if (!points) return {};
+  points->point = turned(points->point, counts.vertices, counts.strands);
+  std::vector<std::byte> payload, body;
+  put_counts(AssetLayout::Numbers, counts, payload);
+  asset::append_strands({counts.strands, counts.vertices, std::move(*points)}, body);
+  put_part(Part::Strands, body, payload);
+  body.clear();
+  asset::append_triangles(asset.triangle, std::span(asset.rest_position_m).first(counts.strands), body);
+  put_part(Part::Triangles, body, payload);
+  if (asset.head.triangle.empty()) return payload;
+  body.clear();
+  if (!asset::append_head(asset.head, body)) return {};
+  put_part(Part::Head, body, payload);
+  return payload;
+}
+
+Result<SceneAsset> decode_floats(std::span<const std::byte> source, const AssetCounts& counts) {
+  // Before anything is allocated: does the compressed part promise exactly what the counts need?
+  ASSIGN_OR_RETURN(const size_t declared_bytes, zstd_content_bytes(source, counts.content_bytes()));
+  if (declared_bytes != counts.content_bytes())
+    return make_error(ErrorCode::BadInput, "asset declares {} bytes, its counts need {}", declared_bytes,
+                      counts.content_bytes());
+  std::vector<std::byte> content(counts.content_bytes());
+  RETURN_IF_ERROR(ZstdDecompressor().fill(source, content));
+  ByteReader items(content);
+  SceneAsset asset;
+  asset.rest_position_m = take_items<glm::vec3>(items, static_cast<size_t>(counts.strands) * counts.vertices);
+  asset.triangle = take_items<RootTriangle>(items, counts.triangles);
+  asset.head.position_m = take_items<glm::vec3>(items, counts.mesh_vertices);
+  asset.head.normal = take_items<glm::vec3>(items, counts.mesh_vertices);
+  asset.head.triangle = take_items<glm::uvec3>(items, counts.mesh_triangles);
+  return asset;
+}
+
+Result<std::span<const std::byte>> take_part(Part part, ByteReader& reader) {
+  const auto kind = reader.take<uint8_t>();
+  const auto body = reader.take_bytes(reader.take<uint32_t>());
+  if (reader.ok() && kind == static_cast<uint8_t>(part)) return body;
+  return make_error(ErrorCode::BadInput, "asset has no whole part {} where it has to be",
+                    static_cast<int>(part));
+}
+
+Result<SceneAsset> decode_numbers(std::span<const std::byte> source, const AssetCounts& counts) {
+  ByteReader reader(source);
+  SceneAsset asset;
+  asset::StrandShape shape{counts.strands, counts.vertices, {}};
+  ASSIGN_OR_RETURN(const auto strands, take_part(Part::Strands, reader));
+  RETURN_IF_ERROR(asset::read_strands(strands, shape));
+  asset.rest_position_m = turned(asset::to_metres(shape.points), counts.strands, counts.vertices);
+  ASSIGN_OR_RETURN(const auto triangles, take_part(Part::Triangles, reader));
+  asset.triangle.resize(counts.triangles);
+  const auto roots_m = std::span(asset.rest_position_m).first(counts.strands);
+  RETURN_IF_ERROR(asset::read_triangles(triangles, roots_m, asset.triangle));
+  if (counts.mesh_triangles > 0) {
+    ASSIGN_OR_RETURN(const auto head, take_part(Part::Head, reader));
+    RETURN_IF_ERROR(asset::read_head(head, {counts.mesh_vertices, counts.mesh_triangles}, asset.head));
+  }
+  if (!reader.rest().empty() || asset.head.position_m.size() != counts.mesh_vertices)
+    return make_error(ErrorCode::BadInput, "asset goes on for {} bytes, or lacks a mesh of {} vertices",
+                      reader.rest().size(), counts.mesh_vertices);
+  return asset;
+}
+
+}  // namespace
+
+std::vector<std::byte> encode_scene_asset(const SceneAsset& asset, AssetLayout newest) {
+  const AssetCounts counts = counts_of(asset);
+  std::vector<std::byte> payload;
+  if (newest == AssetLayout::Numbers) payload = encode_numbers(asset, counts);
+  return payload.empty() ? encode_floats(asset, counts) : payload;
+}
+
+std::vector<std::byte> encode_scene_asset(const SceneAsset& asset) {
+  return encode_scene_asset(asset, kNewestAssetLayout);
 }
 
 Result<SceneAsset> decode_scene_asset(std::span<const std::byte> payload) {
@@ -117,26 +223,15 @@ Result<SceneAsset> decode_scene_asset(std::span<const std::byte> payload) {
   counts.mesh_triangles = reader.take<uint32_t>();
   if (!reader.ok())
     return make_error(ErrorCode::BadInput, "asset of {} bytes is too short for its counts", payload.size());
-  if (layout != kAssetLayout)
-    return make_error(ErrorCode::BadInput, "asset has layout {}, known is {}", layout, kAssetLayout);
+  if (layout != static_cast<uint32_t>(AssetLayout::Floats) &&
+      layout != static_cast<uint32_t>(AssetLayout::Numbers))
+    return make_error(ErrorCode::BadInput, "asset has layout {}, known are 1 and 2", layout);
   RETURN_IF_ERROR(check(counts));
-  // Before anything is allocated: does the compressed part promise exactly what the counts need?
-  ASSIGN_OR_RETURN(const size_t declared_bytes, zstd_content_bytes(reader.rest(), counts.content_bytes()));
-  if (declared_bytes != counts.content_bytes())
-    return make_error(ErrorCode::BadInput, "asset declares {} bytes, its counts need {}", declared_bytes,
-                      counts.content_bytes());
-  std::vector<std::byte> content(counts.content_bytes());
-  RETURN_IF_ERROR(ZstdDecompressor().fill(reader.rest(), content));
-
-  ByteReader items(content);
-  SceneAsset asset;
+  ASSIGN_OR_RETURN(SceneAsset asset, layout == static_cast<uint32_t>(AssetLayout::Floats)
+                                         ? decode_floats(reader.rest(), counts)
+                                         : decode_numbers(reader.rest(), counts));
   asset.strand_count = counts.strands;
   asset.vertex_count = counts.vertices;
-  asset.rest_position_m = take_items<glm::vec3>(items, static_cast<size_t>(counts.strands) * counts.vertices);
-  asset.triangle = take_items<RootTriangle>(items, counts.triangles);
-  asset.head.position_m = take_items<glm::vec3>(items, counts.mesh_vertices);
-  asset.head.normal = take_items<glm::vec3>(items, counts.mesh_vertices);
-  asset.head.triangle = take_items<glm::uvec3>(items, counts.mesh_triangles);
 
   constexpr float kMaxNormal = 1.001f;  // unit length, rounded
   RETURN_IF_ERROR(check_points("rest position", asset.rest_position_m, kMaxGroomExtentM));

@@ -94,6 +94,7 @@ void visit(Visitor& v, Hello& m) {
   v.exact_text("relay_id", m.relay_id, kSessionIdChars);
   v.require("relay_id", is_relay_id(m.relay_id), "is not 16 hexadecimal digits");
   v.number("strand_class", m.strand_class, Range{0, kMaxListedClasses - 1, ""});
+  v.value("asset_layout", m.asset_layout);
 }
 template <>
 inline constexpr const char* kKind<MotionSamples> = "motion";

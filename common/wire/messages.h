@@ -112,6 +112,7 @@ struct Hello {
   std::string head = {};  // name of a head of the server; empty = the first
   std::string relay_id = {};  // of a relay: its session_id; empty = a viewer
   uint32_t strand_class = 0;  // of a relay: the class that it wants, by its place in the StreamList
+  uint32_t asset_layout = 0;  // the newest that it takes; 0 = 1
   bool operator==(const Hello&) const = default;
 };
 /// A camera. To the server: where this viewer looks from; to a viewer: where it is to look from.

@@ -13,6 +13,7 @@
 #include "common/base/histogram.h"
 #include "common/log/log.h"
 #include "server/net/address_guard.h"
+#include "server/net/asset_forms.h"
 #include "server/net/net_server.h"
 #include "server/net/refusal_private.h"
 #include "server/net/send_queue.h"
@@ -74,6 +75,7 @@ struct Head {
   NetHandler& handler;
   StrandCosts strands;
   PictureCosts pictures;
+  AssetForms assets;
 };
 
 struct Context {

@@ -10,7 +10,7 @@
 
 namespace strandcast::net {
 void Session::begin_media(const Hello& hello, const EncodedFramePtr& asset) {
-  queue_.set_asset(asset);
+  queue_.set_asset(head().assets.fit(asset, hello.asset_layout));
   has_asset_ = asset != nullptr;
   if (is_relay()) queue_.take_all();
   if (subscription_.mode() == StreamMode::Strands) queue_.start_strands();
@@ -42,7 +42,7 @@ void Session::renew_asset(const EncodedFramePtr& asset) {
     if (!subscription_.gets(StreamMode::Strands))
       has_asset_ = false;
     else if (has_asset_)
-      queue_.renew_asset(asset);
+      queue_.renew_asset(head().assets.fit(asset, hello_.asset_layout));
     if (subscription_.gets(StreamMode::Frames)) queue_.start_pictures();
     flow_.forget_in_flight();
     account_drops();
@@ -290,7 +290,8 @@ void Session::answer_mode(const ModeAnswer& answer) {
   if (subscription_.changes_to(StreamMode::Frames)) {
     queue_.start_pictures();
   } else {
-    if (!std::exchange(has_asset_, true)) queue_.set_asset(answer.asset);
+    if (!std::exchange(has_asset_, true))
+      queue_.set_asset(head().assets.fit(answer.asset, hello_.asset_layout));
     queue_.start_strands();
   }
   ask_for_keyframe(now_ns());

@@ -12,6 +12,8 @@
 #include "common/base/version.h"
 #include "common/record/recording_reader.h"
 #include "common/scene/scene_file.h"
+#include "common/strands/asset/head.h"
+#include "common/strands/asset/lattice.h"
 #include "common/strands/shared_strands.h"
 #include "server/record/recorded_step.h"
 
@@ -245,7 +247,10 @@ Result<std::unique_ptr<StateSource>> make_replayed(const ReplayConfig& config, R
   simulation.device = choose_device(config, start);
   simulation.script = &script;
   ASSIGN_OR_RETURN(auto source, make_simulation(std::move(simulation), inputs));
-  ASSIGN_OR_RETURN(const SceneAsset recorded, reader.asset());
+  ASSIGN_OR_RETURN(SceneAsset recorded, reader.asset());
+  // Earlier versions did not round what they loaded.
+  round_to_lattice(recorded.rest_position_m, kRestStepBits);
+  recorded.head = as_sent(recorded.head);
   const std::shared_ptr<const SceneAsset> loaded = source->asset();
   if (!is_same_hair(recorded, *loaded))
     return make_error(

@@ -13,6 +13,8 @@
 #include "common/groom/procedural.h"
 #include "common/groom/restyled.h"
 #include "common/scene/file_groom.h"
+#include "common/strands/asset/head.h"
+#include "common/strands/asset/lattice.h"
 
 namespace strandcast {
 namespace {
@@ -161,6 +163,9 @@ Result<SceneContent> load_scene_content(const SceneDesc& scene) {
   }
   if (std::holds_alternative<FileGroomDesc>(scene.groom))
     content.groom = restyled(std::move(content.groom), scene.hair.length, scene.hair.curl);
+  // From here on everybody has what viewers get (common/strands/asset/lattice.h).
+  round_to_lattice(content.groom.rest_position_m, kRestStepBits);
+  head = as_sent(head);
   std::vector<FittedSphere> spheres;
   if (scene.head.collider == kSphereCollider)
     spheres = shrink_under(fit_spheres(head, kHeadSpheres, content.groom), content.groom);

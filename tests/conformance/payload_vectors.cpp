@@ -4,6 +4,8 @@
 
 #include "common/groom/groom.h"
 #include "common/pictures/jpeg_tiles.h"
+#include "common/strands/asset/head.h"
+#include "common/strands/asset/lattice.h"
 #include "tests/conformance/reference_hash.h"
 #include "tests/support/sample_asset.h"
 
@@ -51,12 +53,24 @@ uint64_t content_hash(const SceneAsset& asset) {
   return hash.value();
 }
 
-std::string make_asset_lines() {
+std::string make_asset_lines(AssetLayout layout) {
   std::string lines;
   SceneAsset bare = sample_asset(1, 2);
   bare.head = {};
-  for (const SceneAsset& asset : {sample_asset(5, 3), bare})
-    lines += fmt::format("asset {:016x} {}\n", content_hash(asset), to_hex(encode_scene_asset(asset)));
+  std::vector<SceneAsset> assets = {sample_asset(5, 3), bare};
+  if (layout ==
+      AssetLayout::Numbers) {  // a neighbour's turns, a head with an edge that three triangles share
+    assets = {sample_asset(40, 12), bare};
+    for (SceneAsset& asset : assets) round_to_lattice(asset.rest_position_m, kRestStepBits);
+    Mesh& head = assets[0].head;
+    head.position_m.emplace_back(0.0f, -0.1f, 0.05f);
+    head.normal.emplace_back(0.6f, -0.8f, 0.0f);
+    head.triangle.emplace_back(1, 0, 4);
+    head = as_sent(head);
+  }
+  for (const SceneAsset& asset : assets)
+    lines +=
+        fmt::format("asset {:016x} {}\n", content_hash(asset), to_hex(encode_scene_asset(asset, layout)));
   return lines;
 }
 

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "common/strands/scene_asset.h"
+#include "common/strands/asset/layout.h"
 #include "tests/conformance/stored_stream.h"
 
 namespace strandcast::conformance {
@@ -14,7 +14,7 @@ namespace strandcast::conformance {
 uint64_t content_hash(const SceneAsset& asset);
 
 /// Today's, to be kept.
-std::string make_asset_lines();
+std::string make_asset_lines(AssetLayout layout);
 std::string make_tile_lines();
 
 }  // namespace strandcast::conformance

@@ -22,17 +22,18 @@ std::vector<std::vector<std::string>> lines_of(const std::string& name) {
 }
 
 TEST(Conformance, KeptAssetsHaveTheirContentAndAreMadeAlike) {
-  for (const auto& words : lines_of("asset_1.txt")) {
-    ASSERT_EQ(words.size(), 3u);
-    const Bytes payload = from_hex(words[2]).value();
-    const auto asset = decode_scene_asset(payload);
-    ASSERT_TRUE(asset) << asset.error().to_string();
-    EXPECT_EQ(fmt::format("{:016x}", content_hash(*asset)), words[1]);
-    EXPECT_TRUE(is_same_payload(encode_scene_asset(*asset), payload))
-        << "Assets are written otherwise than those that are kept for layout 1: give the layout the next "
-           "number "
-           "(section 5 of proto/WIRE.md), and keep assets of it in a file of its own.";
-  }
+  for (const AssetLayout layout : {AssetLayout::Floats, AssetLayout::Numbers})
+    for (const auto& words : lines_of(fmt::format("asset_{}.txt", static_cast<uint32_t>(layout)))) {
+      ASSERT_EQ(words.size(), 3u);
+      const Bytes payload = from_hex(words[2]).value();
+      const auto asset = decode_scene_asset(payload);
+      ASSERT_TRUE(asset) << asset.error().to_string();
+      EXPECT_EQ(fmt::format("{:016x}", content_hash(*asset)), words[1]);
+      EXPECT_TRUE(is_same_payload(encode_scene_asset(*asset, layout), payload))
+          << "Assets are written otherwise than those that are kept: give the layout the next number "
+             "(section 5 of "
+             "proto/WIRE.md), and keep assets of it in a file of its own.";
+    }
 }
 
 /// Takes the payload apart by the words of proto/WIRE.md, and puts the scans together again by the code.

@@ -3,6 +3,7 @@
 #include "common/pictures/jpeg_tiles.h"
 #include "common/pictures/picture.h"
 #include "common/pictures/video_codec.h"
+#include "common/strands/asset/layout.h"
 #include "common/strands/residual_coder.h"
 #include "common/strands/strand_payload.h"
 #include "common/strands/value_coder.h"
@@ -38,6 +39,7 @@ void add_messages(const SeedFolder& seeds) {
 void add_blocks(const SeedFolder& seeds) {
   Bytes asset = encode_scene_asset(sample_asset(5, 3));
   seeds.add("scene_asset", "head", asset);
+  seeds.add("scene_asset", "floats", encode_scene_asset(sample_asset(5, 3), AssetLayout::Floats));
   SceneAsset bare = sample_asset(1, 2);
   bare.head = {};
   seeds.add("scene_asset", "bare", encode_scene_asset(bare));

@@ -27,11 +27,13 @@ constexpr uint32_t kVertices = 8;
 /// A client that decodes strands like a viewer.
 class StrandClient {
  public:
-  StrandClient(uint16_t port, Role role, int receive_buffer_bytes = 0) : raw(port, receive_buffer_bytes) {
+  StrandClient(uint16_t port, Role role, int receive_buffer_bytes = 0, uint32_t asset_layout = 0)
+      : raw(port, receive_buffer_bytes) {
     EXPECT_TRUE(raw.handshake());
     Hello hello;
     hello.role = role;
     hello.name = "test";
+    hello.asset_layout = asset_layout;
     raw.send(hello);
     const auto answer = raw.read_control<Welcome>();
     EXPECT_TRUE(answer.has_value());
@@ -154,16 +156,28 @@ TEST_F(LiveServer, LateJoinerHasTheSameStatesBitForBit) {
   EXPECT_EQ(shared_count, 20u);
 }
 
-TEST_F(LiveServer, AssetMatchesTheWelcome) {
+TEST_F(LiveServer, AssetMatchesTheWelcomeInEveryLayoutThatAViewerTakes) {
   if (!start()) return;
-  StrandClient viewer = join();
-  const auto message = viewer.raw.read_media(Opcode::Asset);
-  ASSERT_TRUE(message.has_value());
-  const auto asset = decode_scene_asset(std::span(*message).subspan(kFrameHeaderBytes));
-  ASSERT_TRUE(asset.ok()) << asset.error().to_string();
-  EXPECT_EQ(asset->strand_count, kStrands);
-  EXPECT_EQ(asset->vertex_count, kVertices);
-  EXPECT_FALSE(asset->head.triangle.empty());
+  std::vector<SceneAsset> assets;
+  for (const uint32_t newest : {0u, 1u, 2u}) {  // 0: a viewer of before there was a second layout
+    StrandClient viewer(server_->port(), Role::Viewer, 0, newest);
+    const auto message = viewer.raw.read_media(Opcode::Asset);
+    ASSERT_TRUE(message.has_value());
+    const auto payload = std::span(*message).subspan(kFrameHeaderBytes);
+    EXPECT_EQ(static_cast<uint32_t>(payload[0]), std::max(newest, 1u));
+    auto asset = decode_scene_asset(payload);
+    ASSERT_TRUE(asset.ok()) << asset.error().to_string();
+    EXPECT_EQ(asset->strand_count, kStrands);
+    EXPECT_EQ(asset->vertex_count, kVertices);
+    EXPECT_FALSE(asset->head.triangle.empty());
+    assets.push_back(std::move(*asset));
+  }
+  for (const SceneAsset& asset : assets) {
+    EXPECT_EQ(asset.rest_position_m, assets[0].rest_position_m);
+    EXPECT_EQ(asset.head.position_m, assets[0].head.position_m);
+    EXPECT_EQ(asset.head.normal, assets[0].head.normal);
+    EXPECT_EQ(asset.head.triangle, assets[0].head.triangle);
+  }
 }
 
 TEST_F(LiveServer, KilledAndStalledClientsDisturbNobody) {

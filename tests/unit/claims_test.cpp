@@ -52,6 +52,7 @@ std::vector<std::string> measured_claims() {
           "motion",
           1e3 * kGoalBoundM, kIdleBits, kActiveBits, kViolentBits),
       fmt::format("{} x {}, `dftl`;", kStreamStrands, kStreamVertices),
+      fmt::format("the asset: at most {} kB for 2000 x 16 with the head", kAssetKb),
       fmt::format("{:g} in the median half second of a walk ({})", kClipBits, kStreamClip),
       fmt::format("{:g} times fewer than the best of the others with a prediction in time around it",
                   kTimesFewerThanTemporal),

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "common/pictures/image_codec.h"
+#include "common/strands/asset/layout.h"
 #include "common/strands/byte_io.h"
 #include "common/strands/strand_payload.h"
 #include "common/strands/tangent/symbols.h"
@@ -479,20 +480,22 @@ TEST(StrandBytes, UnknownFlagsAndLengthsBeyondTheLastOneAreRefused) {
 // ---- assets and pictures ----
 
 TEST(AssetBytes, TruncatedDamagedAndRandomAssetsNeverCrash) {
-  const Bytes good = encode_scene_asset(sample_asset(20, 5));
-  for (size_t size = 0; size < good.size(); ++size)
-    EXPECT_FALSE(decode_scene_asset(std::span(good).first(size))) << size;
-  Bytes longer = good;
-  longer.push_back(std::byte{0});
-  EXPECT_FALSE(decode_scene_asset(longer));
-  for_each_damage(good, 5000, 11, [](const Bytes& bad) { feed(fuzz_scene_asset, bad); });
+  for (const AssetLayout layout : {AssetLayout::Floats, AssetLayout::Numbers}) {
+    const Bytes good = encode_scene_asset(sample_asset(20, 5), layout);
+    for (size_t size = 0; size < good.size(); ++size)
+      EXPECT_FALSE(decode_scene_asset(std::span(good).first(size))) << size;
+    Bytes longer = good;
+    longer.push_back(std::byte{0});
+    EXPECT_FALSE(decode_scene_asset(longer));
+    for_each_damage(good, 5000, 11, [](const Bytes& bad) { feed(fuzz_scene_asset, bad); });
+  }
   std::mt19937 random(4);
   for (int i = 0; i < 1000; ++i) feed(fuzz_scene_asset, random_bytes(random() % 300, random));
 }
 
 TEST(AssetBytes, AnAssetThatUnpacksToLessThanItDeclaresIsRefused) {
   SceneAsset asset = sample_asset(20, 5);
-  Bytes payload = encode_scene_asset(asset);
+  Bytes payload = encode_scene_asset(asset, AssetLayout::Floats);
   payload.resize(24);  // keep the counts
   const Bytes wrong = compressed(Bytes(100), ContentSize::Declared);
   payload.insert(payload.end(), wrong.begin(), wrong.end());

@@ -31,6 +31,7 @@ const PICTURE_NAMES: { [codec: number]: string } = {
 
 /** Clocks of browsers are coarse: what is quicker than they can tell is still something. */
 const LEAST_STEP_NS = 5;
+const NEWEST_ASSET_LAYOUT = 2; // that the cores decode
 
 /** Where a session runs: whom it tells, what its socket is, and where modules of the core come from. */
 export interface Surroundings {
@@ -372,6 +373,7 @@ class Connection {
         role: this.asked.role, mode: this.asked.drawsStrands ? this.asked.mode : Mode.frames, name: this.asked.name ?? 'browser', token: this.asked.token,
         frame_width: this.asked.width, frame_height: this.asked.height, acknowledges: true,
         picture_codecs: pictureCodecs & (PICTURE_BITS[this.asked.pictures] ?? ~0), codec_wish: this.asked.codec, head: this.asked.head, step_ns: this.net.stepNs,
+        asset_layout: NEWEST_ASSET_LAYOUT,
       },
     });
   }

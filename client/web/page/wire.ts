@@ -25,7 +25,7 @@ export const Hello = {
   role: [1, 'enum'], mode: [2, 'enum'], name: [3, 'string'], token: [4, 'string'], frame_width: [5, 'uint32'],
   frame_height: [6, 'uint32'], acknowledges: [7, 'bool'], picture_codecs: [8, 'uint32'], gets_no_stream: [9, 'bool'],
   step_ns: [10, 'double'], codec_wish: [11, 'string'], keeps_camera: [16, 'bool'], head: [17, 'string'],
-  relay_id: [18, 'string'], strand_class: [19, 'uint32'],
+  relay_id: [18, 'string'], strand_class: [19, 'uint32'], asset_layout: [20, 'uint32'],
 } as const;
 export const Vec3 = { x: [1, 'double'], y: [2, 'double'], z: [3, 'double'] } as const;
 export const Camera = { offset_m: [1, Vec3], target_m: [2, Vec3], fov_y_rad: [3, 'float'] } as const;

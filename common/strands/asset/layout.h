@@ -1,0 +1,22 @@
+// Byte layouts of an asset (proto/WIRE.md). encode_scene_asset() writes the newest one. Pure functions, any
+// thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "common/strands/scene_asset.h"
+
+namespace strandcast {
+
+/// Floats under zstd, or whole numbers that are predicted; their numbers are those on the wire.
+enum class AssetLayout : uint32_t { Floats = 1, Numbers = 2 };
+/// What programs of this version say that they take.
+inline constexpr AssetLayout kNewestAssetLayout = AssetLayout::Numbers;
+
+/// Serialises the payload of an Asset message for a viewer that knows layouts up to `newest`. Every layout
+/// gives back the same bits. What is not rounded as by load_scene_content() has Floats in any case.
+std::vector<std::byte> encode_scene_asset(const SceneAsset& asset, AssetLayout newest);
+
+}  // namespace strandcast
