@@ -151,8 +151,10 @@ std::string to_sentence(const HairInside& inside, const DistanceField& field) {
                   nodes.y, nodes.z, static_cast<double>(field.cell_m) * kMmPerM);
   if (inside.vertex_count == 0) return size + "; no free vertex of the hair as loaded is inside of it";
   return fmt::format(
-      "{}; {} free vertices of {} strands begin inside of it, at most {:.1f} mm deep, and stay there", size,
-      inside.vertex_count, inside.strand_count, inside.deepest_m * kMmPerM);
+      "{}; the groom has {} vertices of {} strands up to {:.1f} mm below it, and they keep that depth: "
+      "nothing "
+      "need be done",
+      size, inside.vertex_count, inside.strand_count, inside.deepest_m * kMmPerM);
 }
 
 }  // namespace strandcast

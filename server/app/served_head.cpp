@@ -135,10 +135,10 @@ LiveDesk::Target ServedHead::live_target() {
 
 NetHead ServedHead::admit(Whole whole) {
   live_ = whole.live;
-  desk_ = std::make_unique<SessionDesk>(
-      SessionDesk::Parts{config_.scene, *hub_, *source_, inputs_, stages_, codecs_, asset_frame_,
-                         is_drawn_by_processors_, config_.scene.live.empty() ? nullptr : live_, number_,
-                         std::move(whole.heads), std::move(whole.scene), records_.get(), whole.records});
+  desk_ = std::make_unique<SessionDesk>(SessionDesk::Parts{
+      config_.scene, *hub_, *source_, inputs_, stages_, codecs_, asset_frame_, is_drawn_by_processors_,
+      config_.scene.live.empty() ? nullptr : live_, number_, std::move(whole.heads), std::move(whole.scene),
+      [this] { return quality_reason(); }, records_.get(), whole.records});
   desk_->set_metrics(std::move(whole.metrics));
   NetHead head{name(), desk_.get(), hub_->strand_classes(), {}};
   for (const StrandCodecInfo& codec : codecs_) head.strand_codecs.push_back(codec.bytes);
@@ -241,12 +241,21 @@ void ServedHead::watch_speed(const ServerCounters& now) {
   lower_quality();
 }
 
+std::string ServedHead::quality_reason() const {
+  if (is_too_slow_) {
+    const std::optional<SceneDesc> running = source_->scene();
+    return running && running->quality == kFastQuality ? "full does not keep up with real time" : "";
+  }
+  return source_->stats().quality_reason;
+}
+
 /// Of a scene that leaves its quality to the machine, once: what was measured at rest was too little.
 void ServedHead::lower_quality() {
   const std::optional<SceneDesc> running = source_->scene();
   if (has_lowered_quality_ || !running || running->quality != kAutoQuality) return;
   has_lowered_quality_ = true;
   if (running->solver.name == kCheapestSolver) return;
+  is_too_slow_ = true;
   log_warn(
       "sim",
       "quality auto: fast from here on, as full does not keep up with real time; where fewer strands are "

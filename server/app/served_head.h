@@ -77,6 +77,7 @@ class ServedHead {
   void count_by_the_clock();
   void watch_speed(const ServerCounters& now);
   void lower_quality();
+  std::string quality_reason() const;
   void count_strands(ServerCounters& counters) const;
   gl::PassReports idle_picture_passes() const;
 
@@ -107,6 +108,7 @@ class ServedHead {
   std::string slow_motion_;  // what viewers are told; empty = real time
   std::atomic<bool> is_slow_{false};
   bool has_lowered_quality_ = false;
+  std::atomic<bool> is_too_slow_{false};  // for full
   std::atomic<uint64_t> slow_motions_{0};
 };
 

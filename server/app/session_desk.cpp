@@ -209,12 +209,16 @@ Status SessionDesk::may_change(const std::string& assignment) const {
   return {};
 }
 
+std::vector<ParameterInfo> SessionDesk::listed(const SceneDesc& scene) const {
+  return list_parameters(scene, parts_.quality_reason ? parts_.quality_reason() : std::string());
+}
+
 void SessionDesk::answer(SessionId session, const ParameterRequest& request) {
   if (!parameter_budget_.take(session, now_ns()))
     return net_->send(session, Notice{true, "Too many requests for parameters: this one was left out."});
   const std::optional<SceneDesc> scene = parts_.source.scene();
   if (!scene) return net_->send(session, Notice{true, "What is shown here has no parameters."});
-  const std::vector<ParameterInfo> parameters = list_parameters(*scene);
+  const std::vector<ParameterInfo> parameters = listed(*scene);
   if (request.is_watching) parameter_watch_.add(session, request.prefix, parameters);
   net_->send(session, list_of(parameters, request));
 }
@@ -223,8 +227,7 @@ void SessionDesk::tell_parameters() {
   if (parameter_watch_.is_empty()) return;
   const std::optional<SceneDesc> scene = parts_.source.scene();
   if (!scene) return;
-  for (auto& [session, list] : parameter_watch_.news(list_parameters(*scene)))
-    net_->send(session, std::move(list));
+  for (auto& [session, list] : parameter_watch_.news(listed(*scene))) net_->send(session, std::move(list));
 }
 
 void SessionDesk::answer(SessionId session, const SceneRequest&) {

@@ -50,6 +50,8 @@ class SessionDesk : public NetHandler {
     std::vector<std::string> heads = {};  // names of all where there are several
     /// Returns the scene with all heads as it runs; empty if there is no scene.
     std::function<std::optional<SceneDesc>()> whole_scene = {};
+    /// Returns why that quality runs which does, where nobody has chosen it.
+    std::function<std::string()> quality_reason = {};
     RecordDesk* records = nullptr;             // null: nothing is recorded here
     const RecordDesks* all_records = nullptr;  // of all heads, where there are several
   };
@@ -93,6 +95,7 @@ class SessionDesk : public NetHandler {
   void obey(SessionId session, const RecordCommand& command);
   void answer(SessionId session, const SceneRequest& request);
   void answer(SessionId session, const ParameterRequest& request);
+  std::vector<ParameterInfo> listed(const SceneDesc& scene) const;
   void answer(SessionId session, const StateTimesRequest& request);
   void move_camera(SessionId session, const CameraChange& camera);
   void follow_window(SessionId session, const WindowChange& window);

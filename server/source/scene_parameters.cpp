@@ -151,9 +151,13 @@ std::vector<ParameterInfo> walk(SceneDesc scene) {
 }
 
 /// What a person should know of quality and the factors on it.
-std::string control_note(const ParameterInfo& info, const SceneDesc& scene) {
-  if (info.path == "quality" && scene.quality == kAutoQuality)
-    return fmt::format("{}; {} runs", info.note, scene.volume.acts() ? kFullQuality : kFastQuality);
+std::string control_note(const ParameterInfo& info, const SceneDesc& scene,
+                         const std::string& quality_reason) {
+  const std::string why = quality_reason.empty() ? std::string() : ", as " + quality_reason;
+  if (info.path == "quality" && (scene.quality == kAutoQuality || !why.empty()))
+    return cut(
+        fmt::format("{}; {} runs{}", info.note, scene.volume.acts() ? kFullQuality : kFastQuality, why),
+        kMaxParameterTextBytes);
   if (info.path == "hair.friction" && scene.volume.friction_per_s == 0.0)
     return "rests: hair does not act on hair here, quality full lets it";
   for (const HairControl& control : kHairControls)
@@ -163,7 +167,7 @@ std::string control_note(const ParameterInfo& info, const SceneDesc& scene) {
 
 }  // namespace
 
-std::vector<ParameterInfo> list_parameters(const SceneDesc& scene) {
+std::vector<ParameterInfo> list_parameters(const SceneDesc& scene, const std::string& quality_reason) {
   static const std::map<std::string, std::string> kUnset = [] {
     std::map<std::string, std::string> values;
     for (const ParameterInfo& info : walk(SceneDesc())) values.emplace(info.path, info.value);
@@ -172,7 +176,7 @@ std::vector<ParameterInfo> list_parameters(const SceneDesc& scene) {
   }();
   std::vector<ParameterInfo> parameters = walk(scene);
   for (ParameterInfo& info : parameters) {
-    info.note = control_note(info, scene);
+    info.note = control_note(info, scene, quality_reason);
     if (!info.unset_value.empty()) continue;
     if (const auto found = kUnset.find(info.path); found != kUnset.end()) info.unset_value = found->second;
   }

@@ -10,8 +10,9 @@
 
 namespace strandcast {
 
-/// Returns the parameters in the order of scene.proto.
-std::vector<ParameterInfo> list_parameters(const SceneDesc& scene);
+/// Returns the parameters in the order of scene.proto. `quality_reason` says why that quality runs which
+/// does, where the machine chose it.
+std::vector<ParameterInfo> list_parameters(const SceneDesc& scene, const std::string& quality_reason = {});
 
 /// Returns whether a path begins with one of the comma-separated prefixes; an empty prefix matches all.
 bool begins_so(const std::string& path, const std::string& prefixes);

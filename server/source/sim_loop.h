@@ -234,6 +234,7 @@ class SimLoop {
   double input_rate_ = 1.0;              // of the newest step, as InputClock has it
   const TakenStep* scripted_ = nullptr;  // the step that a script has taken
   uint64_t next_quarantine_report_ = 1;  // at so many broken strands since start
+  std::string quality_reason_;           // of the machine's choice, while it is as it chose
   std::vector<std::string> told_missing_joints_;
   size_t told_capsule_count_ = 0;
   uint64_t next_overstretch_report_ = 1;  // at so many over-stretched ones

@@ -121,6 +121,7 @@ Notice SimLoop::change(const std::string& assignment, std::shared_ptr<const Scen
   if (scene->substeps != config_.scene.substeps) stages_->plan_step(scene->substeps, explain(*scene, facts_));
   const std::string what = excerpt(assignment, kMaxToldChars);
   const std::string left_out = left_out_note(config_.scene, *scene);
+  if (scene->solver.name != config_.scene.solver.name || has_other_shape) quality_reason_.clear();
   config_.scene = *scene;
   if (config_.on_scene) config_.on_scene(config_.scene, assignment);
   builder_->change(stepped_scene(*scene, features), colliders_of(*scene, config_.content->head_colliders));
@@ -273,6 +274,7 @@ Status SimLoop::settle_quality() {
   if (config_.scene.quality != kAutoQuality || config_.is_lockstep || config_.script != nullptr) return {};
   ASSIGN_OR_RETURN(const double step_ms, time_step_ms());
   const AutoQuality judged = auto_quality(step_ms, config_.scene.step_rate_hz);
+  quality_reason_ = judged.reason;
   if (judged.is_full) {
     log_info("sim", "quality auto: full, as {}", judged.reason);
     return {};

@@ -291,6 +291,7 @@ void SimLoop::update_stats() {
   stats.solver_bytes = solver_->memory_bytes();
   stats.step_cost = step_log_.step_cost();
   stats.solver_name = config_.scene.solver.name;
+  stats.quality_reason = quality_reason_;
   stats.substeps = config_.scene.substeps;
   stats.strand_rate_hz = config_.scene.stream.strand_rate_hz;
   stats.sim_device = to_string(executor_->info().device);

@@ -48,6 +48,7 @@ struct SimStats {
   std::string sim_device;       // what simulates: "gl", "lanes"; empty = nothing does
   std::string sim_device_name;  // for people
   std::string solver_name;
+  std::string quality_reason;   // of what runs where the scene leaves its quality to the machine
   uint32_t substeps = 0;        // of now; 0 = nothing is simulated
   double strand_rate_hz = 0.0;  // of now; 0 = every step
   int64_t last_step_ns = 0;     // server clock at the end of the newest step; 0 = none yet

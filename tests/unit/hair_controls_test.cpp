@@ -11,6 +11,7 @@
 #include "server/report/scene_run.h"
 #include "server/scene/scene_content.h"
 #include "server/sim/executor/lanes_executor.h"
+#include "server/source/auto_quality.h"
 #include "server/source/hair_factors.h"
 #include "server/source/scene_change.h"
 #include "server/source/scene_parameters.h"
@@ -80,6 +81,22 @@ TEST(HairControls, FrictionSaysWhereItRests) {
   EXPECT_THAT(note_of(scene_with({"quality=fast"}), "hair.friction"), HasSubstr("rests"));
   EXPECT_THAT(note_of(scene_with({"quality=full"}), "hair.friction"), HasSubstr("0 = it slides"));
   EXPECT_THAT(note_of(scene_with({"quality=auto"}), "quality"), HasSubstr("full runs"));
+}
+
+// What the machine chose, and why; a person's own choice needs no reason.
+TEST(HairControls, QualitySaysWhyItRuns) {
+  const auto note_of = [](const std::string& assignment, const std::string& reason) {
+    return list_of(list_parameters(scene_with({assignment}), reason), {"quality", 0, false})
+        .parameters.at(0)
+        .note;
+  };
+  const std::string step = auto_quality(4.9, 60.0).reason;
+  EXPECT_THAT(note_of("quality=auto", step),
+              testing::EndsWith("; full runs, as a step of full takes 4.9 ms of the 16.7 ms there are"));
+  EXPECT_THAT(note_of("quality=fast", "full does not keep up with real time"),
+              testing::EndsWith("; fast runs, as full does not keep up with real time"));
+  EXPECT_THAT(note_of("quality=fast", ""), Not(HasSubstr("runs")));
+  EXPECT_LE(note_of("quality=auto", std::string(1000, 'x')).size(), kMaxParameterTextBytes);
 }
 
 TEST(HairControls, WhatIsNoValueIsRefusedInOneSentence) {

@@ -97,8 +97,8 @@ class Control {
     }, SET_MS);
   }
   private tell(value: string): void {
-    // What runs where the server chooses stands at the end of the note.
-    const runs = value === 'auto' && value === this.info.value ? /; (\w+) runs$/.exec(this.info.note)?.[1] : '';
+    // What runs where the server chooses, and why, stands at the end of the note.
+    const runs = value === 'auto' && value === this.info.value ? /; (\w+) runs(?:, as |$)/.exec(this.info.note)?.[1] : '';
     this.output.textContent = runs ? `auto: ${runs}` : this.info.has_range ? `${Number(Number(value).toPrecision(3))}` : value;
     this.input.setAttribute('aria-valuetext', `${this.output.textContent} ${this.info.unit}`.trimEnd());
     const rests = this.info.note.startsWith('rests: ');
