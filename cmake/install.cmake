@@ -78,7 +78,7 @@ add_library(Strandcast::core ALIAS strandcast_core)
 set(core_headers
   base/frame_rate.h base/profile.h base/result.h base/timecode.h base/version.h base/worker_pool.h
   math/bust.h math/pose.h math/strand_guides.h
-  replay/clock_offset.h replay/interpolation.h replay/playout_clock.h replay/position_blend.h replay/snapshot_timeline.h
+  replay/clock_offset.h replay/interpolation.h replay/playout_clock.h replay/position_blend.h
   replay/state_blend.h replay/strand_fill.h replay/strand_replay.h
   simd/lane_vectors_private.h simd/lanes.h simd/variants.h
   strands/frame_header.h strands/posed_strands.h strands/scene_asset.h strands/snapshot.h strands/strand_codec.h

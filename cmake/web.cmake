@@ -66,7 +66,7 @@ function(strandcast_small folder)
   set_source_files_properties(${ARGN} DIRECTORY ${folder} PROPERTIES COMPILE_OPTIONS -Os)
 endfunction()
 strandcast_small(common/base base.cpp text.cpp worker_pool.cpp)
-strandcast_small(common/kernels head_path.cpp lane_program.cpp step_block.cpp step_input.cpp step_model.cpp step_speed.cpp
+strandcast_small(common/kernels head_path.cpp lane_program.cpp step_input.cpp step_model.cpp step_speed.cpp
   strand_passes.cpp told_field.cpp)
 strandcast_small(common/strands delta_codec.cpp frame_header.cpp raw_codec.cpp scene_asset.cpp strand_codec.cpp
   strand_payload.cpp strand_prefix.cpp zstd_block.cpp tangent/codec.cpp tangent/fit.cpp tangent/fit_shape.cpp tangent/head.cpp

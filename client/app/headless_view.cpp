@@ -1,13 +1,12 @@
-#include "client/app/views.h"
-
 #include <algorithm>
 #include <utility>
 
 #include "client/app/clip_store.h"
 #include "client/app/live_connection.h"
+#include "client/app/views.h"
 #include "common/log/log.h"
 #include "common/log/progress.h"
-#include "common/render/draw_heads.h"
+#include "common/render/render_device.h"
 
 namespace strandcast {
 namespace {

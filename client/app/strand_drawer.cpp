@@ -1,7 +1,6 @@
 #include "client/app/strand_drawer.h"
 
 #include <sys/resource.h>
-
 #include <algorithm>
 #include <cmath>
 #include <exception>
@@ -9,7 +8,7 @@
 
 #include "common/base/worker_pool.h"
 #include "common/log/log.h"
-#include "common/render/draw_heads.h"
+#include "common/render/render_device.h"
 
 namespace strandcast {
 namespace {

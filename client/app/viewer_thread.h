@@ -13,7 +13,7 @@
 
 #include "client/app/live_connection.h"
 #include "client/app/view_report.h"
-#include "common/replay/snapshot_timeline.h"
+#include "common/replay/strand_replay.h"
 
 namespace strandcast {
 

@@ -13,7 +13,7 @@
 #include "common/kernels/kernel_desc.h"
 #include "common/kernels/lane_kernel.h"
 #include "common/kernels/plane_role.h"
-#include "common/kernels/step_block.h"
+#include "common/kernels/step_input.h"
 #include "common/kernels/strand_blocks.h"
 #include "common/simd/variants.h"
 

@@ -13,7 +13,6 @@
 
 #include "common/kernels/kernel_desc.h"
 #include "common/kernels/plane_role.h"
-#include "common/kernels/step_block.h"
 #include "common/kernels/step_input.h"
 #include "common/kernels/strand_passes.h"
 #include "common/kernels/told_field.h"

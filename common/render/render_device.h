@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "common/gl/egl_context.h"
@@ -67,5 +68,35 @@ RendererKind likely_renderer(const std::string& renderer, const LookDesc& look);
 
 /// Returns the passes that a renderer of this kind would run, without drawing.
 Result<gl::PassReports> plan_renderer(const SceneAsset& asset, const LookDesc& look, RendererKind kind);
+
+struct PlacedHead {
+  Renderer* renderer = nullptr;
+  const PosedStrands* strands = nullptr;
+};
+
+/// Returns the point that a picture's camera follows: the middle of the heads (at least one), world, m.
+glm::dvec3 middle_of(std::span<const PlacedHead> heads);
+
+/// Converts a camera that follows `middle_m` into one that follows `head_m` and shows the same view.
+CameraDesc camera_from_head(const CameraDesc& camera, const glm::dvec3& middle_m, const glm::dvec3& head_m);
+
+/// Camera of a picture of heads; it follows their middle.
+struct HeadsCamera {
+  CameraDesc own;
+  CameraDesc of_scene;  // from which all heads are to be seen
+};
+/// Returns the factor on the scene camera's distance at which all heads are in the picture; 1 if they already
+/// are. The viewer's own camera is moved by it too, so that no head is out of view.
+double room_factor(std::span<const PlacedHead> heads, const CameraDesc& of_scene, RenderSize size);
+
+struct HeadsPicture {
+  Image image;
+  RenderProfile profile;  // of all
+};
+
+/// Draws the heads. With one head the result equals that renderer's draw() and read_image(). A picture that
+/// was abandoned has no pixels. Errors as Renderer::draw().
+Result<HeadsPicture> draw_heads(std::span<const PlacedHead> heads, const HeadsCamera& camera, RenderSize size,
+                                const DrawTerms& terms = {});
 
 }  // namespace strandcast

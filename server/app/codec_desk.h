@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "server/app/viewer_codec.h"
-#include "server/net/net_handler.h"
+#include "server/net/net_server.h"
 
 namespace strandcast {
 

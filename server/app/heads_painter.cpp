@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "common/log/log.h"
-#include "common/render/draw_heads.h"
+#include "common/render/render_device.h"
 
 namespace strandcast {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "common/wire/messages.h"
 #include "server/encode/frame_worker.h"
-#include "server/net/net_handler.h"
+#include "server/net/net_server.h"
 
 namespace strandcast {
 

@@ -77,19 +77,10 @@ EncodedFramePtr SessionDesk::follow_shape(const SceneAsset& asset) {
 void SessionDesk::connect(NetServer& net) {
   net_ = &net;
   teller_.connect(net);
-  const auto tell_classes = [this](const std::vector<StrandClass>& classes, const std::string& reason) {
-    teller_.change([&](StreamList& list) {
-      list.classes = classes;
-      if (classes.size() > kMaxListedClasses) list.classes.resize(kMaxListedClasses);
-      list.reason = reason;
-    });
-  };
-  tell_classes(parts_.hub.strand_classes(), {});
+  list_classes(parts_.hub.strand_classes(), {});
   tell_streams();
-  reader_ = std::make_unique<NetworkReader>(net, parts_.stages, parts_.head, tell_classes,
-                                            [this](const SceneAsset& asset) { return follow_shape(asset); });
   // It hears of changes of the stream while no session is there, too.
-  (void)parts_.hub.add(*reader_);
+  (void)parts_.hub.add(*this);
 }
 
 Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hello) {
@@ -103,7 +94,7 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
   const ViewerCodec codec = codecs_.admit(visitor.session, hello, model_of(parts_.source.stats()));
   visitor.subscription.strands.codec = codec.codec;
   if (is_relay) visitor.subscription.strands.strand_class = hello.strand_class;
-  const ReaderId reader = parts_.hub.add(*reader_, {visitor.peer, is_controller});
+  const ReaderId reader = parts_.hub.add(*this, {visitor.peer, is_controller});
   viewers_.set_scene_camera(parts_.hub.look().camera);
   const Result<Viewers::Place> place = viewers_.add(visitor.session, reader, visitor.subscription, hello);
   if (!place) {
@@ -449,6 +440,53 @@ void SessionDesk::on_left(SessionId session) {
   teller_.remove(session);
   parts_.inputs.remove_source(session);
   parts_.hub.remove(viewers_.remove(session));
+}
+
+void SessionDesk::list_classes(const std::vector<StrandClass>& classes, const std::string& reason) {
+  teller_.change([&](StreamList& list) {
+    list.classes = classes;
+    if (classes.size() > kMaxListedClasses) list.classes.resize(kMaxListedClasses);
+    list.reason = reason;
+  });
+}
+
+void SessionDesk::on_strands(const EncodedFramePtr& frame) {
+  parts_.stages.note_encoded(frame->header.sim_time_ns, now_ns());
+  net_->publish_strands(frame, parts_.head);
+}
+void SessionDesk::on_picture(PictureClass picture_class, const PicturePtr& picture) {
+  net_->publish_picture(picture_class, picture, parts_.head);
+}
+void SessionDesk::on_picture_refused(PictureClass picture_class, const Error& error) {
+  net_->send_to_class(picture_class, Notice{true, "This view cannot be drawn: " + error.to_string()},
+                      parts_.head);
+}
+void SessionDesk::on_look_refused(PictureClass picture_class, const Error& error) {
+  net_->send_to_class(picture_class,
+                      Notice{true, "The server's pictures keep their look, this one cannot be drawn there: " +
+                                       error.to_string()},
+                      parts_.head);
+}
+void SessionDesk::on_look_change(const LookChange& look) {
+  net_->broadcast(look, parts_.head);
+}
+void SessionDesk::on_pictures_failed(const Error& error) {
+  net_->broadcast(Notice{true, "No pictures can be drawn: " + error.to_string()}, parts_.head);
+}
+void SessionDesk::on_stream_change(const std::vector<StrandClass>& classes,
+                                   std::shared_ptr<void> until_told) {
+  constexpr const char* kReason = "the stream was changed";
+  list_classes(classes, kReason);
+  net_->set_strand_classes(
+      classes, kReason, [until_told] {}, parts_.head);
+}
+
+void SessionDesk::on_shape_change(const std::shared_ptr<const SceneAsset>& asset,
+                                  std::shared_ptr<void> until_told) {
+  const EncodedFramePtr frame = follow_shape(*asset);
+  if (frame != nullptr)
+    net_->renew_asset(
+        frame, [until_told] {}, parts_.head);
 }
 
 }  // namespace strandcast

@@ -14,8 +14,8 @@
 
 #include "server/app/codec_desk.h"
 #include "server/app/control_budget.h"
+#include "server/app/frame_stages.h"
 #include "server/app/live_desk.h"
-#include "server/app/network_reader.h"
 #include "server/app/parameter_watch.h"
 #include "server/app/record_desks.h"
 #include "server/app/stream_teller.h"
@@ -24,6 +24,7 @@
 #include "server/net/net_server.h"
 #include "server/stream/state_source.h"
 #include "server/stream/stream_hub.h"
+#include "server/stream/stream_reader.h"
 
 namespace strandcast {
 
@@ -33,7 +34,7 @@ std::string make_start_id();
 /// Makes the message of an asset. LimitExceeded if the asset is too large for a message.
 Result<EncodedFramePtr> make_asset_frame(const SceneAsset& asset);
 
-class SessionDesk : public NetHandler {
+class SessionDesk : public NetHandler, private StreamReader {
  public:
   /// Objects that must outlive the desk. `asset` is the message for viewers of strands.
   struct Parts {
@@ -88,6 +89,18 @@ class SessionDesk : public NetHandler {
   std::string metrics() override { return metrics_ ? metrics_() : std::string(); }
 
  private:
+  // Of the stream, for all sessions of this head together.
+  void on_strands(const EncodedFramePtr& frame) override;
+  void on_picture(PictureClass picture_class, const PicturePtr& picture) override;
+  void on_picture_refused(PictureClass picture_class, const Error& error) override;
+  void on_look_refused(PictureClass picture_class, const Error& error) override;
+  void on_look_change(const LookChange& look) override;
+  void on_pictures_failed(const Error& error) override;
+  void on_stream_change(const std::vector<StrandClass>& classes, std::shared_ptr<void> until_told) override;
+  void on_shape_change(const std::shared_ptr<const SceneAsset>& asset,
+                       std::shared_ptr<void> until_told) override;
+  void list_classes(const std::vector<StrandClass>& classes, const std::string& reason);
+
   void obey(SessionId session, const ControlCommand& command);
   void obey(SessionId session, const SetParameter& parameter);
   void obey(SessionId session, const LiveCommand& command);
@@ -116,7 +129,6 @@ class SessionDesk : public NetHandler {
   ParameterWatch parameter_watch_;
   std::set<SessionId> whole_viewers_;  // who named no head of several, and so sees all
   NetServer* net_ = nullptr;
-  std::unique_ptr<NetworkReader> reader_;  // of all sessions
   std::function<std::string()> metrics_;
   mutable std::mutex asset_mutex_;  // guards the one below
   EncodedFramePtr asset_;

@@ -13,7 +13,7 @@
 #include "common/wire/messages.h"
 #include "server/app/mode_policy.h"
 #include "server/encode/picture_ladder.h"
-#include "server/net/net_handler.h"
+#include "server/net/net_server.h"
 #include "server/stream/demand.h"
 
 namespace strandcast {

@@ -5,6 +5,7 @@
 // no GL objects of its own.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -12,12 +13,45 @@
 
 #include "common/base/worker_pool.h"
 #include "common/groom/groom.h"
+#include "common/kernels/strand_blocks.h"
 #include "common/simd/variants.h"
 #include "common/strands/snapshot.h"
-#include "server/publish/block_quantise.h"
 #include "server/sim/solver.h"
 
 namespace strandcast {
+
+/// Results of the checks for each strand of a block.
+struct BlockFindings {
+  std::array<int32_t, kBlockStrands> bad_vertices{};  // without a usable position or velocity
+  /// Segments that exceed longest_squared_m2 or whose length is not finite.
+  std::array<int32_t, kBlockStrands> stretched_segments{};
+  bool has_bad = false;
+  bool has_stretched = false;
+};
+
+struct BlockQuantise {
+  StrandBlocksView position_m;  // world axes
+  StrandBlocksView velocity_mps;
+  float reach_m = 0.0f;  // farther from the head along an axis no position is usable
+  /// Squared limit of the segment before each vertex, (blocks x vertex_count x 16); nullptr: stretch is not
+  /// checked.
+  const float* longest_squared_m2 = nullptr;
+  /// Columns of the rotation.
+  std::array<std::array<double, 3>, 3> head_from_world{};
+  float quantum_m = 0.0f;
+  BlockFindings* findings = nullptr;  // (blocks)
+  /// Output, (3 x vertex_count x strand_count) as Snapshot::lattice; equals quantise() of
+  /// common/strands/snapshot.h. Values of strands with bad vertices are arbitrary.
+  int32_t* lattice = nullptr;
+};
+
+struct BlockRange {
+  const BlockQuantise* work = nullptr;
+  uint32_t begin = 0;  // blocks
+  uint32_t end = 0;
+};
+
+void quantise_blocks(simd::InstructionSet set, const BlockRange& range);
 
 /// Largest distance of hair from the head joint along any axis; a vertex beyond it has left the simulation.
 inline constexpr float kMaxStrandReachM = 10.0f * kMaxGroomExtentM;

@@ -1,6 +1,6 @@
 #include "server/sim/chain_parameters.h"
 
-#include "server/sim/strand_kernel.h"
+#include "server/sim/kernel_solver.h"
 
 namespace strandcast {
 

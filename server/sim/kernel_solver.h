@@ -3,12 +3,13 @@
 // executor's thread.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "common/kernels/step_block.h"
+#include "common/kernels/step_input.h"
 #include "server/sim/bend_limit.h"
 #include "server/sim/body_collider.h"
 #include "server/sim/field_collider.h"
@@ -85,6 +86,38 @@ class KernelSolver : public Solver {
   std::optional<BodyCollider> body_collider_;  // where the scene has a body
   std::shared_ptr<const DistanceField> head_field_;
   std::optional<FieldCollider> field_collider_;  // where the scene's head collides as a field
+};
+
+/// Properties that distinguish one kernel from another.
+struct StrandKernelDesc {
+  std::string name;            // labels
+  std::string shader_path;     // below shaders/
+  bool is_per_vertex = false;  // as KernelDesc
+  bool has_offset = false;     // a strand beside the state; one that is written starts without any
+  ModelConstants constants;
+};
+
+class StrandKernel final : public KernelSolver {
+ public:
+  static std::unique_ptr<Solver> make(StrandKernelDesc desc, const StrandParameters& parameters,
+                                      const SolverContext& context) {
+    return std::unique_ptr<Solver>(new StrandKernel(std::move(desc), parameters, context));
+  }
+
+ private:
+  StrandKernel(StrandKernelDesc desc, const StrandParameters& parameters, const SolverContext& context)
+      : KernelSolver(context, parameters), desc_(std::move(desc)) {}
+
+  void prepare() override;
+  KernelDesc kernel() const override;
+  void bind(BoundPlanes& planes) const override;
+  void forget(const std::vector<bool>& is_changed) override;
+  void turn_memory(const glm::dquat& turn) override;
+  uint64_t model_bytes() const override { return offset_ ? offset_->size_bytes() : 0; }
+
+  StrandKernelDesc desc_;
+  // (vertex_count x strand_count) second strand less the state, m; has_offset only
+  std::unique_ptr<StrandPlane> offset_;
 };
 
 }  // namespace strandcast

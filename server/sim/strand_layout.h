@@ -8,7 +8,7 @@
 
 #include "common/base/result.h"
 #include "common/groom/groom.h"
-#include "common/kernels/step_block.h"
+#include "common/kernels/step_input.h"
 #include "server/sim/solver.h"
 
 namespace strandcast {

@@ -4,7 +4,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "common/kernels/step_block.h"
+#include "common/kernels/step_input.h"
 #include "server/sim/solver_registry.h"
 
 namespace strandcast {

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "common/kernels/step_block.h"
+#include "common/kernels/step_input.h"
 #include "server/sim/solver.h"
 #include "server/sim/strand_layout.h"
 

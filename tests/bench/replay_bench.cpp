@@ -4,7 +4,6 @@
 // machine.
 // usage: replay_bench [--rounds N]
 #include <fmt/format.h>
-
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
@@ -13,7 +12,7 @@
 
 #include "common/base/quantile.h"
 #include "common/replay/interpolation.h"
-#include "common/replay/snapshot_timeline.h"
+#include "common/replay/strand_replay.h"
 #include "tests/support/hair_motion.h"
 
 namespace strandcast {

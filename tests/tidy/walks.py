@@ -12,7 +12,7 @@ import sys
 
 PAGE = "docs/internals/walks.md"
 # Files that a walk has at most. A shorter walk lowers its number here and in the page.
-MOST = {"Head pose": 45, "Vertex": 30, "Mode": 21, "Look": 22, "Recording": 19}
+MOST = {"Head pose": 37, "Vertex": 27, "Mode": 20, "Look": 21, "Recording": 19}
 MOST_WORDS, LEAST_WORDS = 8, 3
 TOPS = ("client", "common", "proto", "server", "shaders")
 ENDINGS = (".cpp", ".h", ".ts", ".comp", ".glsl", ".frag", ".vert", ".proto")
@@ -171,7 +171,7 @@ def main():
     tree = Tree(sys.argv[1])
     faults = [fault for check in CHECKS for fault in check(tree)]
     print("\n".join(faults))
-    print(", ".join(f"{title} {len(files)}" for title, files in walks_of(tree.page).items()) + f"; {len(faults)} faults")
+    print(", ".join(f"{title} {len({unit_of(path) for path, _ in files})}" for title, files in walks_of(tree.page).items()) + f"; {len(faults)} faults")
     sys.exit(1 if self_test(tree) or faults else 0)
 
 

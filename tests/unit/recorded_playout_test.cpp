@@ -1,11 +1,10 @@
 // Hair as the server's own solvers move it, with every second state taken away: how far what a viewer shows
 // in its place is off.
 #include <fmt/format.h>
-
 #include <cmath>
 
 #include "common/replay/interpolation.h"
-#include "common/replay/snapshot_timeline.h"
+#include "common/replay/strand_replay.h"
 #include "server/report/stream_recording.h"
 #include "server/sim/executor/lanes_executor.h"
 #include "tests/support/shared_data.h"

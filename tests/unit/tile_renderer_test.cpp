@@ -1,21 +1,19 @@
 // The tile renderer: the same pixels however it runs, coverage and blending as computed by hand, and finite
 // pictures of impossible hair.
-#include "common/render/tiles/tile_renderer.h"
-
 #include <gmock/gmock.h>
-
 #include <cmath>
 #include <limits>
 #include <numeric>
 
 #include "common/base/hash.h"
 #include "common/pictures/picture_error.h"
-#include "common/render/draw_heads.h"
+#include "common/render/render_device.h"
 #include "common/render/render_scene.h"
 #include "common/render/strand_detail.h"
 #include "common/render/tiles/half_float.h"
 #include "common/render/tiles/strand_expansion.h"
 #include "common/render/tiles/tile_raster.h"
+#include "common/render/tiles/tile_renderer.h"
 #include "tests/support/grown_hair.h"
 #include "tests/support/sample_look.h"
 

@@ -3,7 +3,7 @@
 #include <numbers>
 
 #include "common/base/units.h"
-#include "common/replay/snapshot_timeline.h"
+#include "common/replay/strand_replay.h"
 
 namespace strandcast::timeline_player_test {
 namespace {

@@ -11,8 +11,8 @@
 #include "common/log/log.h"
 #include "common/pictures/picture_error.h"
 #include "common/render/render_device.h"
-#include "common/replay/snapshot_timeline.h"
 #include "common/replay/strand_fill.h"
+#include "common/replay/strand_replay.h"
 
 namespace strandcast {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "common/kernels/kernel_desc.h"
-#include "common/kernels/step_block.h"
+#include "common/kernels/step_input.h"
 #include "common/kernels/volume/volume_desc.h"
 #include "common/kernels/volume/volume_extras.h"
 

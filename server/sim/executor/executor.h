@@ -19,7 +19,7 @@
 #include "common/base/result.h"
 #include "common/kernels/kernel_desc.h"
 #include "common/kernels/plane_role.h"
-#include "common/kernels/step_block.h"
+#include "common/kernels/step_input.h"
 #include "common/kernels/strand_blocks.h"
 #include "common/kernels/volume/hair_volume.h"
 #include "common/scene/features.h"

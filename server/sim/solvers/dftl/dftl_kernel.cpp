@@ -1,5 +1,5 @@
+#include "server/sim/kernel_solver.h"
 #include "server/sim/solvers/dftl/dftl.h"
-#include "server/sim/strand_kernel.h"
 #include "server/sim/strand_parameters.h"
 
 namespace strandcast {

@@ -1,7 +1,7 @@
 #include "server/sim/solvers/ftl/ftl.h"
 
+#include "server/sim/kernel_solver.h"
 #include "server/sim/reference_strands.h"
-#include "server/sim/strand_kernel.h"
 #include "server/sim/strand_parameters.h"
 
 namespace strandcast {

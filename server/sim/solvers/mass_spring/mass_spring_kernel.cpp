@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/sim/kernel_solver.h"
 #include "server/sim/solvers/mass_spring/mass_spring.h"
-#include "server/sim/strand_kernel.h"
 #include "server/sim/strand_parameters.h"
 
 namespace strandcast {

@@ -1,7 +1,7 @@
 #include <cmath>
 
+#include "server/sim/kernel_solver.h"
 #include "server/sim/solvers/shape_constraints/shape_constraints.h"
-#include "server/sim/strand_kernel.h"
 #include "server/sim/strand_parameters.h"
 
 namespace strandcast {
