@@ -18,7 +18,7 @@
 
 namespace strandcast {
 
-/// What a server is fed, and when its states are wanted.
+/// Motion that a bake sends to its server, and the times of the states that it takes.
 struct BakeFeed {
   FeedPlan plan;        // in motion time, from 0
   double lead_s = 0.0;  // in which the motion sets in, before the first state

@@ -147,7 +147,7 @@ void ViewerSession::take_look(const LookChange& look) {
   ++look_changes_;
 }
 
-/// A change tells the new values alone.
+/// Merges listed parameters into the known ones. A list that is no change replaces them.
 void ViewerSession::take_parameters(const ParameterList& list) {
   auto all = std::make_shared<std::vector<ParameterInfo>>();
   if (list.is_change && parameters_ != nullptr) *all = *parameters_;

@@ -360,8 +360,8 @@ class WindowedView {
     (void)send(message);
   }
 
-  /// The server's picture in frames mode, else what was drawn here; one of them goes on being shown while the
-  /// other is not there.
+  /// Chooses the picture to show: the server's in frames mode, else the one drawn here. Until there is
+  /// one the previous picture stays.
   void choose_image() {
     std::shared_ptr<const Image> chosen = is_frames() ? state_->image : drawn_.image;
     fit_ = is_frames() ? PictureFit::Inside : PictureFit::Stretched;

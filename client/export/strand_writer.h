@@ -47,7 +47,8 @@ class StrandWriter {
   virtual Result<WrittenBytes> finish() = 0;
 };
 
-/// What both forms of USD say: of Unreal's groom conventions, and what the file holds.
+/// Names that `.usda` and `.usdc` share: version of Unreal's groom convention, schemas of the curve
+/// physics.
 inline constexpr int kUsdGroomMajor = 1, kUsdGroomMinor = 5;
 inline constexpr const char* kUsdCurvesSchema = "PhysicsCurvesDeformableSimAPI";
 inline constexpr const char* kUsdMaterialSchema = "PhysicsCurvesDeformableMaterialAPI";

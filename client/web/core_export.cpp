@@ -17,7 +17,8 @@ ErrorCode last_error_code = ErrorCode::Internal;
 
 }  // namespace
 
-/// Of the standard library, whose own one prints, with all of printf, why the module ends.
+/// Replaces the standard library's function, which prints the reason of an abort and so links all of
+/// printf.
 extern "C" void abort_message(const char*, ...) {
   std::abort();
 }

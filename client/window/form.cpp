@@ -104,7 +104,7 @@ std::optional<FormValue> draw_choice(const FormField& field) {
   return chosen;
 }
 
-/// What is none of the stops stands in the middle.
+/// Draws a slider over the field's choices. A value that is none of them puts the handle in the middle.
 std::optional<FormValue> draw_stops(const FormField& field) {
   const auto& present = std::get<std::string>(field.value);
   const auto found = std::find(field.choices.begin(), field.choices.end(), present);

@@ -50,7 +50,7 @@ inline constexpr std::string_view kClosedByServer = "the server closed the conne
 bool is_silent(int64_t heard_ns, int64_t time_ns);
 /// Whether it may be dead.
 bool is_doubted(int64_t heard_ns, int64_t time_ns);
-/// For a person.
+/// Returns a sentence for a person: for how long nothing has come from the server.
 std::string silence_text(const std::string& server, int64_t heard_ns, int64_t time_ns);
 
 class ReconnectPolicy {

@@ -17,7 +17,7 @@ constexpr double kSkull = 0.985;  // radius of the built-in cranium, in skull ra
 /// Roots nearer to or further from the middle than this, in skull radii, are not on the head: a mane's on the
 /// back.
 constexpr double kNearestRoot = 0.7, kFurthestRoot = 1.35;
-/// How uncertain things are before any root is looked at, for the least squares of the ellipsoid.
+/// Standard deviations for the least squares of the ellipsoid: of a root, of the centre, of each stretch.
 constexpr double kRootNoiseM = 0.004, kCenterNoiseM = 0.02, kStretchNoise = 0.08;
 constexpr int kStretchRounds = 8;
 /// Share of the roots in one direction that may lie below the skin.

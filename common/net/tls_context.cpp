@@ -18,7 +18,8 @@ Error file_error(const std::filesystem::path& path, const char* what, const erro
   return at(path.string(), make_error(ErrorCode::BadInput, "{}: {}", what, error.message()));
 }
 
-/// The same for both sides.
+/// Restricts a context, of server or client, to TLS 1.2 and newer without resumption, renegotiation or
+/// compression.
 Status restrict_protocol(ssl::context& context) {
   SSL_CTX* const native = context.native_handle();
   context.set_options(ssl::context::default_workarounds | ssl::context::no_sslv2 | ssl::context::no_sslv3 |

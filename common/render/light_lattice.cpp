@@ -54,7 +54,7 @@ glm::vec3 along_axes(const glm::vec3& v, const LatticeFrame& view) {
   return {glm::dot(v, view.axis[0]), glm::dot(v, view.axis[1]), glm::dot(v, view.axis[2])};
 }
 
-/// Along the axes of a lattice.
+/// Bounding box along the axes of a lattice.
 struct Bounds {
   glm::vec3 low{1e30f};
   glm::vec3 high{-1e30f};

@@ -374,7 +374,8 @@ bool names_any(const std::vector<std::string>& overrides, std::initializer_list<
   });
 }
 
-/// At least as many as make the steps of rods short enough; a rate a little below takes one as well.
+/// Raises the substeps until their rate is about kFullStepHz, at most to kMostFullSubsteps. A rate that
+/// is lower by a quarter of a substep is accepted.
 void add_substeps(v1::Scene& message) {
   constexpr double kALittle = 0.25;
   const double rate_hz = message.has_step_rate_hz() ? message.step_rate_hz() : kFullStepHz;

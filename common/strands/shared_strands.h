@@ -37,7 +37,8 @@ class SharedStrands {
   virtual void read(StrandBlocks& position_m, StrandBlocks& velocity_mps) const = 0;
 };
 
-/// Returns whether a frame has nothing but what steps cannot foretell (WIRE.md, exact frames).
+/// Returns whether this is an exact frame: it carries only what a step cannot predict (WIRE.md, exact
+/// frames).
 bool is_exact(const EncodedFrame& frame);
 
 /// What an encoder tells the simulation.

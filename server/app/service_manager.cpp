@@ -33,7 +33,7 @@ std::optional<int64_t> number_of(const char* variable) {
   return failure == std::errc() && rest == end && value >= 0 ? std::optional(value) : std::nullopt;
 }
 
-/// Whether variables of this kind are meant for this process, not for one that it was started by.
+/// Returns whether this variable names this process, not the parent that it was inherited from.
 bool is_for_us(const char* variable) {
   return number_of(variable) == int64_t{getpid()};
 }

@@ -311,7 +311,8 @@ void SessionDesk::tell_streams() {
   });
 }
 
-/// What was refused is on record, too.
+/// Returns the reply that answers the session, logs a refusal, and tells changed parameters after a
+/// success.
 StateSource::Reply SessionDesk::reply_to(SessionId session, const std::string& what) {
   return [this, session, who = viewers_.describe(session),
           what = one_line(what, kMaxLoggedCharacters)](Notice notice) {

@@ -16,7 +16,7 @@ namespace {
 constexpr std::chrono::milliseconds kKeyframePatience{
     50};  // for a new state, before the present one is encoded again
 
-/// Whether there is a state on the lattice that the class is announced with.
+/// Returns whether the slot has a snapshot with the lattice step that the class announces.
 bool has_state(const SnapshotSlot::View& view, const StrandEncodeConfig& config) {
   if (view.snapshot == nullptr) return false;
   return config.quantum_m == 0.0f || view.snapshot->quantum_m == config.quantum_m;

@@ -288,8 +288,8 @@ InputHub::SeenHead InputHub::see_head(int64_t server_time_ns) {
   return seen;
 }
 
-/// True where samples are later than they have been of late, of a source whose samples are shown evenly.
-/// Others are held from sample to sample.
+/// Returns whether the newest sample of an evenly shown source is later than usual. Samples of other
+/// sources are held until the next.
 bool InputHub::is_silent(int64_t time_ns, int64_t delay_ns) const {
   const double usual_ns = std::max(motion_.usual_spacing_ns, motion_.usual_wait_ns);
   const bool is_even = kMostSteadiedSpacings * usual_ns <= static_cast<double>(kMostSteadiedNs) ||

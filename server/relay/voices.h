@@ -30,7 +30,7 @@ inline constexpr size_t kMaxVoicesPerAddress = 12;
 inline constexpr int64_t kIdleVoiceNs = 90'000'000'000;
 /// Questions of one viewer that wait for their answer; more are refused.
 inline constexpr size_t kMaxQuestionsOfOne = 4;
-/// After a refusal the next try for the same viewer comes no sooner.
+/// Shortest time from a refusal to the next attempt for the same viewer.
 inline constexpr int64_t kSpeakAgainNs = 2'000'000'000;
 
 /// Session at a relay that says something.

@@ -68,7 +68,8 @@ class StreamCodec {
   virtual Status decode(std::span<const std::byte> message) = 0;
   /// Returns the result of the last decode(), (vertex_count x strand_count) as in StreamFrame; not timed.
   virtual std::vector<glm::vec3> decoded() const = 0;
-  /// Returns where the strands of the last take() are: the recording's, unless they go on from the viewers'.
+  /// Returns the positions that the last take() encoded: the recording's, or those continued from the
+  /// viewers' strands.
   virtual const std::vector<glm::vec3>& meant(const StreamFrame& frame) const {
     return frame.position_in_head_m;
   }

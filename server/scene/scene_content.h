@@ -32,8 +32,8 @@ struct SceneContent {
 /// Loads or grows the groom and the head. Errors name the file or option.
 Result<SceneContent> load_scene_content(const SceneDesc& scene);
 
-/// Returns the scene with the parameters of hair of this material, where the solver has these and the scene
-/// says none.
+/// Returns the scene with the solver's parameters as the hair's material says. Parameters that the scene sets
+/// stay.
 SceneDesc with_material(SceneDesc scene, const HairMaterial& material);
 
 /// Returns the scene's colliders, or the head's if the scene lists none and does not disable them. Head

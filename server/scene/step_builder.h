@@ -52,7 +52,7 @@ class StepBuilder {
   /// Begins and completes a step: adds wind, gusts and the root limit that these facts require.
   const SceneStep& build(const InputFrame& input, const SceneFeatures& features, double end_time_s);
 
-  /// Return the same step in the form that others need to simulate it too.
+  /// Returns the newest step as decoders need it to simulate the same: its scene, and its tick.
   StepScene step_scene(const SceneFeatures& features) const;
   StepTick step_tick(uint64_t tick) const;
 

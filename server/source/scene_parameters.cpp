@@ -150,7 +150,8 @@ std::vector<ParameterInfo> walk(SceneDesc scene) {
   return lister.take();
 }
 
-/// What a person should know of quality and the factors on it.
+/// Returns the note shown beside a parameter. That of `quality` says which quality runs, that of friction
+/// why it has no effect.
 std::string control_note(const ParameterInfo& info, const SceneDesc& scene,
                          const std::string& quality_reason) {
   const std::string why = quality_reason.empty() ? std::string() : ", as " + quality_reason;

@@ -121,7 +121,8 @@ class SimulationSource : public StateSource {
     return answer;
   }
 
-  /// On the simulation thread, whose look may be old: the assignment counts, on the newest.
+  /// Takes over a scene from the simulation thread. The look in it may be old, so `assignment` is
+  /// applied to the newest look.
   void follow(const SceneDesc& scene, const std::string& assignment) {
     {
       const std::lock_guard lock(mutex_);

@@ -21,7 +21,8 @@ class PredictedState final : public SharedState {
  public:
   Predictor::State state;
   TickBase base;
-  /// Decoded positions. An encoder takes them out of a state that it was given: nobody else has it.
+  /// Decoded positions. An encoder that receives the state moves them out of it, since it is their only
+  /// user.
   mutable tangent::Planes<int32_t> lattice;
   float quantum_m = 0.0f;
   uint64_t tick = 0;

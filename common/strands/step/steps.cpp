@@ -189,7 +189,8 @@ std::span<const StepTick> EncoderSteps::ticks_since(const SnapshotInfo& snapshot
   return std::span(ticks).last(count);
 }
 
-/// How steps serve the frame: they predict it, or go on beside what motion predicts, or are worth nothing.
+/// Returns the frame's step flags: steps predict it, steps run along while motion predicts it, or 0 where
+/// steps do not help.
 uint8_t EncoderSteps::judge(const tangent::Layout& layout, const tangent::History& history,
                             const tangent::Planes<int32_t>& target) const {
   constexpr uint32_t kFirstFrames = 1;     // strands without velocities rather start anew

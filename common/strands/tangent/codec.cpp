@@ -672,8 +672,8 @@ class Decoder final : public StrandDecoder {
     return give(message, frame_.lattice, snapshot);
   }
 
-  /// Reads `codes` of all slices, to the last byte; place(slice) finds their positions. `tables` become those
-  /// that the slices end with.
+  /// Reads the symbols of all slices into `codes` and calls place(slice) for each; bytes left over are
+  /// an error. Afterwards `tables` holds what the slices learnt.
   template <class Place>
   Status read_slices(std::span<const std::byte> source, Tables& tables, const SymbolSizes& sizes,
                      Codes& codes, Place place) {

@@ -56,7 +56,7 @@ using Planes = std::array<std::vector<T>, 3>;  // one for each axis, (vertex_cou
 using MotionWeights = std::array<std::array<int16_t, kMotionFeatureCount>, kMotionClassCount>;
 
 using FloatWeights = std::array<float, kMotionFeatureCount>;
-/// Weights of one class in the form in which they are used.
+/// Weights of one class as prediction applies them: as floats, with the head's motion multiplied in.
 struct MotionClass {
   FloatWeights weights{};
   std::array<std::array<float, 4>, 3> head{};  // the steps of the head, weighted

@@ -30,7 +30,8 @@ struct Found {
     for (IntLanes& axis : position.axis) axis = IntLanes{};
   }
 
-  /// How far the integers are from the origin, unless escaped.
+  /// Returns the codes to store: differences from the origin, or the values themselves in lanes that
+  /// found none (escaped).
   STRANDCAST_LANES CodeLanes apart() const {
     return {is_found ? wrapping_differences(codes.first, origin.first) : codes.first,
             is_found ? wrapping_differences(codes.second, origin.second) : codes.second,

@@ -42,7 +42,7 @@ LiveParserConfig parser_config(const LiveDesc& live) {
   return config;
 }
 
-/// In metres, and of the size of this head, whatever its sender measures in.
+/// Scales a pose to metres and to the size of this head.
 LivePose scaled(LivePose pose, double scale) {
   if (scale == 1.0) return pose;
   pose.world_from_subject.position_m *= scale;

@@ -143,8 +143,8 @@ int first_step(const RodShape& shape, const RodParameters& parameters) {
   return static_cast<int>(std::floor(std::log2(most_m4ps2 / parameters.stiffness_m4ps2) * kStiffeningSteps));
 }
 
-/// The first step from `from` on that holds, doubling to above it and bisecting below; one more than the last
-/// when none does.
+/// Returns the smallest step, at least `from`, at which the rod holds; one more than the last if none
+/// does. Searches upwards, then bisects.
 int least_step(const RodShape& shape, const RodParameters& parameters, double rate_squared, int from) {
   const auto holds = [&](int step) {
     return is_rod_held(shape, stiffened(parameters, stiffening_of(step)), rate_squared);

@@ -85,7 +85,8 @@ class ShapeConstraintsReference final : public ReferenceStrands {
 
   double weight(uint32_t i) const { return is_pinned(i) ? 0.0 : 1.0; }
 
-  /// Direction of the groomed segment before vertex i; that of the one before for a segment of no length.
+  /// Returns the direction of the groomed segment that ends at vertex i. A segment of no length takes
+  /// that of the one before.
   glm::dvec3 groomed(const ReferenceStrand& strand, uint32_t i) const {
     glm::dvec3 direction(0.0, 1.0, 0.0);
     for (uint32_t j = 1; j <= i; ++j)

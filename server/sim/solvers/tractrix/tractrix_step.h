@@ -8,10 +8,8 @@
 
 namespace strandcast {
 
-/// Where the tail of a rigid segment goes that was at `tail` when its head was at `head_before`, once the
-/// head has gone straight to `head`. Exact for any distance. A segment along the way, and one without a
-/// direction, is carried along: also when the head moves towards the tail, where any other segment turns
-/// around.
+/// Returns where the tail of a rigid segment is dragged to while its head moves straight from `head_before`
+/// to `head`, at any distance. A segment of no length, or along the way, is shifted as a whole.
 glm::dvec3 tractrix_followed(const glm::dvec3& head_before, const glm::dvec3& head, const glm::dvec3& tail,
                              double segment_m);
 
