@@ -132,7 +132,7 @@ constexpr int32_t kOctahedron = 1 << 10;
 
 glm::ivec2 to_octahedron(const glm::dvec3& direction) {
   const double sum = std::abs(direction.x) + std::abs(direction.y) + std::abs(direction.z);
-  if (!(sum > 0.0)) return {0, kOctahedron};
+  if (!(sum > 0.0 && std::isfinite(sum))) return {0, 0};  // upwards
   // The upper half is that of y.
   double u = direction.x / sum, v = direction.z / sum;
   if (direction.y < 0.0) {
@@ -468,7 +468,12 @@ Status read_head(std::span<const std::byte> source, const HeadCounts& counts, Me
 }  // namespace asset
 
 Mesh as_sent(const Mesh& mesh) {
-  if (mesh.triangle.empty()) return mesh;
+  const auto is_near = [](const glm::vec3& point) {
+    return std::abs(point.x) <= kMaxMeshExtentM && std::abs(point.y) <= kMaxMeshExtentM &&
+           std::abs(point.z) <= kMaxMeshExtentM;
+  };
+  if (mesh.triangle.empty() || !std::all_of(mesh.position_m.begin(), mesh.position_m.end(), is_near))
+    return mesh;
   asset::LatticePoints points{kHeadStepBits, {}};
   for (const glm::vec3& position : mesh.position_m)
     points.point.emplace_back(glm::dvec3(asset::rounded(position, kHeadStepBits)) *

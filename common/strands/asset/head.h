@@ -14,7 +14,7 @@
 namespace strandcast {
 
 /// Returns the mesh with vertices and triangles in the order in which they are sent, positions on the lattice
-/// of kHeadStepBits and normals that its code holds exactly.
+/// of kHeadStepBits and normals that its code holds exactly. One beyond kMaxMeshExtentM comes back unchanged.
 Mesh as_sent(const Mesh& mesh);
 
 namespace asset {
