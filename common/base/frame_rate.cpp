@@ -80,15 +80,15 @@ Result<FrameRate> parse_frame_rate(std::string_view text, double least, double m
   const auto television = is_quotient ? std::nullopt : television_rate(first->value());
   const double rate = television ? television->hz() : first->value() / second->value();
   if (rate < least || rate > most || first->count <= 0 || second->count < 0)
-    return make_error(ErrorCode::BadInput, "{} frames per second are asked for; {:g} to {:g} are possible",
-                      shown, least, most);
+    return make_error(ErrorCode::BadInput, "{} frames per second are asked for; {} to {:g} are possible",
+                      shown, least < 1e-3 ? fmt::format("{:.6f}", least) : fmt::format("{:g}", least), most);
   const auto exact = television ? television : quotient_of(*first, *second);
   if (!exact) return no_rate();
   return *exact;
 }
 
 std::string frame_rate_text(double rate_hz) {
-  return fmt::format("{:.6g}", std::round(rate_hz * 1e3) / 1e3);
+  return fmt::format("{:.6g}", rate_hz < 1.0 ? rate_hz : std::round(rate_hz * 1e3) / 1e3);
 }
 
 std::string make_frame_rate(std::string& text, double least, double most) {

@@ -20,7 +20,7 @@ struct FrameRate {
 };
 
 inline constexpr double kMostFrameRate = 240.0;  // frames per second
-inline constexpr double kLeastFrameRate = 1e-3;
+inline constexpr double kLeastFrameRate = 1e-6;
 
 /// Parses a rate in frames per second: a number, or a quotient of two. Rates of television are meant exactly
 /// where they are rounded: 23.976 is 24000/1001. Other numbers count to six decimals. The quotient has no

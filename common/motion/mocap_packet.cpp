@@ -76,7 +76,7 @@ std::vector<std::byte> encode_opentrack(const MocapMoment& moment) {
 std::vector<std::byte> encode_freed(const MocapMoment& moment) {
   constexpr double kUnitsPerDegree = 32768.0, kUnitsPerM = 64'000.0;
   constexpr uint8_t kType = 0xD1, kChecksumBegin = 0x40;
-  constexpr int kZoomFocusSpare = 8;
+  constexpr int kZoomFocus = 6;
   const glm::dvec3& p = moment.world_from_head.position_m;
   const HeadAngles angles = angles_of(moment.world_from_head.rotation);
   Packet packet;
@@ -85,7 +85,8 @@ std::vector<std::byte> encode_freed(const MocapMoment& moment) {
   for (const double degrees : {-angles.left_deg, -angles.down_deg, angles.tilt_right_deg})
     packet.put_three(kUnitsPerDegree * degrees);
   for (const double metres : {-p.x, p.z, p.y}) packet.put_three(kUnitsPerM * metres);
-  for (int i = 0; i < kZoomFocusSpare; ++i) packet.put(uint8_t{0}, std::endian::big);
+  for (int i = 0; i < kZoomFocus; ++i) packet.put(uint8_t{0}, std::endian::big);
+  packet.put(static_cast<uint16_t>(moment.timecode ? moment.timecode->frame : 0), std::endian::big);
   uint8_t sum = kChecksumBegin;
   for (const std::byte byte : packet.bytes())
     sum = static_cast<uint8_t>(sum - std::to_integer<uint8_t>(byte));
@@ -122,10 +123,11 @@ std::vector<std::byte> osc_bundle(const std::vector<std::vector<std::byte>>& mes
 
 std::vector<std::byte> encode_vmc(const MocapMoment& moment) {
   constexpr double kHeadAboveRootM = 0.25;  // a bone at 0 would be one whose place is not told
+  constexpr double kRoundS = 4096.0;        // steps of a float are a quarter of a millisecond below it
   const glm::dvec3& p = moment.world_from_head.position_m;
   const glm::dquat& r = moment.world_from_head.rotation;
   std::vector<std::vector<std::byte>> messages = {
-      osc_message("/VMC/Ext/T", "", {moment.time_s}),
+      osc_message("/VMC/Ext/T", "", {std::fmod(moment.time_s, kRoundS)}),
       osc_message("/VMC/Ext/Root/Pos", "root", {-p.x, p.y - kHeadAboveRootM, p.z, 0.0, 0.0, 0.0, 1.0}),
       osc_message("/VMC/Ext/Bone/Pos", "Head", {0.0, kHeadAboveRootM, 0.0, r.x, -r.y, -r.z, r.w})};
   if (moment.wind_mps)
@@ -154,7 +156,10 @@ std::vector<std::byte> encode_track(const MocapMoment& moment, TrackEncoding enc
                                                   moment.time_s,
                                                   moment.number,
                                                   moment.rate_hz,
-                                                  moment.source});
+                                                  moment.source,
+                                                  moment.timecode,
+                                                  moment.is_recording,
+                                                  moment.slate});
   std::vector<std::byte> payload;
   if (encoding == TrackEncoding::Cbor) {
     payload = write_cbor(document);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/base/timecode.h"
 #include "common/math/pose.h"
 
 namespace strandcast {
@@ -22,6 +23,9 @@ struct MocapMoment {
   uint32_t number = 0;                     // of the packet; of opentrackio only
   double rate_hz = 0.0;                    // of packets, 0 = not told; likewise
   uint32_t source = 1;                     // of protocols that number their sources
+  std::optional<Timecode> timecode = {};   // of opentrackio, and of freed in its spare word: frames, 16 bits
+  std::optional<bool> is_recording = {};   // of opentrackio only
+  std::string slate = {};                  // likewise
 };
 
 /// A protocol that packets can be made for.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <string_view>
 
 #include "common/base/check.h"
@@ -14,6 +13,7 @@ namespace {
 constexpr std::string_view kIdentifier = "OTrk";
 constexpr size_t kChecksumAt = kTrackHeaderBytes - 2;
 constexpr uint32_t kLastFlag = 0x8000;
+constexpr double kMostTrackRateHz = 1e4;
 
 uint32_t take_big_endian(std::span<const std::byte> bytes) {
   uint32_t number = 0;
@@ -24,14 +24,10 @@ void put_track_number(std::vector<std::byte>& bytes, uint32_t number, int count)
   while (count-- > 0) bytes.push_back(static_cast<std::byte>(number >> (8 * count)));
 }
 
-/// As one of those that the header of opentrackio.h names.
 bool has_right_checksum(std::span<const std::byte> packet) {
   const uint32_t sent = take_big_endian(packet.subspan(kChecksumAt, 2));
-  const auto payload = packet.subspan(kTrackHeaderBytes);
-  for (const auto head : {packet.first(kChecksumAt), packet.first(0)})
-    for (const uint32_t modulus : {255u, 256u})
-      if (fletcher16(head, payload, modulus) == sent) return true;
-  return false;
+  const auto head = packet.first(kChecksumAt), payload = packet.subspan(kTrackHeaderBytes);
+  return fletcher16(head, payload, 256) == sent || fletcher16(head, payload, 255) == sent;
 }
 
 ValueTree map_of(ValueTree::Map map) {
@@ -39,12 +35,21 @@ ValueTree map_of(ValueTree::Map map) {
 }
 
 /// A rate as OpenTrackIO tells it: of whole numbers.
-ValueTree rational_of(double rate_hz) {
-  constexpr int64_t kDenominator = 1000;
-  const auto thousandths = static_cast<int64_t>(std::llround(rate_hz * kDenominator));
-  const int64_t common = std::max<int64_t>(std::gcd(thousandths, kDenominator), 1);
-  return map_of({{"num", {static_cast<double>(thousandths / common)}},
-                 {"denom", {static_cast<double>(kDenominator / common)}}});
+ValueTree rational_of(const FrameRate& rate) {
+  return map_of(
+      {{"num", {static_cast<double>(rate.numerator)}}, {"denom", {static_cast<double>(rate.denominator)}}});
+}
+
+/// The counting is told where it leaves out numbers, which version 1.0 has no field for.
+ValueTree timecode_tree(const Timecode& timecode) {
+  const TimecodeFields fields = fields_of(timecode);
+  ValueTree::Map map = {{"hours", {1.0 * fields.hours}},
+                        {"minutes", {1.0 * fields.minutes}},
+                        {"seconds", {1.0 * fields.seconds}},
+                        {"frames", {1.0 * fields.frames}},
+                        {"frameRate", rational_of(timecode.rate)}};
+  if (timecode.is_drop) map.emplace_back("dropFrame", ValueTree{true});
+  return map_of(std::move(map));
 }
 
 }  // namespace
@@ -110,7 +115,14 @@ ValueTree make_track_document(const TrackSample& sample) {
       {"sampleTimestamp",
        map_of({{"seconds", {whole_s}}, {"nanoseconds", {std::floor((sample.time_s - whole_s) * kNsPerS)}}})},
       {"sequenceNumber", {static_cast<double>(sample.number & 0xFFFF)}}};
-  if (sample.rate_hz > 0.0) timing.emplace_back("sampleRate", rational_of(sample.rate_hz));
+  // What is no rate of a document is not told.
+  if (const auto rate =
+          parse_frame_rate(fmt::format("{:f}", sample.rate_hz), kLeastFrameRate, kMostTrackRateHz))
+    timing.emplace_back("sampleRate", rational_of(*rate));
+  if (sample.timecode) timing.emplace_back("timecode", timecode_tree(*sample.timecode));
+  ValueTree::Map tracker = {{"status", {std::string("head of Strandcast")}}};
+  if (sample.is_recording) tracker.emplace_back("recording", ValueTree{*sample.is_recording});
+  if (!sample.slate.empty()) tracker.emplace_back("slate", ValueTree{sample.slate});
   const auto& p = sample.translation_m;
   const auto& r = sample.pan_tilt_roll_deg;
   ValueTree head = map_of({{"translation", map_of({{"x", {p[0]}}, {"y", {p[1]}}, {"z", {p[2]}}})},
@@ -119,7 +131,7 @@ ValueTree make_track_document(const TrackSample& sample) {
   return map_of({{"protocol", map_of({{"name", {std::string("OpenTrackIO")}},
                                       {"version", {ValueTree::List{{1.0}, {0.0}, {1.0}}}}})},
                  {"sourceNumber", {static_cast<double>(sample.source)}},
-                 {"tracker", map_of({{"status", {std::string("head of Strandcast")}}})},
+                 {"tracker", map_of(std::move(tracker))},
                  {"timing", map_of(std::move(timing))},
                  {"transforms", {ValueTree::List{std::move(head)}}}});
 }

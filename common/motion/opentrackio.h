@@ -1,9 +1,6 @@
 // Packets of OpenTrackIO 1.0 (SMPTE RiS): a header of 16 bytes, big-endian, before JSON or CBOR, which may be
-// spread over segments. Pure functions, any thread.
-//
-// Not verified against another implementation: that the flag of the last segment is the top bit of the
-// length, and what the checksum covers. Fletcher-16 is therefore taken modulo 255 or 256, over header and
-// payload or over the payload alone; what is written has the first of each.
+// spread over segments. Pure functions, any thread. The checksum is Fletcher-16 over the header before it and
+// the payload: modulo 255 in version 1.0.0, modulo 256 since 1.0.1. Both are read, and the newer is written.
 #pragma once
 
 #include <array>
@@ -11,9 +8,11 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/base/timecode.h"
 #include "common/motion/value_tree.h"
 
 namespace strandcast {
@@ -44,8 +43,7 @@ std::vector<std::byte> write_track_segment(const TrackSegment& segment);
 
 /// Checksum of bytes and of those behind them: a sum, and the sum of its sums in the upper byte. `modulus` is
 /// 255 or 256.
-uint16_t fletcher16(std::span<const std::byte> begin, std::span<const std::byte> end = {},
-                    uint32_t modulus = 255);
+uint16_t fletcher16(std::span<const std::byte> begin, std::span<const std::byte> end, uint32_t modulus = 256);
 
 /// What a sample tells of one head, in metres and degrees, +Z up, +Y ahead, +X to the right.
 struct TrackSample {
@@ -55,6 +53,9 @@ struct TrackSample {
   uint32_t number = 0;
   double rate_hz = 0.0;  // 0 = not told
   uint32_t source = 1;
+  std::optional<Timecode> timecode = {};
+  std::optional<bool> is_recording = {};  // empty = not told
+  std::string slate = {};                 // of what is recorded; empty = none
 };
 
 /// Makes the document of a sample.

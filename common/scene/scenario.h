@@ -19,6 +19,7 @@ struct ScenarioStart {
   bool is_lockstep = false;
   std::vector<std::string> options;  // further words of the server's command line
   bool has_relay = false;            // between viewers and server
+  bool records = false;
 };
 
 struct ScenarioFeed {
@@ -61,6 +62,10 @@ struct ScenarioLink {
   double delay_ms = 0.0;
   double link_mbit = 0.0;  // 0 = as fast as it goes
 };
+/// Room for files of the server, from now on.
+struct ScenarioDisk {
+  std::optional<double> full_at_mb;  // none of them grows beyond; empty: as large as they get
+};
 struct ScenarioLeave {
   std::string viewer;
 };
@@ -97,6 +102,7 @@ struct ScenarioExpect {
   std::optional<ScenarioPicture> picture;
   std::optional<double> kbit_below, bits_per_vertex_below, realtime_above, hz_above, back_within_s;
   std::optional<double> realtime_below, feed_pace_within, head_mps_below;
+  std::optional<double> order_above, incoherent_below, cpu_share_below;
   std::optional<bool> is_slow;
   std::string mode;
   std::string because;    // part of the reason for the mode
@@ -111,9 +117,10 @@ struct ScenarioRefusal {
   std::string says;
 };
 
-using ScenarioWork = std::variant<ScenarioStart, ScenarioFeed, ScenarioSteps, ScenarioRunTime, ScenarioSet,
-                                  ScenarioCommand, ScenarioView, ScenarioLeave, ScenarioExpect,
-                                  ScenarioRefusal, ScenarioRemember, ScenarioSend, ScenarioLink>;
+using ScenarioWork =
+    std::variant<ScenarioStart, ScenarioFeed, ScenarioSteps, ScenarioRunTime, ScenarioSet, ScenarioCommand,
+                 ScenarioView, ScenarioLeave, ScenarioExpect, ScenarioRefusal, ScenarioRemember, ScenarioSend,
+                 ScenarioLink, ScenarioDisk>;
 
 struct ScenarioAction {
   ScenarioWork work;

@@ -36,6 +36,7 @@ constexpr Range kShake{0.0, 1'000.0, "m/s2"};
 constexpr Range kShakeRate{0.1, 50.0, "Hz"};
 constexpr Range kWind{-200.0, 200.0, "m/s"};
 constexpr Range kShare{0.0, 2.0, ""};
+constexpr Range kDisk{0.001, 1e6, "MB"};
 constexpr Range kLink{0.01, 10'000.0, "Mbit/s"};
 constexpr Range kDelay{0.0, 5'000.0, "ms"};
 constexpr Range kLoss{0.0, 0.5, ""};
@@ -229,6 +230,7 @@ ScenarioStart ScenarioReader::read_start(const Part& part) const {
   start.overrides = part.texts("set", kMaxWords);
   start.is_lockstep = part.flag("lockstep");
   start.has_relay = part.flag("relay");
+  start.records = part.flag("record");
   start.options = part.texts("option", kMaxWords);
   for (const std::string& word : start.options)
     if (word.starts_with('-') && !is_scenario_option(word))
@@ -288,6 +290,9 @@ ScenarioExpect ScenarioReader::read_expect(const Part& part) const {
   expect.realtime_below = part.some("realtime_below", kMeasure);
   expect.feed_pace_within = part.some("feed_pace_within", kMeasure);
   expect.head_mps_below = part.some("head_mps_below", kMeasure);
+  expect.order_above = part.some("order_above", kShare);
+  expect.incoherent_below = part.some("incoherent_below", kShare);
+  expect.cpu_share_below = part.some("cpu_share_below", kMeasure);
   expect.within_s = part.number("within_s", expect.within_s, kSeconds);
   if (part.has("slow_motion")) expect.is_slow = part.flag("slow_motion");
   if (part.has("mode")) expect.mode = part.word("mode", "", {"strands", "frames"});
@@ -385,6 +390,8 @@ ScenarioAction ScenarioReader::read_action(const Part& part) const {
     action.work = read_view(part.group("view"));
   } else if (part.has("link")) {
     action.work = read_link(part.group("link"));
+  } else if (part.has("disk")) {
+    action.work = ScenarioDisk{part.group("disk").some("full_at_mb", kDisk)};
   } else if (part.has("leave")) {
     action.work = ScenarioLeave{part.text("leave", "", kMaxWordBytes)};
   } else if (part.has("expect")) {

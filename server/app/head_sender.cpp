@@ -1,5 +1,6 @@
 #include "server/app/head_sender.h"
 
+#include <cstdlib>
 #include <utility>
 
 #include "common/base/units.h"
@@ -19,30 +20,46 @@ Result<HeadSend> parse_head_send(const std::string& text) {
   return send;
 }
 
-HeadSender::HeadSender(std::vector<Way> ways, uint32_t head, double rate_hz)
-    : ways_(std::move(ways)), head_(head), rate_hz_(rate_hz) {}
+HeadSender::HeadSender(std::vector<Way> ways, HeadSenderConfig config)
+    : ways_(std::move(ways)), config_(std::move(config)) {}
 
-Result<std::unique_ptr<HeadSender>> HeadSender::open(const std::vector<HeadSend>& sends, uint32_t head,
-                                                     double rate_hz) {
+Result<std::unique_ptr<HeadSender>> HeadSender::open(const std::vector<HeadSend>& sends,
+                                                     HeadSenderConfig config) {
   std::vector<Way> ways;
   for (const HeadSend& send : sends) {
     ASSIGN_OR_RETURN(const MocapEncoding encoding, find_mocap_encoding(send.protocol));
-    if (head > 0 && !encoding.numbers_sources) continue;
+    if (config.head > 0 && !encoding.numbers_sources) continue;
     auto sender = DatagramSender::open(send.to);
     if (!sender) return at("--send", sender.error());
     log_info("app", "the head is sent to {} as {}", send.to.to_string(), send.protocol);
     ways.push_back({encoding, std::move(*sender)});
   }
-  return std::unique_ptr<HeadSender>(new HeadSender(std::move(ways), head, rate_hz));
+  return std::unique_ptr<HeadSender>(new HeadSender(std::move(ways), std::move(config)));
+}
+
+/// As the clock had it when the state was due: even, as simulated time is, and near the clock.
+double HeadSender::time_s(int64_t sim_time_ns) {
+  constexpr int64_t kFarNs = 100'000'000;  // simulated time stood still, or the clock was set
+  const int64_t now_ns = config_.clock.time_ns();
+  if (!clock_from_sim_ns_ || std::abs(sim_time_ns + *clock_from_sim_ns_ - now_ns) > kFarNs)
+    clock_from_sim_ns_ = now_ns - sim_time_ns;
+  return static_cast<double>(sim_time_ns + *clock_from_sim_ns_) * kSPerNs;
 }
 
 void HeadSender::on_state(const std::shared_ptr<const Snapshot>& state) {
   MocapMoment moment;
-  moment.time_s = static_cast<double>(state->sim_time_ns) * kSPerNs;
+  moment.time_s = time_s(state->sim_time_ns);
   moment.world_from_head = state->world_from_head;
   moment.number = number_++;
-  moment.rate_hz = rate_hz_;
-  moment.source = head_ + 1;
+  moment.rate_hz = config_.rate_hz;
+  moment.source = config_.head + 1;
+  moment.timecode = state->timecode;
+  if (config_.tell) {
+    HeadTold told = config_.tell();
+    moment.wind_mps = told.wind_mps;
+    moment.is_recording = told.is_recording;
+    moment.slate = std::move(told.slate);
+  }
   for (const Way& way : ways_)
     if (!way.sender->send(way.encoding.encode(moment))) ++unsent_;
 }

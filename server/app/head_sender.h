@@ -5,7 +5,10 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
+#include <glm/glm.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +16,7 @@
 #include "common/client/address.h"
 #include "common/client/datagram_sender.h"
 #include "common/motion/mocap_packet.h"
+#include "server/app/stage_clock.h"
 #include "server/stream/stream_reader.h"
 
 namespace strandcast {
@@ -29,12 +33,25 @@ struct HeadSend {
 /// explains the accepted forms, or lists the protocols.
 Result<HeadSend> parse_head_send(const std::string& text);
 
+/// What else goes with a state.
+struct HeadTold {
+  std::optional<glm::vec3> wind_mps;  // at the head, world
+  std::optional<bool> is_recording;   // empty: nothing can be recorded
+  std::string slate;                  // of the recording, with its take; empty = none
+};
+
+struct HeadSenderConfig {
+  uint32_t head = 0;  // its number: protocols that do not number their sources carry the first head alone
+  double rate_hz = 0.0;
+  StageClock clock = {};                // that times are told by
+  std::function<HeadTold()> tell = {};  // called with every state; may be empty
+};
+
 class HeadSender : public StreamReader {
  public:
-  /// Opens the sockets; NotFound for an unknown host. `head` is the head's number from 0 on: protocols that
-  /// do not number their sources carry the first head alone.
-  static Result<std::unique_ptr<HeadSender>> open(const std::vector<HeadSend>& sends, uint32_t head,
-                                                  double rate_hz);
+  /// Opens the sockets; NotFound for an unknown host.
+  static Result<std::unique_ptr<HeadSender>> open(const std::vector<HeadSend>& sends,
+                                                  HeadSenderConfig config);
 
   void on_state(const std::shared_ptr<const Snapshot>& state) override;
 
@@ -47,11 +64,12 @@ class HeadSender : public StreamReader {
     MocapEncoding encoding;
     std::unique_ptr<DatagramSender> sender;
   };
-  HeadSender(std::vector<Way> ways, uint32_t head, double rate_hz);
+  HeadSender(std::vector<Way> ways, HeadSenderConfig config);
+  double time_s(int64_t sim_time_ns);
 
   const std::vector<Way> ways_;
-  const uint32_t head_;
-  const double rate_hz_;
+  const HeadSenderConfig config_;
+  std::optional<int64_t> clock_from_sim_ns_;
   uint32_t number_ = 0;  // of the next packet
   std::atomic<uint64_t> unsent_{0};
 };

@@ -66,6 +66,7 @@ Result<SceneDesc> with_mocap(const SceneDesc& scene, const MocapOptions& options
     ASSIGN_OR_RETURN(LiveDesc live, parse_mocap(input));
     live.subject = options.subject;
     live.axes = options.axes;
+    if (!options.timecode.empty()) live.axes += "/" + options.timecode;
     live.scale = options.scale;
     changed.live.push_back(std::move(live));
   }

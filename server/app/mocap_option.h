@@ -14,7 +14,8 @@ struct MocapOptions {
   std::vector<std::string> inputs;  // PROTOCOL, PROTOCOL:PORT or PROTOCOL://HOST[:PORT]
   std::string subject;              // of all of them
   std::string axes;
-  double scale = 1.0;  // LiveDesc::scale
+  std::string timecode;  // how the spare word of freed counts frames; empty = it does not
+  double scale = 1.0;    // LiveDesc::scale
 };
 
 /// Parses one value of --mocap, or of another `option` of that form. BadInput explains the accepted forms.

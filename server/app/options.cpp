@@ -151,9 +151,9 @@ struct RawRunOptions {
 
 /// What a relay leaves to the server that it stands in for.
 constexpr const char* kNotForRelays[] = {
-    "--scene",       "--set",       "--groom",      "--check",  "--list-solvers", "--explain",
-    "--print-scene", "--mocap",     "--send",       "--record", "--replay",       "--sim-device",
-    "--renderer",    "--gl-device", "--shader-dir", "--trace",  "--lockstep",     "--timecode"};
+    "--scene",      "--set",   "--groom",    "--check",    "--list-solvers",  "--explain",  "--print-scene",
+    "--mocap",      "--send",  "--record",   "--replay",   "--sim-device",    "--renderer", "--gl-device",
+    "--shader-dir", "--trace", "--lockstep", "--timecode", "--timecode-clock"};
 
 void add_relay_options(CLI::App& app, RawRunOptions& raw) {
   constexpr const char* kGroup = "Relay";
@@ -209,6 +209,10 @@ void add_mocap_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw
          "how its numbers are meant, where senders disagree; a wrong name is answered with those there are")
       ->needs(inputs)
       ->group(kGroup);
+  app.add_option("--mocap-timecode", options.mocap.timecode,
+                 "freed: its spare word counts frames of timecode, so many a second: 25, 29.97df")
+      ->needs(inputs)
+      ->group(kGroup);
   app.add_option(
          "--mocap-scale", options.mocap.scale,
          "its places times this, for senders of another unit or size: 0.01 makes metres of centimetres")
@@ -249,15 +253,6 @@ void add_record_options(CLI::App& app, ServerOptions& options, RawRunOptions& ra
   app.add_flag("--replay-realtime", raw.is_replayed_in_real_time,
                "with --replay: no faster than it was recorded")
       ->needs(replay);
-}
-
-/// How timecode counts that this machine's clock gives: a rate, with "df" behind it for drop-frame.
-Result<Timecode> timecode_count(std::string_view text) {
-  constexpr std::string_view kDrop = "df";
-  const bool is_drop = text.ends_with(kDrop);
-  if (is_drop) text.remove_suffix(kDrop.size());
-  ASSIGN_OR_RETURN(const FrameRate rate, parse_frame_rate(text));
-  return make_timecode({}, rate, is_drop);
 }
 
 void add_proxy_options(CLI::App& app, RawRunOptions& raw) {
@@ -326,11 +321,21 @@ void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) 
   app.add_option_function<std::string>(
       "--timecode",
       [&options](const std::string& text) {
-        const auto count = timecode_count(text);
+        const auto count = parse_timecode_count(text);
         if (!count) throw CLI::ValidationError("--timecode", count.error().message);
         options.config.timecode = *count;
       },
       "frames per second of a timecode by this machine's clock, where nobody sends one: 24, 23.976, 29.97df");
+  app.add_option_function<std::string>(
+      "--timecode-clock",
+      [&options](const std::string& text) {
+        const auto clock = StageClock::open(text);
+        if (!clock) throw CLI::ValidationError("--timecode-clock", clock.error().message);
+        options.config.clock = *clock;
+      },
+      "which clock that is, and that of --send opentrackio: local (first; it jumps with summer time), utc, "
+      "tai (what "
+      "PTP counts), or a PTP device such as /dev/ptp0");
   app.add_flag("--lockstep", options.config.is_lockstep,
                "simulated time goes on by strandcast-ctl step N only, and inputs are for simulated times");
   app.add_option("--seconds", options.run_s, "stop after so many seconds")->check(in_range(0.0, kMaxRunS));

@@ -323,6 +323,7 @@ Result<std::string> RecordDesk::start_recording(const RecordCommand& command) {
   take->begin(std::move(start), stream_->asset());
   const std::lock_guard lock(mutex_);
   take_ = std::move(take);
+  take_slate_ = recording_name({true, {}, command.slate, command.take});
   both_ = std::move(both);
   ended_.clear();
   return fmt::format("Recording {} from step {} on.", take_->path().string(), tick);
@@ -364,6 +365,13 @@ void RecordDesk::watch() {
     const std::lock_guard lock(mutex_);
     ended_ = text_of(*recorder, reason);
   }
+}
+
+std::optional<std::string> RecordDesk::slate() const {
+  const std::lock_guard lock(mutex_);
+  if (take_ != nullptr && !take_->failure()) return take_slate_;
+  if (whole_ != nullptr && !whole_->failure()) return std::string();
+  return std::nullopt;
 }
 
 std::string RecordDesk::text() const {

@@ -88,6 +88,8 @@ class RecordDesk {
   /// Describes the recordings for a person: "take 5.mcap: 12.5 s, 3.2 MB", or why they ended; empty = nothing
   /// is recorded.
   std::string text() const;
+  /// Returns slate and take of what is recorded, in one word; empty text without a slate, empty = nothing is.
+  std::optional<std::string> slate() const;
   void add(const ServerStatus& status);
   /// Returns the counters of the recordings together; empty if nothing is recorded.
   std::optional<RecordCounters> counters() const;
@@ -122,6 +124,7 @@ class RecordDesk {
   std::condition_variable changed_;
   std::shared_ptr<Recorder> whole_;  // of --record; null: none
   std::shared_ptr<Recorder> take_;   // of a command; likewise
+  std::string take_slate_;           // of that one, as slate() has it
   std::unique_ptr<StepTap> both_;    // tells them both, while there are two
   std::string ended_;                // how the last one ended by itself; until somebody asks for another
   std::optional<Order> order_;       // that is carried out, or waits for it

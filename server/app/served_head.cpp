@@ -1,8 +1,6 @@
 #include "server/app/served_head.h"
 
 #include <algorithm>
-#include <chrono>
-#include <ctime>
 #include <utility>
 
 #include "common/base/profile.h"
@@ -16,22 +14,6 @@
 #include "server/encode/picture_painter.h"
 
 namespace strandcast {
-namespace {
-
-/// The timecode of now by this machine's clock, local time, counted like `count`.
-Timecode time_of_day(const Timecode& count) {
-  const auto now = std::chrono::system_clock::now();
-  const std::time_t seconds = std::chrono::system_clock::to_time_t(now);
-  std::tm parts{};
-  ::localtime_r(&seconds, &parts);
-  const auto whole = std::chrono::system_clock::from_time_t(seconds);
-  const double part_s = std::chrono::duration<double>(now - whole).count();
-  const double day_s = parts.tm_hour * 3600.0 + parts.tm_min * 60.0 + parts.tm_sec + part_s;
-  return advanced({count.rate, count.is_drop}, day_s * count.rate.hz());
-}
-
-}  // namespace
-
 Result<std::unique_ptr<ServedHead>> ServedHead::load(const ServerConfig& config, size_t number,
                                                      OtherHeads others) {
   std::unique_ptr<ServedHead> head(new ServedHead(config, number));
@@ -56,7 +38,8 @@ Status ServedHead::load(OtherHeads others) {
     config_.tap = records_->first_tap();
   }
   ASSIGN_OR_RETURN(sender_,
-                   HeadSender::open(config_.sends, static_cast<uint32_t>(number_), scene.step_rate_hz));
+                   HeadSender::open(config_.sends, {static_cast<uint32_t>(number_), scene.step_rate_hz,
+                                                    config_.clock, [this] { return told(); }}));
   config_.shared = &shared_;
   ASSIGN_OR_RETURN(source_, config_.make_source(config_, inputs_));
   if (const std::optional<SceneDesc> loaded = source_->scene()) scene.camera = loaded->camera;
@@ -214,9 +197,19 @@ void ServedHead::tell_status() {
   desk_->tell_streams();
 }
 
+/// What who follows the head is told besides its pose.
+HeadTold ServedHead::told() const {
+  HeadTold told{source_->wind_mps(), {}, {}};
+  if (records_ == nullptr) return told;
+  const std::optional<std::string> slate = records_->slate();
+  told.is_recording = slate.has_value();
+  told.slate = slate.value_or("");
+  return told;
+}
+
 /// Where nobody sends timecode, this machine's clock counts.
 void ServedHead::count_by_the_clock() {
-  if (config_.timecode) inputs_.push(time_of_day(*config_.timecode), now_ns());
+  if (config_.timecode) inputs_.push(config_.clock.timecode(*config_.timecode), now_ns());
 }
 
 void ServedHead::watch_speed(const ServerCounters& now) {

@@ -74,6 +74,7 @@ class ServedHead {
   Status choose_stream();
   Status choose_codecs();
   RecordingStart describe_recording() const;
+  HeadTold told() const;
   void count_by_the_clock();
   void watch_speed(const ServerCounters& now);
   void lower_quality();

@@ -14,6 +14,7 @@
 #include "common/scene/scene_desc.h"
 #include "server/app/head_sender.h"
 #include "server/app/record_desk.h"
+#include "server/app/stage_clock.h"
 #include "server/encode/picture_painter.h"
 #include "server/input/input_hub.h"
 #include "server/net/net_server.h"
@@ -37,6 +38,7 @@ struct ServerConfig {
   std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
   SnapshotObserver on_publish;                         // may be empty; of every head
   std::optional<Timecode> timecode;  // how this machine's clock counts where nobody does; empty = not at all
+  StageClock clock;                  // which it is
   bool is_lockstep = false;          // simulated time goes on by commands only
   std::filesystem::path trace_path;  // CSV of what each state took; empty = none
   std::function<MakePicturePainter(PainterConfig)> make_painter =

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "common/base/picture_size.h"
+#include "common/math/coherence.h"
 #include "common/pictures/image_codec.h"
 #include "common/scene/scene_desc.h"
-#include "server/report/coherence.h"
 #include "server/report/hair_reality.h"
 #include "server/sim/executor/executor.h"
 

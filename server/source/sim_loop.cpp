@@ -378,6 +378,11 @@ std::shared_ptr<const SceneAsset> SimLoop::asset() const {
   return asset_;
 }
 
+std::optional<glm::vec3> SimLoop::wind_mps() const {
+  const std::lock_guard lock(mutex_);
+  return wind_mps_;
+}
+
 SimStats SimLoop::stats() const {
   const std::lock_guard lock(mutex_);
   SimStats stats = stats_;

@@ -111,6 +111,8 @@ class SimLoop {
   /// kMaxPendingJobs already wait.
   bool note(const SetParameter& parameter, const Notice& answer, const std::string& who);
   SimStats stats() const;
+  /// Does what StateSource::wind_mps() does.
+  std::optional<glm::vec3> wind_mps() const;
   /// Returns the asset of strands whose shape has changed since the start; null if it has not.
   std::shared_ptr<const SceneAsset> asset() const;
   /// Ends the thread after the current substep or command. Call it from one thread only.
@@ -266,6 +268,7 @@ class SimLoop {
   bool is_preparing_ = false;  // no command is carried out before the one that is being prepared
   std::atomic<bool> is_stopping_{false};
   SimStats stats_;
+  std::optional<glm::vec3> wind_mps_;
   std::shared_ptr<const SceneAsset> asset_;
   std::optional<Error> failure_;
 

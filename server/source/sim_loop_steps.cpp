@@ -173,7 +173,12 @@ void SimLoop::step(int64_t time_ns) {
   if (is_stopping_) return;
   step_times_.add_ms(stages_->last_step_ms());
   if (solver_features_.has_body) report_body();
-  step_log_.add(builder_->step_tick(tick_));
+  const StepTick taken = builder_->step_tick(tick_);
+  step_log_.add(taken);
+  {
+    const std::lock_guard lock(mutex_);
+    wind_mps_ = glm::vec3(taken.wind_mps);
+  }
   last_step_ns_ = now_ns();
   if (is_watched() || is_recorded() || clock_->is_paused() || tick_ % kIdlePublishSteps == 0) publish();
 }

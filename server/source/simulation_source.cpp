@@ -89,6 +89,9 @@ class SimulationSource : public StateSource {
   }
   void set_tap(StepTap* tap, OnTapped on_tapped) override { loop_->set_tap(tap, std::move(on_tapped)); }
   SimStats stats() const override { return loop_ != nullptr ? loop_->stats() : SimStats{}; }
+  std::optional<glm::vec3> wind_mps() const override {
+    return loop_ != nullptr ? loop_->wind_mps() : std::nullopt;
+  }
   std::optional<SceneDesc> scene() const override {
     SceneDesc scene;
     {

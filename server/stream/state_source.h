@@ -98,6 +98,8 @@ class StateSource {
   /// after the source has stopped or failed. A source without steps only calls `on_tapped`.
   virtual void set_tap(StepTap* /*tap*/, OnTapped on_tapped) { on_tapped(stats().tick); }
   virtual SimStats stats() const = 0;
+  /// Returns the mean wind at the head in the newest step, world; empty if it is not known.
+  virtual std::optional<glm::vec3> wind_mps() const { return std::nullopt; }
   /// Returns the scene as it runs, so that it can be run elsewhere on this machine; empty if there is none.
   virtual std::optional<SceneDesc> scene() const { return std::nullopt; }
   /// Returns why the source ended by itself; empty while it runs.

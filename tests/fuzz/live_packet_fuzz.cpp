@@ -51,6 +51,7 @@ extern "C" int FUZZ_ENTRY(live_packet)(const uint8_t* data, size_t size) {
   for (const LiveProtocol& protocol : live_protocols())
     if (protocol.name == config.protocol && !protocol.axis_orders.empty())
       config.axis_order = protocol.axis_orders[settings & 1];
+  if (config.protocol == "freed" && (settings & 2) != 0) config.axis_order += "/29.97df";
   config.protocol_version = kVersions[(settings >> 1) % std::size(kVersions)];
   LiveParserPair parsers(config);
   while (!input.is_empty()) {

@@ -12,6 +12,7 @@
 #include "common/record/strand_frames.h"
 #include "server/record/replay.h"
 #include "tests/support/live_packets.h"
+#include "tests/support/live_poses.h"
 #include "tests/support/server_fixture.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/udp_socket.h"
@@ -164,6 +165,50 @@ TEST_F(RecordCommands, BeginAndEndRecordingsOfAServerThatRuns) {
   EXPECT_LE(*first, begin_tick + 1);
   EXPECT_THAT(replayed(file("take 5.mcap")),
               HasSubstr(fmt::format("it began while the simulation ran, at step {}", *first)));
+}
+
+// Who follows the head hears of wind, timecode and take, too.
+TEST_F(RecordCommands, WhoFollowsTheHeadIsTold) {
+  const test::UdpSocket vmc, tracks;
+  ServerConfig config = this->config();
+  config.scene.wind = {};  // without gusts
+  config.scene.wind.mean_mps = {1.0f, -0.5f, 2.0f};
+  config.timecode = Timecode{{25, 1}};
+  config.clock = StageClock::open("utc").value();
+  config.sends = {{"vmc", {"127.0.0.1", vmc.port()}}, {"opentrackio", {"127.0.0.1", tracks.port()}}};
+  if (!start(std::move(config))) return;
+  const auto of_vmc = test::live_parser_of("vmc");
+  EXPECT_TRUE(eventually([&] {
+    const auto packet = of_vmc->parse(vmc.take(), 0);
+    return packet && packet->wind_mps && glm::distance(*packet->wind_mps, glm::dvec3(1.0, -0.5, 2.0)) < 1e-5;
+  }));
+  const auto of_tracks = test::live_parser_of("opentrackio");
+  // The clock is read twice a second.
+  std::optional<Timecode> timecode;
+  double sent_s = 0.0;
+  ASSERT_TRUE(eventually([&] {
+    const auto packet = of_tracks->parse(tracks.take(), 0);
+    if (!packet || packet->poses.empty()) return false;
+    timecode = packet->poses[0].timecode;
+    sent_s = static_cast<double>(packet->poses[0].source_time_ns.value_or(0)) * 1e-9;
+    return timecode.has_value();
+  }));
+  const StageClock utc = StageClock::open("utc").value();
+  EXPECT_LT(std::abs(frames_between(*timecode, utc.timecode({{25, 1}}))), 50.0) << timecode_text(*timecode);
+  EXPECT_LT(std::abs(sent_s - static_cast<double>(utc.time_ns()) * 1e-9), 2.0);
+  const auto take = [&](bool is_wanted) {
+    std::optional<LiveTake> found;
+    EXPECT_TRUE(eventually([&] {
+      const auto packet = of_tracks->parse(tracks.take(), 0);
+      if (packet) found = packet->take;
+      return packet && found && found->is_wanted == is_wanted;
+    })) << is_wanted;
+    return found.value_or(LiveTake{});
+  };
+  EXPECT_FALSE(ask(RecordCommand{true, "", "12A", 3}).is_error);
+  EXPECT_EQ(take(true).slate, "12A-T03");
+  EXPECT_FALSE(ask(RecordCommand{false}).is_error);
+  (void)take(false);
 }
 
 // A take on a stage: its file has slate, take and timecode, of each state and of the replay.

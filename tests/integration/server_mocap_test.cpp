@@ -290,10 +290,10 @@ TEST(HeadSends, AreOneSentenceWhereTheyAreWrong) {
   EXPECT_THAT(parse_head_send("natnet").error().to_string(), AllOf(HasSubstr("--send"), HasSubstr("freed")));
   EXPECT_THAT(parse_head_send("vmc:0").error().to_string(), HasSubstr("--send vmc:0"));
   // Of further heads, what numbers them.
-  const auto second = HeadSender::open({{"vmc", {}}, {"opentrack", {}}}, 1, 60.0);
+  const auto second = HeadSender::open({{"vmc", {}}, {"opentrack", {}}}, {1, 60.0});
   ASSERT_TRUE(second);
   EXPECT_TRUE((*second)->is_empty());
-  EXPECT_FALSE(HeadSender::open({{"freed", {}}}, 1, 60.0).value()->is_empty());
+  EXPECT_FALSE(HeadSender::open({{"freed", {}}}, {1, 60.0}).value()->is_empty());
 }
 
 TEST(MocapPackets, SayWhatTheirParsersRead) {
@@ -322,6 +322,23 @@ TEST(MocapPackets, SayWhatTheirParsersRead) {
     }
   }
   EXPECT_THAT(find_mocap_encoding("bvh").error().to_string(), HasSubstr("opentrack"));
+}
+
+// A float has steps of 31 ms at five days, and of a quarter of a millisecond below 4096 s.
+TEST(MocapPackets, TimesOfVmcStayFine) {
+  const auto encoding = find_mocap_encoding("vmc");
+  auto parser = parser_of("vmc");
+  std::optional<int64_t> before;
+  for (int i = 0; i < 400; ++i) {
+    const auto packet = (*parser)->parse(encoding->encode({5.0 * 86'400.0 + i / 60.0, {}}), i);
+    ASSERT_TRUE(packet && packet->poses.size() == 1);
+    const auto time_ns = packet->poses[0].source_time_ns;
+    ASSERT_TRUE(time_ns);
+    if (before) {
+      EXPECT_NEAR(static_cast<double>(*time_ns - *before), 1e9 / 60.0, 0.3e6) << i;
+    }
+    before = time_ns;
+  }
 }
 
 TEST(MocapPackets, WindGoesWithVmc) {

@@ -119,6 +119,7 @@ struct FreedPacket {
   uint8_t camera = 1;
   std::array<double, 3> angle_deg{};    // in the packet's order: pan, tilt, roll by the manual
   std::array<double, 3> position_mm{};  // x, y, height
+  uint16_t spare = 0;
 };
 /// Three bytes, the highest first, of two's complement.
 inline void put_three(PacketWriter& writer, double number) {
@@ -130,7 +131,7 @@ inline PacketBytes freed(const FreedPacket& packet) {
   writer.put(uint8_t{0xD1}).put(packet.camera);
   for (const double angle : packet.angle_deg) put_three(writer, angle * 32768);
   for (const double position : packet.position_mm) put_three(writer, position * 64);
-  writer.put(std::array<uint8_t, 8>{});  // zoom, focus, spare
+  writer.put(std::array<uint8_t, 6>{}).put(packet.spare);  // zoom and focus before it
   int sum = 0x40;
   for (const std::byte byte : writer.bytes()) sum -= std::to_integer<int>(byte);
   return writer.put(static_cast<uint8_t>(sum & 0xFF)).bytes();
@@ -171,8 +172,10 @@ struct TrackPacketFields {
   uint16_t sequence = 0;
   uint32_t offset = 0;  // of the payload in its sample
   bool is_last = true;
+  uint32_t modulus = 256;
 };
-/// A segment of OpenTrackIO around a payload, with Fletcher-16 over header and payload.
+/// A segment of OpenTrackIO around a payload, with Fletcher-16 over header and payload: modulo 256
+/// since 1.0.1.
 inline PacketBytes opentrackio(const std::string& payload, const TrackPacketFields& fields = {}) {
   PacketWriter header(std::endian::big);
   header.text("OTrk").put(uint8_t{0}).put(fields.encoding).put(fields.sequence).put(fields.offset);
@@ -180,8 +183,8 @@ inline PacketBytes opentrackio(const std::string& payload, const TrackPacketFiel
   const PacketBytes summed = PacketWriter(header).text(payload).bytes();
   uint32_t sum = 0, sums = 0;
   for (const std::byte byte : summed) {
-    sum = (sum + std::to_integer<uint32_t>(byte)) % 255;
-    sums = (sums + sum) % 255;
+    sum = (sum + std::to_integer<uint32_t>(byte)) % fields.modulus;
+    sums = (sums + sum) % fields.modulus;
   }
   header.put(static_cast<uint8_t>(sums)).put(static_cast<uint8_t>(sum));
   return header.text(payload).bytes();

@@ -1,5 +1,5 @@
 // How much of hair moves as one: made-up strands with known answers.
-#include "server/report/coherence.h"
+#include "common/math/coherence.h"
 
 #include <gtest/gtest.h>
 

@@ -38,11 +38,11 @@ std::string sample(const std::string& transforms, const std::string& more = "") 
 }
 const std::string kAtRest = "{\"pan\":0,\"tilt\":0,\"roll\":0}";
 
-// An empty document in JSON. The sums modulo 255 after each byte, by hand: 79 163 22 129 129 130 130 135 135
-// 135 135 135 8 10 133 3, and their own: 79 242 9 138 12 142 17 152 32 167 47 182 190 200 78 81.
+// An empty document in JSON. The sums modulo 256 after each byte, by hand: 79 163 21 128 128 129 129 134 134
+// 134 134 134 6 8 131 0, and their own: 79 242 7 135 7 136 9 143 21 155 33 167 173 181 56 56.
 TEST(OpenTrackIo, APacketHasTheBytesOfItsDescription) {
   const PacketBytes by_hand =
-      packet_of({'O', 'T', 'r', 'k', 0, 1, 0, 5, 0, 0, 0, 0, 0x80, 2, 81, 3, '{', '}'});
+      packet_of({'O', 'T', 'r', 'k', 0, 1, 0, 5, 0, 0, 0, 0, 0x80, 2, 56, 0, '{', '}'});
   TrackSegment segment;
   segment.encoding = 1;
   segment.sequence = 5;
@@ -58,6 +58,14 @@ TEST(OpenTrackIo, APacketHasTheBytesOfItsDescription) {
     EXPECT_FALSE(read_track_segment(wrong)) << i;
     EXPECT_FALSE(read_track_segment(std::span(by_hand).first(i))) << i;
   }
+}
+
+// Version 1.0.0 sums modulo 255, 1.0.1 modulo 256; nobody sums the payload alone, or anything else.
+TEST(OpenTrackIo, ChecksumsOfBothVersionsAreRead) {
+  const std::string json = sample(transform("{\"x\":1,\"y\":2,\"z\":3}", kAtRest));
+  for (const uint32_t modulus : {255u, 256u})
+    EXPECT_TRUE(read_track_segment(opentrackio(json, {.modulus = modulus}))) << modulus;
+  EXPECT_FALSE(read_track_segment(opentrackio(json, {.modulus = 254})));
 }
 
 // +Z is up and a camera at rest looks along +Y, so +X is to its right. Pan turns about +Z to the left, tilt
@@ -156,10 +164,30 @@ TEST(OpenTrackIo, TimecodesHaveARateOfTheirOwn) {
   const std::string at = "\"hours\":10,\"minutes\":1,\"seconds\":0,\"frames\":";
   EXPECT_EQ(told(at + "2," + drop), make_timecode({10, 1, 0, 2}, {30'000, 1001}, true).value());
   EXPECT_THAT(parser->describe(), Contains("timecode 10:01:00;02"));
+  EXPECT_EQ(told(at + "4,\"format\":{\"frameRate\":{\"num\":25,\"denom\":1}}"),
+            make_timecode({10, 1, 0, 4}, {25, 1}, false).value())
+      << "as it was before version 1.0";
   EXPECT_FALSE(told(at + "1," + drop)) << "a number that is left out";
   EXPECT_FALSE(told(at + "1")) << "no timecode counts 240 frames a second";
   EXPECT_FALSE(told(at + "1.5," + drop));
   EXPECT_FALSE(told("\"hours\":10," + drop));
+}
+
+TEST(OpenTrackIo, AClockThatRunsFreeIsSaidOnce) {
+  const auto parser = live_parser_of("opentrackio");
+  const auto notes_of = [&](const std::string& fields) {
+    (void)only_pose(*parser, opentrackio(sample(transform("{\"x\":0,\"y\":0,\"z\":0}", kAtRest),
+                                                ",\"timing\":{\"synchronization\":{" + fields + "}}")));
+    return parser->take_notes();
+  };
+  EXPECT_THAT(notes_of("\"locked\":true,\"source\":\"ptp\""), IsEmpty());
+  EXPECT_THAT(parser->describe(), Contains("locked to ptp"));
+  EXPECT_THAT(notes_of("\"locked\":false,\"source\":\"ptp\""),
+              ElementsAre("the tracker is not locked to ptp"));
+  EXPECT_THAT(notes_of("\"locked\":false,\"source\":\"ptp\""), IsEmpty());
+  EXPECT_THAT(notes_of(""), IsEmpty());
+  EXPECT_THAT(notes_of("\"locked\":true,\"source\":\"ptp\""),
+              ElementsAre("the tracker is locked again to ptp"));
 }
 
 TEST(OpenTrackIo, NumbersGoOnWhereSixteenBitsBeginAnew) {
@@ -257,6 +285,32 @@ TEST(OpenTrackIo, WhatIsSentComesBack) {
     EXPECT_NEAR(static_cast<double>(*a.source_time_ns), 1e7 * i, 1.0);
   }
   EXPECT_THAT(of_cbor->describe(), Contains("59.940 samples a second"));
+}
+
+/// Timecode, recording and slate, of all rates; a datagram of one Ethernet frame has room for all of it.
+TEST(OpenTrackIo, WhatIsSentTellsTimecodeAndTake) {
+  constexpr size_t kEthernetPayload = 1472;
+  for (const char* count : {"23.976", "24", "25", "29.97", "29.97df", "30", "50", "59.94df", "60"}) {
+    SCOPED_TRACE(count);
+    const auto parser = live_parser_of("opentrackio");
+    MocapMoment moment{1.7e9, {{-1.23456789012345, 1.6, -0.2}, {}}, {}, 70'000, 60'000.0 / 1001.0, 200};
+    moment.timecode = advanced(parse_timecode_count(count).value(), 1e6);
+    moment.is_recording = true;
+    moment.slate = std::string(60, 'A');
+    const PacketBytes packet = find_mocap_encoding("opentrackio")->encode(moment);
+    EXPECT_LT(packet.size(), kEthernetPayload);
+    const LivePacket read = test::parsed(*parser, packet);
+    ASSERT_EQ(read.poses.size(), 1u);
+    EXPECT_EQ(read.poses[0].timecode, moment.timecode);
+    ASSERT_TRUE(read.take);
+    EXPECT_EQ(read.take->slate, moment.slate);
+    const std::string text(reinterpret_cast<const char*>(packet.data()), packet.size());
+    EXPECT_THAT(text, HasSubstr("\"sampleRate\":{\"num\":60000,\"denom\":1001}"));
+    // What the flag was is known from here on.
+    moment.is_recording = false;
+    const auto ended = test::parsed(*parser, find_mocap_encoding("opentrackio")->encode(moment)).take;
+    EXPECT_TRUE(ended && !ended->is_wanted);
+  }
 }
 
 }  // namespace

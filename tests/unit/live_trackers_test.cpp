@@ -3,6 +3,7 @@
 // its crown points.
 #include <cmath>
 
+#include "common/motion/mocap_packet.h"
 #include "server/input/live/live_parser.h"
 #include "tests/support/live_packets.h"
 #include "tests/support/live_poses.h"
@@ -121,8 +122,9 @@ TEST(FreedParser, TurnsACameraAsTheManualSays) {
   EXPECT_EQ(pose.subject, "7");
   EXPECT_TRUE(test::is_near(pose.world_from_subject.position_m, {-1.0, 1.5, 2.0}));
   expect_turned(pose, {-40 * kDegree, 15 * kDegree, -25 * kDegree});
-  EXPECT_THAT(parser->describe(), ElementsAre("camera 7", "pan 40.000 tilt 15.000 roll -25.000 degrees",
-                                              "x 1000.00 y 2000.00 height 1500.00 mm", "zoom 0 focus 0"));
+  EXPECT_THAT(parser->describe(),
+              ElementsAre("camera 7", "pan 40.000 tilt 15.000 roll -25.000 degrees",
+                          "x 1000.00 y 2000.00 height 1500.00 mm", "zoom 0 focus 0", "spare word 0"));
   const auto swapped = live_parser_of("freed", "tilt-pan-roll");
   packet.angle_deg = {15, 40, -25};
   expect_turned(only_pose(*swapped, test::freed(packet)), {-40 * kDegree, 15 * kDegree, -25 * kDegree});
@@ -141,7 +143,39 @@ TEST(FreedParser, ReadsTheNumbersOfTheManual) {
   (void)only_pose(*parser, writer.put(static_cast<uint8_t>(sum)).bytes());
   EXPECT_THAT(parser->describe(),
               ElementsAre("camera 2", "pan -180.000 tilt 90.000 roll -1.000 degrees",
-                          "x -1.00 y 1.00 height -131072.00 mm", "zoom 515 focus 263430"));
+                          "x -1.00 y 1.00 height -131072.00 mm", "zoom 515 focus 263430", "spare word 0"));
+}
+
+// The word is its sender's own: it is timecode where somebody says so. 65,536 frames of 25 a second are 43
+// min 41 s and 11 frames.
+TEST(FreedParser, TheSpareWordCountsFramesWhereItIsSaid) {
+  const auto timecode_of = [](LiveParser& parser, uint16_t spare) {
+    return only_pose(parser, test::freed({.spare = spare})).timecode;
+  };
+  EXPECT_FALSE(timecode_of(*live_parser_of("freed"), 1000));
+  const auto parser = live_parser_of("freed", "pan-tilt-roll/25");
+  const auto at = [](TimecodeFields fields) { return make_timecode(fields, {25, 1}, false).value(); };
+  EXPECT_EQ(timecode_of(*parser, 65'535), at({0, 43, 41, 10}));
+  EXPECT_THAT(parser->describe(), testing::Contains("spare word 65535, timecode 00:43:41:10"));
+  EXPECT_EQ(timecode_of(*parser, 0), at({0, 43, 41, 11})) << "it goes on";
+  EXPECT_EQ(timecode_of(*parser, 65'534), at({0, 43, 41, 9})) << "one that was late";
+  EXPECT_EQ(timecode_of(*live_parser_of("freed", "/29.97df"), 1800),
+            make_timecode({0, 1, 0, 2}, {30'000, 1001}, true).value());
+  // As it is sent, and back.
+  MocapMoment moment;
+  moment.timecode = at({0, 10, 0, 3});
+  EXPECT_EQ(only_pose(*live_parser_of("freed", "/25"), find_mocap_encoding("freed")->encode(moment)).timecode,
+            moment.timecode);
+  const auto refusal = [](const char* protocol, const char* axes) {
+    LiveParserConfig config;
+    config.protocol = protocol;
+    config.axis_order = axes;
+    const auto refused = make_live_parser(config);
+    return refused ? "it was made" : refused.error().to_string();
+  };
+  EXPECT_THAT(refusal("freed", "/26"), HasSubstr("frames of the spare word"));
+  EXPECT_THAT(refusal("freed", "roll/25"), HasSubstr("pan-tilt-roll"));
+  EXPECT_THAT(refusal("opentrack", "xyz-ypr/25"), HasSubstr("xyz-ypr/25"));
 }
 
 TEST(FreedParser, RefusesWrongChecksumsAndOtherSizes) {

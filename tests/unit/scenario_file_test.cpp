@@ -20,7 +20,8 @@ TEST(ScenarioFile, ReadsActionsInOrderWithTheirLines) {
 about: "a promise"
 limit_s: 12.5
 repeat: 2
-do { start { scene: "../scenes/minimal.textproto" set: "substeps=2" lockstep: true relay: true option: "--sim-device" } }
+do { start { scene: "../scenes/minimal.textproto" set: "substeps=2" lockstep: true relay: true record: true
+  option: "--sim-device" } }
 do { feed { motion: "walk.bvh" wind: "steady" wind_mps { x: 2 } from_s: 1.5 } }
 do { step: 240 }
 do { run_s: 0.5 }
@@ -38,21 +39,24 @@ do { expect { viewer: "thin" stretch_below: 0.01 no_quarantine: true hash: "00ff
   slow_motion: false realtime_below: 0.5 feed_pace_within: 0.1 head_mps_below: 12 within_s: 3 } }
 do { send { port: 39541 hex: "00 fF" hex: "7f" file: "packet.bin" random_bytes: 9 count: 3 rate_hz: 50 } }
 do { link { viewer: "thin" fault: HALF_OPEN loss: 0.05 delay_ms: 20 link_mbit: 3 } }
-do { expect { hash_file: "kept.txt" } }
+do { expect { hash_file: "kept.txt" order_above: 0.5 incoherent_below: 0.4 cpu_share_below: 1.5 } }
+do { disk { full_at_mb: 2.5 } }
+do { disk { } }
 )");
   ASSERT_TRUE(scenario) << scenario.error().to_string();
   EXPECT_EQ(scenario->name, "all");
   EXPECT_EQ(scenario->about, "a promise");
   EXPECT_EQ(scenario->limit_s, 12.5);
   EXPECT_EQ(scenario->repeat, 2u);
-  ASSERT_EQ(scenario->actions.size(), 14u);
+  ASSERT_EQ(scenario->actions.size(), 16u);
   EXPECT_EQ(scenario->actions[0].line, 5);
-  EXPECT_EQ(scenario->actions[10].line, 16);
+  EXPECT_EQ(scenario->actions[10].line, 17);
   const auto& start = std::get<ScenarioStart>(scenario->actions[0].work);
   EXPECT_EQ(start.scene, "/scenes/minimal.textproto") << "from the scenario's folder";
   EXPECT_EQ(start.overrides, std::vector<std::string>{"substeps=2"});
   EXPECT_TRUE(start.is_lockstep);
   EXPECT_TRUE(start.has_relay);
+  EXPECT_TRUE(start.records);
   EXPECT_EQ(start.options, std::vector<std::string>{"--sim-device"});
   const auto& feed = std::get<ScenarioFeed>(scenario->actions[1].work);
   EXPECT_EQ(feed.motion, "/folder/walk.bvh");
@@ -99,7 +103,13 @@ do { expect { hash_file: "kept.txt" } }
   EXPECT_EQ(link.loss, 0.05);
   EXPECT_EQ(link.delay_ms, 20.0);
   EXPECT_EQ(link.link_mbit, 3.0);
-  EXPECT_EQ(std::get<ScenarioExpect>(scenario->actions[13].work).hash_file, "/folder/kept.txt");
+  const auto& hair = std::get<ScenarioExpect>(scenario->actions[13].work);
+  EXPECT_EQ(hair.hash_file, "/folder/kept.txt");
+  EXPECT_EQ(hair.order_above, 0.5);
+  EXPECT_EQ(hair.incoherent_below, 0.4);
+  EXPECT_EQ(hair.cpu_share_below, 1.5);
+  EXPECT_EQ(std::get<ScenarioDisk>(scenario->actions[14].work).full_at_mb, 2.5);
+  EXPECT_FALSE(std::get<ScenarioDisk>(scenario->actions[15].work).full_at_mb);
 }
 
 TEST(ScenarioFile, SaysWhereItIsWrong) {
@@ -185,7 +195,7 @@ TEST(ScenarioFile, EveryShippedScenarioParses) {
       EXPECT_TRUE(std::filesystem::exists(expect->picture->golden)) << expect->picture->golden;
     }
   }
-  EXPECT_EQ(names.size(), 14u);
+  EXPECT_EQ(names.size(), 15u);
   const auto example = load_scenario(std::filesystem::path(STRANDCAST_SOURCE_DIR) /
                                      "examples/ci/same_as_last_release.textproto");
   EXPECT_TRUE(example) << example.error().to_string();

@@ -440,6 +440,8 @@ TEST(MocapOptions, AreInputsOfTheScene) {
             (Inputs{{.protocol = "vmc"}, {.protocol = "freed", .port = 40001, .delay_ms = 20}}));
   EXPECT_EQ(live_of({"--set", "live.0.protocol=vmc", "--set", "live.0.turns_only=true"}).value(),
             (Inputs{{.protocol = "vmc", .turns_only = true}}));
+  EXPECT_EQ(live_of({"--mocap", "freed", "--mocap-timecode", "25"}).value(),
+            (Inputs{{.protocol = "freed", .axes = "/25"}}));
   // Those of the command line are instead of the scene's, and what is set is set of them.
   EXPECT_EQ(live_of({"--set", "live.0.turns_only=true", "--mocap", "opentrack"}).value(),
             (Inputs{{.protocol = "opentrack", .turns_only = true}}));
@@ -464,6 +466,7 @@ TEST(MocapOptions, WhatIsWrongIsOneSentence) {
   EXPECT_THAT(sentence({"--mocap", ""}), HasSubstr("no protocol"));
   EXPECT_THAT(sentence({"--mocap", "vrpn://"}), HasSubstr("no host"));
   EXPECT_THAT(sentence({"--mocap", "opentrack", "--mocap-axes", "sideways"}), HasSubstr("xyz-ypr"));
+  EXPECT_THAT(sentence({"--mocap", "freed", "--mocap-timecode", "26"}), HasSubstr("spare word"));
   EXPECT_THAT(sentence({"--mocap-subject", "Zoe"}), HasSubstr("--mocap"));
   EXPECT_THAT(sentence({"--mocap", "vmc", "--mocap-allow", "10.0.0.0/33"}), HasSubstr("--mocap-allow"));
   EXPECT_THAT(sentence({"--set", "live.0.delay_ms=5"}), HasSubstr("live.0.protocol"));

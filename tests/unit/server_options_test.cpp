@@ -11,7 +11,7 @@ inline void tell(FieldTexts& told, const std::string& where, const UpstreamOptio
   OPTION_FIELDS(all, address, token_path, tls_authorities, head);
 }
 inline void tell(FieldTexts& told, const std::string& where, const MocapOptions& all) {
-  OPTION_FIELDS(all, inputs, subject, axes, scale);
+  OPTION_FIELDS(all, inputs, subject, axes, timecode, scale);
 }
 inline void tell(FieldTexts& told, const std::string& where, const TlsFiles& all) {
   OPTION_FIELDS(all, certificate, key);
@@ -53,8 +53,11 @@ inline void tell(FieldTexts& told, const std::string& where, const NetConfig& al
 inline void tell(FieldTexts& told, const std::string& where, const Timecode& all) {
   told[where + "count"] = fmt::format("{}{}", frame_rate_text(all.rate.hz()), all.is_drop ? "df" : "");
 }
+inline void tell(FieldTexts& told, const std::string& where, const StageClock& all) {
+  told[where + "name"] = all.name();
+}
 inline void tell(FieldTexts& told, const std::string& where, const ServerConfig& all) {
-  OPTION_FIELDS(all, scene, net, sim_device, gl_device, renderer, shader_folder, on_publish, timecode,
+  OPTION_FIELDS(all, scene, net, sim_device, gl_device, renderer, shader_folder, on_publish, timecode, clock,
                 is_lockstep, trace_path, make_painter, is_drawn_by_processors, make_source, fallback_codec,
                 live_allowed, sends, record, record_folder, tap, shared);
 }
@@ -102,6 +105,7 @@ const OptionRow kSceneRows[] = {
     {"--explain", {"x.textproto"}, {{"is_explaining", "true"}, {"scene_path", "x.textproto"}}},
     {"--frame-viewers", {"3"}, {{"explained_frame_viewers", "3"}}},
     {"--print-scene", {}, {{"is_printing_scene", "true"}}},
+    {"--mocap-timecode", {"25"}, {{"mocap.timecode", "25"}}, {"--mocap", "freed"}},
     {"--mocap", {"vmc", "--mocap", "freed:5"}, {{"mocap.inputs", "vmc freed:5"}}},
     {"--mocap-subject", {"Zoe"}, {{"mocap.subject", "Zoe"}}, {"--mocap", "vmc"}},
     {"--mocap-axes", {"ypr-xyz"}, {{"mocap.axes", "ypr-xyz"}}, {"--mocap", "vmc"}},
@@ -172,6 +176,7 @@ const OptionRow kRunRows[] = {
     {"--log-level", {"debug"}, {{"log_level", "debug"}}},
     {"--log-format", {"json"}, {{"has_json_log", "true"}}},
     {"--timecode", {"29.97df"}, {{"config.timecode", "some"}, {"config.timecode.count", "29.97df"}}},
+    {"--timecode-clock", {"utc"}, {{"config.clock.name", "utc"}}},
     {"--trace", {"t.csv"}, {{"config.trace_path", "t.csv"}}},
     {"--lockstep", {}, {{"config.is_lockstep", "true"}}},
     {"--seconds", {"2.5"}, {{"run_s", "2.5"}}},

@@ -32,7 +32,9 @@ TEST(FrameRate, IsReadAsPeopleWriteIt) {
                                                       {"48/2", {24, 1}},
                                                       {"59.94006", {60000, 1001}},
                                                       {"1234567/12345.67", {100, 1}},
-                                                      {"0.001", {1, 1000}}}) {
+                                                      {"0.001", {1, 1000}},
+                                                      {"0.000001", {1, 1'000'000}},
+                                                      {"1/500000", {1, 500'000}}}) {
     ASSERT_TRUE(rate(text)) << text;
     EXPECT_EQ(*rate(text), exact) << text;
   }
@@ -41,13 +43,14 @@ TEST(FrameRate, IsReadAsPeopleWriteIt) {
     ASSERT_FALSE(rate(text)) << text;
     EXPECT_THAT(rate(text).error().message, HasSubstr("24000/1001")) << text;
   }
-  for (const char* text : {"0", "-24", "240.5", "10000000000", "0.0001", "24/-1", "-24/-1", "0/1"}) {
+  for (const char* text : {"0", "-24", "240.5", "10000000000", "0.0000001", "24/-1", "-24/-1", "0/1"}) {
     ASSERT_FALSE(rate(text)) << text;
-    EXPECT_THAT(rate(text).error().message, HasSubstr("0.001 to 240 are possible")) << text;
+    EXPECT_THAT(rate(text).error().message, HasSubstr("0.000001 to 240 are possible")) << text;
   }
   EXPECT_EQ(frame_rate_text(24000.0 / 1001.0), "23.976");
   EXPECT_EQ(frame_rate_text(119.88011988), "119.88");
   EXPECT_EQ(frame_rate_text(30.0), "30");
+  EXPECT_EQ(frame_rate_text(0.0001), "0.0001");
 }
 
 struct Count {

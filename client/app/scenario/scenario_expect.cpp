@@ -25,18 +25,6 @@ constexpr size_t kMaxExpectedChars = 300;
 constexpr double kRefusalTimeoutS = 10.0;
 constexpr size_t kHashChars = 16;
 
-/// The value of a line of /metrics; none where there is no such line.
-std::vector<double> find_metric(const std::string& text, const std::string& name) {
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) {
-    if (!line.starts_with(name + " ")) continue;
-    double value = 0.0;
-    const char* begin = line.data() + name.size() + 1;
-    if (std::from_chars(begin, line.data() + line.size(), value).ec == std::errc()) return {value};
-  }
-  return {};
-}
-
 std::string wanted_text(const ScenarioMetric& metric) {
   std::string text;
   const auto add = [&](const char* word, const std::optional<double>& value) {
@@ -71,6 +59,18 @@ const char* name_of(ScenarioInput input) {
   return kNames[static_cast<size_t>(input)];
 }
 
+/// What shows a stretch as small as `limit`, where this bound shows `grain` and no less.
+std::string hint_of_bound(double bound_m, double grain, double limit) {
+  constexpr auto kFinestM = static_cast<double>(kMinBoundM);
+  constexpr double kRoom = 0.9;  // for rounding
+  const double wanted_m = bound_m * limit / grain * kRoom;
+  if (wanted_m >= kFinestM)
+    return fmt::format("set: \"stream.bound_m={:.7f}\" shows so little; over a thin link, a faster one too",
+                       wanted_m);
+  return fmt::format("no stream.bound_m shows so little: the finest, {:.6f}, shows {:.2g}", kFinestM,
+                     grain * kFinestM / bound_m);
+}
+
 std::string hash_text(const std::optional<uint64_t>& hash) {
   return hash ? fmt::format("{:016x}", *hash) : std::string("none");
 }
@@ -87,6 +87,17 @@ bool lies_below(const std::filesystem::path& path, const std::filesystem::path& 
 }
 
 }  // namespace
+
+std::vector<double> find_metric(const std::string& text, const std::string& name) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with(name + " ")) continue;
+    double value = 0.0;
+    const char* begin = line.data() + name.size() + 1;
+    if (std::from_chars(begin, line.data() + line.size(), value).ec == std::errc()) return {value};
+  }
+  return {};
+}
 
 Result<Image> draw(const ViewerPicture& picture, RenderSize size) {
   if (picture.mode == StreamMode::Frames && picture.image != nullptr) return *picture.image;
@@ -118,11 +129,13 @@ Result<ScenarioViewer*> ScenarioRun::viewer(const std::string& name) const {
 Status ScenarioRun::carry_out(const ScenarioExpect& expect) {
   const bool needs_viewer = expect.stretch_below || expect.picture || expect.kbit_below ||
                             expect.bits_per_vertex_below || expect.hz_above || expect.back_within_s ||
-                            expect.head_mps_below || !expect.mode.empty();
+                            expect.head_mps_below || expect.order_above || expect.incoherent_below ||
+                            !expect.mode.empty();
   if (needs_viewer) RETURN_IF_ERROR(viewer(expect.viewer));
   const bool needs_span = expect.stretch_below || expect.kbit_below || expect.bits_per_vertex_below ||
                           expect.hz_above || expect.realtime_above || expect.realtime_below ||
-                          expect.feed_pace_within || expect.head_mps_below;
+                          expect.feed_pace_within || expect.head_mps_below || expect.order_above ||
+                          expect.incoherent_below || expect.cpu_share_below;
   if (needs_span && !span_)
     return make_error(ErrorCode::BadInput, "nothing was measured: a step or run_s comes first");
   if (needs_span) expect_span(expect);
@@ -155,6 +168,7 @@ void ScenarioRun::expect_span(const ScenarioExpect& expect) {
            now.strand_frames > seen.before.strand_frames &&
                seen.after.largest_head_mps < *expect.head_mps_below);
   if (expect.stretch_below) expect_stretch(name, seen, *expect.stretch_below);
+  if (expect.order_above || expect.incoherent_below) expect_coherence(expect);
   add_guide(&TraceSample::stretch, "below", expect.stretch_below);
   add_guide(&TraceSample::hz, "above", expect.hz_above);
   add_guide(&TraceSample::kbit, "below", expect.kbit_below);
@@ -198,6 +212,13 @@ void ScenarioRun::expect_pace(const ScenarioExpect& expect) {
   if (expect.realtime_below)
     report("simulated over real time", fmt::format("below {:g}", *expect.realtime_below), measured,
            span_->realtime >= 0.0 && span_->realtime < *expect.realtime_below);
+  if (expect.cpu_share_below)
+    report("processor share of the server",
+           fmt::format("below {:g} of one processor", *expect.cpu_share_below),
+           span_->cpu_share < 0.0 ? std::string("the server does not say what it takes")
+                                  : fmt::format("measured {:.3f}", span_->cpu_share),
+           span_->cpu_share >= 0.0 && span_->cpu_share < *expect.cpu_share_below,
+           "strandcast-server --explain says what costs most");
   if (!expect.feed_pace_within) return;
   const bool is_measured = span_->feed_pace >= 0.0 && span_->realtime >= 0.0;
   report("what is fed beside the simulation", fmt::format("within {:g}", *expect.feed_pace_within),
@@ -250,14 +271,34 @@ void ScenarioRun::expect_stretch(const std::string& name, const MeasuredSpan::Se
   std::string detail;
   if (has_seen && !has_passed) {
     const StretchPlace& place = seen.after.stretch_place;
-    detail =
-        fmt::format("at strand {}, from vertex {} to {}, {:.3f} s (state {}): {}", place.strand, place.vertex,
-                    place.vertex + 1, place.time_s, place.tick,
-                    is_too_fine ? fmt::format("a stream.bound_m that is {:.0f} times finer shows so little",
-                                              std::floor(grain / limit) + 1.0)
-                                : std::string("more substeps, or quality=full, stretch hair less"));
+    detail = fmt::format("at strand {}, from vertex {} to {}, {:.3f} s (state {}): {}", place.strand,
+                         place.vertex, place.vertex + 1, place.time_s, place.tick,
+                         is_too_fine ? hint_of_bound(seen.after.bound_m, grain, limit)
+                                     : std::string("more substeps, or quality=full, stretch hair less"));
   }
   report("stretch of " + name, fmt::format("below {:g}", limit), measured, has_passed, detail);
+}
+
+/// Of the last two states that it decoded.
+void ScenarioRun::expect_coherence(const ScenarioExpect& expect) {
+  const ScenarioViewer& who = **viewer(expect.viewer);
+  const std::string& name = who.view().name;
+  const auto coherence = who.coherence();
+  const auto told = [&](const double share) {
+    return coherence
+               ? fmt::format("measured {:.3f} (hair moves at {:.3f} m/s)", share, coherence->motion_mps())
+               : std::string("fewer than two states were decoded");
+  };
+  if (expect.order_above) {
+    const double order = coherence ? coherence->order() : 0.0;
+    report("order of hair seen by " + name, fmt::format("above {:g}", *expect.order_above), told(order),
+           coherence && order > *expect.order_above, "hair that sticks together (volume) keeps its order");
+  }
+  if (!expect.incoherent_below) return;
+  const double share = coherence ? coherence->incoherent_share() : 0.0;
+  report("incoherent motion of hair seen by " + name, fmt::format("below {:g}", *expect.incoherent_below),
+         told(share), coherence && share < *expect.incoherent_below,
+         "a finer stream.bound_m rounds less; hair that sticks together (volume) moves together");
 }
 
 /// Compares with the hash that a file has, or writes it there.
@@ -372,10 +413,10 @@ void ScenarioRun::expect_metric(const ScenarioMetric& metric) {
   std::string measured;
   const bool has_passed = await(metric.within_s, [&] {
     const auto text = metrics();
-    const std::vector<double> found = text ? find_metric(*text, metric.name) : std::vector<double>();
-    measured = !text           ? text.error().to_string()
-               : found.empty() ? std::string("there is no such line in /metrics")
-                               : fmt::format("is {:g}", found.front());
+    if (!text) return measured = text.error().to_string(), false;
+    const std::vector<double> found = find_metric(*text, metric.name);
+    measured = found.empty() ? std::string("there is no such line in /metrics")
+                             : fmt::format("is {:g}", found.front());
     return !found.empty() && holds(metric, found.front());
   });
   report(metric.name, wanted_text(metric), measured, has_passed);

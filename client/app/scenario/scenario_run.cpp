@@ -29,11 +29,25 @@ constexpr milliseconds kRelayPoll{50};
 constexpr milliseconds kHttpTimeout{3'000};
 constexpr double kTraceS = 0.25;
 constexpr double kLifetimeMarginS = 30.0;
+constexpr double kBytesPerMb = 1e6;
+
+template <class Test>
+bool any_work(const Scenario& scenario, const Test& test) {
+  return std::any_of(scenario.actions.begin(), scenario.actions.end(),
+                     [&](const ScenarioAction& action) { return test(action.work); });
+}
 
 }  // namespace
 
 ScenarioRun::ScenarioRun(const Scenario& scenario, ScenarioOptions options, CheckListener listener)
-    : scenario_(scenario), options_(std::move(options)), listener_(std::move(listener)), begin_ns_(now_ns()) {
+    : scenario_(scenario),
+      options_(std::move(options)),
+      listener_(std::move(listener)),
+      begin_ns_(now_ns()),
+      measures_cpu_(any_work(scenario, [](const ScenarioWork& work) {
+        const auto* expect = std::get_if<ScenarioExpect>(&work);
+        return expect != nullptr && expect->cpu_share_below.has_value();
+      })) {
   result_.name = scenario.name;
   result_.about = scenario.about;
 }
@@ -88,6 +102,9 @@ Status ScenarioRun::carry_out(const ScenarioStart& start) {
   for (const std::string& assignment : start.overrides)
     config.arguments.insert(config.arguments.end(), {"--set", assignment});
   if (start.is_lockstep) config.arguments.emplace_back("--lockstep");
+  if (start.records)
+    config.arguments.insert(config.arguments.end(),
+                            {"--record", (folder_ / "run.mcap").string(), "--record-replace"});
   config.arguments.insert(config.arguments.end(), start.options.begin(), start.options.end());
   server_ = std::make_unique<ServerProcess>(std::move(config));
   RETURN_IF_ERROR(server_->start(std::min(left_s(), kStartTimeoutS), *options_.stop));
@@ -308,8 +325,19 @@ Status ScenarioRun::carry_out(const ScenarioSend& send) {
   return {};
 }
 
+/// Processor time that the server has taken; -1 where nothing is expected of it, or it does not say.
+double ScenarioRun::server_cpu_s() {
+  if (!measures_cpu_) return -1.0;
+  const auto text = metrics();
+  if (!text) return -1.0;
+  const std::vector<double> found = find_metric(*text, "process_cpu_seconds_total");
+  return found.empty() ? -1.0 : found.front();
+}
+
 void ScenarioRun::begin_span() {
   span_.emplace();
+  span_cpu_s_ = server_cpu_s();
+  span_begin_s_ = elapsed_s();
   for (const auto& [name, viewer] : viewers_) {
     viewer->begin_measure();
     span_->viewers[name].before = viewer->look().counts;
@@ -319,6 +347,9 @@ void ScenarioRun::begin_span() {
 void ScenarioRun::end_span(double seconds, double realtime) {
   span_->seconds = seconds;
   span_->realtime = realtime;
+  const double cpu_s = server_cpu_s();
+  if (cpu_s >= span_cpu_s_ && span_cpu_s_ >= 0.0)
+    span_->cpu_share = (cpu_s - span_cpu_s_) / std::max(elapsed_s() - span_begin_s_, 1e-6);
   for (auto& [name, seen] : span_->viewers)
     if (const auto found = viewers_.find(name); found != viewers_.end()) seen.after = found->second->look();
 }
@@ -399,15 +430,23 @@ Status ScenarioRun::carry_out(const ScenarioLink& link) {
   return {};
 }
 
+Status ScenarioRun::carry_out(const ScenarioDisk& disk) {
+  if (server_ == nullptr)
+    return make_error(ErrorCode::BadInput,
+                      "the disk of a server that was not started by the scenario is not filled");
+  std::optional<uint64_t> most_bytes;
+  if (disk.full_at_mb) most_bytes = static_cast<uint64_t>(*disk.full_at_mb * kBytesPerMb);
+  return server_->limit_files(most_bytes);
+}
+
 Status ScenarioRun::carry_out(const ScenarioView& view) {
   if (viewers_.contains(view.name))
     return make_error(ErrorCode::BadInput, "there is a viewer '{}' already", view.name);
   ASSIGN_OR_RETURN(ClientConfig config, config_for(Role::Viewer));
   // Each of these stands alone: what was sent before does not show in it.
   if (is_lockstep_) config.hello.picture_codecs = codec_bit(PictureCodec::Jpeg);
-  const bool changes =
-      std::any_of(scenario_.actions.begin(), scenario_.actions.end(),
-                  [](const auto& action) { return std::holds_alternative<ScenarioLink>(action.work); });
+  const bool changes = any_work(
+      scenario_, [](const ScenarioWork& work) { return std::holds_alternative<ScenarioLink>(work); });
   const LinkUse use = changes ? LinkUse::Changes : LinkUse::Stays;
   auto viewer = ScenarioViewer::join(view, config, use);
   // A relay listens before it has found its server.

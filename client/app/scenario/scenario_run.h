@@ -36,6 +36,7 @@ struct MeasuredSpan {
   double seconds = 0.0;     // simulated where it was stepped, else real
   double realtime = -1.0;   // -1 = not measured
   double feed_pace = -1.0;  // motion time per real time; likewise
+  double cpu_share = -1.0;  // of one processor, by the server; likewise
   struct Seen {
     ViewerCounts before;
     ViewerLook after;
@@ -72,6 +73,7 @@ class ScenarioRun {
   Status carry_out(const ScenarioRefusal& refusal);
   Status carry_out(const ScenarioSend& send);
   Status carry_out(const ScenarioLink& link);
+  Status carry_out(const ScenarioDisk& disk);
   Status start_relay();
   Status restart_server();
   void begin_absence(const std::string& viewer);
@@ -86,6 +88,7 @@ class ScenarioRun {
 
   Status step_chunk(uint64_t tick);
   void await_viewers(uint64_t tick, double patience_s);
+  double server_cpu_s();
   void begin_span();
   void end_span(double seconds, double realtime);
   void trace();
@@ -101,6 +104,7 @@ class ScenarioRun {
   void expect_metric(const ScenarioMetric& metric);
   void expect_back(const ScenarioExpect& expect);
   void expect_pace(const ScenarioExpect& expect);
+  void expect_coherence(const ScenarioExpect& expect);
   void expect_slow_motion(const ScenarioExpect& expect);
   void expect_mode(const ScenarioExpect& expect);
   /// Waits until `condition` holds; returns false if it does not within `seconds`.
@@ -142,6 +146,9 @@ class ScenarioRun {
   std::optional<SteppedFeed> stepped_feed_;
   std::unique_ptr<LiveFeed> live_feed_;
   std::optional<MeasuredSpan> span_;
+  const bool measures_cpu_;   // as something is expected of it
+  double span_cpu_s_ = -1.0;  // of the server, when the span began
+  double span_begin_s_ = 0.0;
   std::map<std::string, ViewerCounts> traced_;
   double traced_s_ = 0.0;
   /// When the server or link of a viewer was mended last, and its frames then.
@@ -152,6 +159,9 @@ class ScenarioRun {
   std::map<std::string, Absence> absences_;
   std::set<std::filesystem::path> renewed_;  // goldens
 };
+
+/// Returns the value of a line of /metrics; none where there is no such line.
+std::vector<double> find_metric(const std::string& text, const std::string& name);
 
 /// Draws what a viewer has received, as the viewer's window would.
 Result<Image> draw(const ViewerPicture& picture, RenderSize size);

@@ -102,6 +102,10 @@ void ScenarioViewer::run(LiveConnection& live) {
 void ScenarioViewer::watch(ViewerSession& session) {
   measured_asset_.reset();
   last_sim_time_ns_ = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    last_state_ = state_before_ = nullptr;
+  }
   session.set_snapshot_listener([this, &session](const auto& state) { take(session, state); });
 }
 
@@ -187,6 +191,27 @@ void ScenarioViewer::take(ViewerSession& session, const std::shared_ptr<const Sn
     look_.stretch_place.tick = state->tick;
   }
   look_.stretch_grain = grain;
+  look_.bound_m = bound_m;
+  state_before_ = std::exchange(last_state_, state);
+}
+
+std::optional<Coherence> ScenarioViewer::coherence() const {
+  std::shared_ptr<const Snapshot> before, now;
+  {
+    const std::lock_guard lock(mutex_);
+    before = state_before_;
+    now = last_state_;
+  }
+  if (before == nullptr || before->strand_count != now->strand_count ||
+      before->vertex_count != now->vertex_count || before->sim_time_ns >= now->sim_time_ns)
+    return std::nullopt;
+  const double passed_s = static_cast<double>(now->sim_time_ns - before->sim_time_ns) * kSPerNs;
+  const std::vector<glm::vec3> from_m = positions_in_head(*before), to_m = positions_in_head(*now);
+  const std::vector<glm::dvec3> position_m(to_m.begin(), to_m.end());
+  std::vector<glm::dvec3> velocity_mps(position_m.size());
+  for (size_t i = 0; i < position_m.size(); ++i)
+    velocity_mps[i] = (position_m[i] - glm::dvec3(from_m[i])) / passed_s;
+  return measure_coherence({now->strand_count, now->vertex_count, position_m, velocity_mps});
 }
 
 ViewerLook ScenarioViewer::look() const {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "client/app/viewer_session.h"
 #include "common/chaos/chaos_relay.h"
 #include "common/client/viewer_client.h"
+#include "common/math/coherence.h"
 #include "common/scene/scenario.h"
 
 namespace strandcast {
@@ -48,6 +50,7 @@ struct ViewerLook {
   double largest_stretch = 0.0;   // since begin_measure()
   StretchPlace stretch_place;     // of it
   double stretch_grain = 0.0;     // no finer than this is seen, through the bound of the stream
+  double bound_m = 0.0;           // that bound
   double largest_head_mps = 0.0;  // likewise, between two states; infinite for what is no number
   std::string codec;
 };
@@ -78,6 +81,8 @@ class ScenarioViewer {
   const ScenarioView& view() const { return view_; }
   ViewerLook look() const;
   ViewerPicture picture() const;
+  /// Measures the last state with the one before; empty before there are two of one server.
+  std::optional<Coherence> coherence() const;
   /// Restarts the measurement of the largest stretch and speed.
   void begin_measure();
   /// Puts another line in the place of the one that it has. The viewer must have joined with
@@ -105,7 +110,8 @@ class ScenarioViewer {
   Pose last_world_from_head_;
   int64_t last_sim_time_ns_ = 0;  // 0 = none
 
-  mutable std::mutex mutex_;  // guards the two below
+  mutable std::mutex mutex_;  // guards the block below
+  std::shared_ptr<const Snapshot> last_state_, state_before_;
   ViewerLook look_;
   ViewerPicture picture_;
   std::atomic<bool> is_leaving_{false};

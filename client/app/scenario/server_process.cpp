@@ -4,9 +4,11 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <chrono>
@@ -43,6 +45,8 @@ struct ChildFiles {
 /// It is told to end when the thread that made it does, whatever ends that.
 [[noreturn]] void become(const std::vector<char*>& words, const ChildFiles& files) {
   // A group of its own: Ctrl-C is for us, and we end it.
+  // A file that may not grow is an error of writing, and no end of the program.
+  signal(SIGXFSZ, SIG_IGN);
   const bool is_ready = prctl(PR_SET_PDEATHSIG, SIGTERM) == 0 && setpgid(0, 0) == 0 &&
                         dup2(files.null, STDIN_FILENO) >= 0 && dup2(files.null, STDOUT_FILENO) >= 0 &&
                         dup2(files.output, STDERR_FILENO) >= 0;
@@ -100,10 +104,24 @@ Status ServerProcess::spawn() {
     waitpid(process_, nullptr, 0);
   for (const int descriptor : {null, output, failed[0]})
     if (descriptor >= 0) close(descriptor);
-  if (failure == 0) return {};
+  if (failure == 0) return most_file_bytes_ ? apply_file_limit() : Status();
   process_ = -1;
   return make_error(ErrorCode::NotFound, "cannot start {}: {} (--server PATH names the program)",
                     config_.program.string(), std::strerror(failure));
+}
+
+Status ServerProcess::limit_files(const std::optional<uint64_t>& most_bytes) {
+  most_file_bytes_ = most_bytes;
+  return apply_file_limit();
+}
+
+Status ServerProcess::apply_file_limit() const {
+  rlimit limit{};
+  bool is_set = process_ > 0 && prlimit(process_, RLIMIT_FSIZE, nullptr, &limit) == 0;
+  limit.rlim_cur = most_file_bytes_ ? std::min<rlim_t>(*most_file_bytes_, limit.rlim_max) : limit.rlim_max;
+  is_set = is_set && prlimit(process_, RLIMIT_FSIZE, &limit, nullptr) == 0;
+  if (is_set) return {};
+  return make_error(ErrorCode::Unavailable, "cannot limit the server's files: {}", std::strerror(errno));
 }
 
 bool ServerProcess::has_ended() {

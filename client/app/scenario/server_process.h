@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,10 @@ class ServerProcess {
   /// Asks the server to end, and kills it if it does not.
   void stop();
 
+  /// Limits the size of each file of the server from now on, also after restart(); empty = none.
+  /// Unavailable where the system refuses.
+  Status limit_files(const std::optional<uint64_t>& most_bytes);
+
   bool has_ended();
   uint16_t port() const { return port_; }
   /// Returns what the server said last, for a person.
@@ -52,11 +57,13 @@ class ServerProcess {
 
  private:
   Status spawn();
+  Status apply_file_limit() const;
   Status wait_for_port(double timeout_s, const std::atomic<bool>& stop);
 
   const ServerProcessConfig config_;
   pid_t process_ = -1;  // -1 = none
   uint16_t port_ = 0;
+  std::optional<uint64_t> most_file_bytes_;
 };
 
 }  // namespace strandcast

@@ -1,5 +1,6 @@
 // FreeD, message D1, of cameras and heads in virtual production: Vinten's manual, appendix A.3.2 and B. A
-// subject is a camera's number. Angles are `pan-tilt-roll` or `tilt-pan-roll`.
+// subject is a camera's number. Angles are `pan-tilt-roll` or `tilt-pan-roll`. The spare word is the sender's
+// own; where it counts frames of timecode, their number goes on beyond 16 bits.
 #include <array>
 
 #include "common/strands/byte_io.h"
@@ -24,6 +25,7 @@ struct FreedFields {
   std::array<int32_t, 3> position{};  // x, y, height
   uint32_t zoom = 0;
   uint32_t focus = 0;
+  uint32_t spare = 0;
 };
 
 uint8_t checksum_of(std::span<const std::byte> bytes) {
@@ -49,13 +51,16 @@ FreedFields take_fields(ByteReader reader) {
   for (int32_t& position : fields.position) position = take_signed_three(reader);
   fields.zoom = take_three(reader);
   fields.focus = take_three(reader);
+  const uint32_t high = reader.take<uint8_t>();
+  fields.spare = high << 8 | reader.take<uint8_t>();
   return fields;
 }
 
 class FreedParser : public LiveParser {
  public:
   /// Which of the three angles pan and tilt are.
-  FreedParser(size_t pan_at, size_t tilt_at) : pan_at_(pan_at), tilt_at_(tilt_at) {}
+  FreedParser(size_t pan_at, size_t tilt_at, const std::optional<Timecode>& count)
+      : pan_at_(pan_at), tilt_at_(tilt_at), count_(count) {}
 
   Result<LivePacket> parse(std::span<const std::byte> bytes, int64_t) override {
     const uint8_t type = bytes.empty() ? uint8_t{0} : std::to_integer<uint8_t>(bytes.front());
@@ -79,6 +84,10 @@ class FreedParser : public LiveParser {
     LivePose& pose = packet.poses.emplace_back();
     pose.subject = fmt::format("{}", last_->camera);
     pose.world_from_subject = pose_from_freed(last_pose());
+    if (count_) {
+      newest_ = advanced(*count_, frames_.unwrapped(last_->spare));
+      pose.timecode = newest_;
+    }
     return packet;
   }
 
@@ -92,7 +101,8 @@ class FreedParser : public LiveParser {
         fmt::format("camera {}", last_->camera),
         fmt::format("pan {:.3f} tilt {:.3f} roll {:.3f} degrees", pose.pan_deg, pose.tilt_deg, pose.roll_deg),
         fmt::format("x {:.2f} y {:.2f} height {:.2f} mm", p.x, p.y, p.z),
-        fmt::format("zoom {} focus {}", last_->zoom, last_->focus)};
+        fmt::format("zoom {} focus {}", last_->zoom, last_->focus),
+        fmt::format("spare word {}{}", last_->spare, newest_ ? ", timecode " + timecode_text(*newest_) : "")};
   }
 
  private:
@@ -105,14 +115,17 @@ class FreedParser : public LiveParser {
   }
 
   size_t pan_at_, tilt_at_;
+  std::optional<Timecode> count_;
+  WrappingCount frames_;
+  std::optional<Timecode> newest_;
   std::optional<FreedFields> last_;
   uint64_t ignored_ = 0;
 };
 
 }  // namespace
 
-std::unique_ptr<LiveParser> make_freed_parser(size_t axis_order) {
-  return std::make_unique<FreedParser>(axis_order, 1 - axis_order);
+std::unique_ptr<LiveParser> make_freed_parser(size_t axis_order, const std::optional<Timecode>& count) {
+  return std::make_unique<FreedParser>(axis_order, 1 - axis_order, count);
 }
 
 }  // namespace strandcast

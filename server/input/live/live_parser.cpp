@@ -46,17 +46,33 @@ std::span<const LiveProtocol> live_protocols() {
   return kProtocols;
 }
 
+Result<Timecode> parse_timecode_count(std::string_view text) {
+  constexpr std::string_view kDrop = "df";
+  const bool is_drop = text.ends_with(kDrop);
+  if (is_drop) text.remove_suffix(kDrop.size());
+  ASSIGN_OR_RETURN(const FrameRate rate, parse_frame_rate(text));
+  return make_timecode({}, rate, is_drop);
+}
+
 Result<std::unique_ptr<LiveParser>> make_live_parser(const LiveParserConfig& config) {
   std::vector<const char*> names;
   for (const LiveProtocol& protocol : live_protocols()) names.push_back(protocol.name);
   ASSIGN_OR_RETURN(const size_t index, find_name("live protocol", config.protocol, names));
+  std::string axis_order = config.axis_order;
+  std::optional<Timecode> count;
+  if (const size_t slash = axis_order.find('/'); slash != std::string::npos && config.protocol == "freed") {
+    const auto parsed = parse_timecode_count(axis_order.substr(slash + 1));
+    if (!parsed) return at("frames of the spare word", parsed.error());
+    count = *parsed;
+    axis_order.resize(slash);
+  }
   size_t order = 0;
-  if (!config.axis_order.empty()) {
-    ASSIGN_OR_RETURN(order, find_name("axis order", config.axis_order, live_protocols()[index].axis_orders));
+  if (!axis_order.empty()) {
+    ASSIGN_OR_RETURN(order, find_name("axis order", axis_order, live_protocols()[index].axis_orders));
   }
   if (config.protocol == "vmc") return make_vmc_parser(config);
   if (config.protocol == "opentrack") return make_opentrack_parser(order);
-  if (config.protocol == "freed") return make_freed_parser(order);
+  if (config.protocol == "freed") return make_freed_parser(order, count);
   if (config.protocol == "natnet") return make_natnet_parser(order, config.protocol_version);
   if (config.protocol == "vrpn") return make_vrpn_parser(order);
   if (config.protocol == "vrchat") return make_vrchat_parser(config);

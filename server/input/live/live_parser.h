@@ -10,6 +10,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/result.h"
@@ -23,7 +24,8 @@ constexpr size_t kMaxMonitorLines = 64;
 /// How packets of a protocol are read; points on which senders and documents disagree are settings.
 struct LiveParserConfig {
   std::string protocol;    // a name of live_protocols()
-  std::string axis_order;  // one of LiveProtocol::axis_orders; empty = the first
+  std::string axis_order;  // one of LiveProtocol::axis_orders; empty = the first; freed: "ORDER/25" where its
+                           // spare word counts frames of timecode, as parse_timecode_count() reads it
   std::string
       protocol_version;  // natnet: 2.5 to 2.11, 3.0 to 4.1; empty = what the server says, or what fits
   bool ignores_zero_positions = true;  // vmc: bones whose position is zero keep the bind offset
@@ -68,6 +70,10 @@ class LiveParser {
   /// Returns sentences for the log since the last call: what the peer does that it should not, each once.
   virtual std::vector<std::string> take_notes() { return {}; }
 };
+
+/// Parses how timecode counts: a rate, with "df" behind it for drop-frame. Returns its first frame; BadInput
+/// says which rates there are.
+Result<Timecode> parse_timecode_count(std::string_view text);
 
 /// Makes a parser. NotFound lists the known protocols, axis orders or versions.
 Result<std::unique_ptr<LiveParser>> make_live_parser(const LiveParserConfig& config);

@@ -56,6 +56,8 @@ struct TrackFields {
   std::optional<Timecode> timecode;
   std::optional<bool> is_recording;
   std::string slate, status;
+  std::string synchronized_to;  // ptp, genlock, ..; empty = not told
+  bool is_locked = false;       // to that
 };
 
 /// A whole number that fits; empty for any other.
@@ -79,6 +81,7 @@ std::optional<FrameRate> rate_at(const ValueTree& tree, std::initializer_list<st
 std::optional<Timecode> timecode_of(const ValueTree& tree) {
   const ValueTree* told = find_at(tree, {"timing", "timecode"});
   auto rate = rate_at(tree, {"timing", "timecode", "frameRate"});
+  if (!rate) rate = rate_at(tree, {"timing", "timecode", "format", "frameRate"});  // before version 1.0
   if (!rate) rate = rate_at(tree, {"timing", "sampleRate"});
   if (told == nullptr || !rate) return std::nullopt;
   const auto hours = count_at(*told, {"hours"}), minutes = count_at(*told, {"minutes"});
@@ -110,6 +113,7 @@ class OpenTrackIoParser : public LiveParser {
   }
 
   uint64_t ignored() const override { return ignored_; }
+  std::vector<std::string> take_notes() override { return std::exchange(notes_, {}); }
 
   std::vector<std::string> describe() const override {
     if (!last_) return {};
@@ -128,6 +132,8 @@ class OpenTrackIoParser : public LiveParser {
     if (fields.is_recording) lines.add(*fields.is_recording ? "records" : "does not record");
     if (!fields.slate.empty()) lines.add("slate " + fields.slate);
     if (!fields.status.empty()) lines.add("status " + fields.status);
+    if (!fields.synchronized_to.empty())
+      lines.add((fields.is_locked ? "locked to " : "not locked to ") + fields.synchronized_to);
     return std::move(lines).take();
   }
 
@@ -189,6 +195,7 @@ class OpenTrackIoParser : public LiveParser {
     TrackFields fields = read_fields(*tree);
     LivePacket packet;
     packet.take = take_of(fields);
+    note_lock(fields);
     if (fields.pose) packet.poses.push_back(pose_of(fields));
     if (!fields.pose) ++ignored_;  // of a lens or a clock alone
     last_ = std::move(fields);
@@ -209,6 +216,9 @@ class OpenTrackIoParser : public LiveParser {
     fields.slate = text_at(tree, {"tracker", "slate"});
     fields.status = text_at(tree, {"tracker", "status"});
     fields.timecode = timecode_of(tree);
+    fields.synchronized_to = text_at(tree, {"timing", "synchronization", "source"});
+    if (const ValueTree* locked = find_at(tree, {"timing", "synchronization", "locked"}))
+      fields.is_locked = locked->truth().value_or(false);
     read_transforms(tree, fields);
     return fields;
   }
@@ -244,7 +254,7 @@ class OpenTrackIoParser : public LiveParser {
     pose.subject = fields.subject;
     pose.world_from_subject = fields.world_from_subject;
     pose.has_position = fields.has_position;
-    if (fields.number) pose.frame = unwrapped(*fields.number);
+    if (fields.number) pose.frame = numbers_.unwrapped(*fields.number);
     pose.timecode = fields.timecode;
     if (fields.time_s)
       pose.source_time_ns = nanoseconds_of(*fields.time_s);
@@ -253,12 +263,13 @@ class OpenTrackIoParser : public LiveParser {
     return pose;
   }
 
-  /// Goes on where a number of 16 bits begins anew.
-  uint32_t unwrapped(uint32_t number) {
-    const auto passed = static_cast<int16_t>(static_cast<uint16_t>(number - count_));
-    count_ = has_count_ && number < 0x10000 ? count_ + static_cast<uint32_t>(passed) : number;
-    has_count_ = true;
-    return count_;
+  /// Says where a tracker's clock runs free, and where it no longer does.
+  void note_lock(const TrackFields& fields) {
+    if (fields.synchronized_to.empty()) return;
+    if (fields.is_locked != is_locked_)
+      notes_.push_back(fmt::format("the tracker is {} to {}",
+                                   fields.is_locked ? "locked again" : "not locked", fields.synchronized_to));
+    is_locked_ = fields.is_locked;
   }
 
   /// What the tracker's flag asks for where it changes. A sample without the flag leaves it as it was.
@@ -273,8 +284,9 @@ class OpenTrackIoParser : public LiveParser {
   const double pan_sign_;
   Pending pending_;
   std::optional<TrackFields> last_;
-  uint32_t count_ = 0;  // of samples, without beginning anew
-  bool has_count_ = false;
+  WrappingCount numbers_;  // of samples
+  bool is_locked_ = true;  // what was said last
+  std::vector<std::string> notes_;
   uint64_t ignored_ = 0;
 };
 

@@ -15,7 +15,8 @@ namespace strandcast {
 // An axis order is an index into LiveProtocol::axis_orders.
 std::unique_ptr<LiveParser> make_vmc_parser(const LiveParserConfig& config);
 std::unique_ptr<LiveParser> make_opentrack_parser(size_t axis_order);
-std::unique_ptr<LiveParser> make_freed_parser(size_t axis_order);
+/// `count`: how the spare word counts frames; empty: it does not.
+std::unique_ptr<LiveParser> make_freed_parser(size_t axis_order, const std::optional<Timecode>& count);
 Result<std::unique_ptr<LiveParser>> make_natnet_parser(size_t axis_order, const std::string& version);
 std::unique_ptr<LiveParser> make_vrpn_parser(size_t axis_order);
 std::unique_ptr<LiveParser> make_opentrackio_parser(size_t axis_order);
@@ -36,6 +37,21 @@ inline glm::dquat quaternion_of(const glm::dvec4& xyzw) {
 
 /// Converts seconds to whole nanoseconds; empty if they are not finite or do not fit.
 std::optional<int64_t> nanoseconds_of(double seconds);
+
+/// Goes on where a number of 16 bits begins anew.
+class WrappingCount {
+ public:
+  uint32_t unwrapped(uint32_t number) {
+    const auto passed = static_cast<int16_t>(static_cast<uint16_t>(number - count_));
+    count_ = has_begun_ && number < 0x10000 ? count_ + static_cast<uint32_t>(passed) : number;
+    has_begun_ = true;
+    return count_;
+  }
+
+ private:
+  uint32_t count_ = 0;
+  bool has_begun_ = false;
+};
 
 /// A time in larger steps is worse than that of the packet's arrival.
 constexpr double kCoarsestTimeS = 0.002;

@@ -1,4 +1,4 @@
-#include "server/report/coherence.h"
+#include "common/math/coherence.h"
 
 #include <algorithm>
 #include <cmath>
