@@ -355,11 +355,8 @@ int run_feed(const CtlTarget& target, const FeedOptions& options, const std::ato
   const auto done = feed(*heads, *plan, stop, progress_listener());
   if (isatty(STDERR_FILENO) != 0) std::cerr << '\n';
   if (!done) return ctl_failure(done.error(), kRefusedExit);
-  if (done->motion_s < 0.99 * done->elapsed_s * plan->speed)
-    std::cout << fmt::format(
-        "slow motion: {:.1f} s of the motion in {:.1f} s, as slowly as the simulation (--live feeds in real "
-        "time)\n",
-        done->motion_s, done->elapsed_s);
+  if (const std::string slow = slow_motion_sentence(*done, plan->speed); !slow.empty())
+    std::cout << slow << '\n';
   std::cout << fmt::format(
       "fed {:.1f} s: {} motion and {} wind samples, at most {:.1f} ms late, {} skipped, {} unsent, {} "
       "rejected\n",

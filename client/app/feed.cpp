@@ -1,5 +1,7 @@
 #include "client/app/feed.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <thread>
@@ -16,6 +18,9 @@ using std::chrono::milliseconds;
 constexpr int64_t kSkipBehindNs = kSInNs / 20;
 constexpr milliseconds kLongestSleep{50};  // so that a stop is noticed
 constexpr milliseconds kFlushWait{250};    // less than a stop is given
+// What a simulation that begins may be late by is no slow motion, nor is a pace of this and more.
+constexpr double kLeastMissingS = 0.5;
+constexpr double kSlowMotion = 0.95;
 
 /// Sleeps until `time_ns` of now_ns()'s clock in pieces; false when stopped.
 bool sleep_until_ns(int64_t time_ns, const std::atomic<bool>& stop) {
@@ -209,6 +214,16 @@ Result<FeedProgress> feed(std::span<const std::unique_ptr<SteadyClient>> heads, 
                           const std::atomic<bool>& stop, const FeedListener& listener) {
   SessionWay way(heads);
   return Feeder(way, plan).run(stop, listener);
+}
+
+std::string slow_motion_sentence(const FeedProgress& done, double speed) {
+  const double there_s = done.elapsed_s * speed;
+  const double missing_s = there_s - done.motion_s;
+  if (missing_s <= (1.0 - kSlowMotion) * there_s || missing_s <= kLeastMissingS) return {};
+  return fmt::format(
+      "slow motion: {:.1f} s of the motion in {:.1f} s, as slowly as the simulation (--live feeds in real "
+      "time)",
+      done.motion_s, done.elapsed_s);
 }
 
 FeedProgress feed_moments(const SendMoment& send, const FeedPlan& plan, const std::atomic<bool>& stop,

@@ -61,6 +61,10 @@ struct FeedProgress {
   double outage_s = 0.0;    // without a connection, of the worst head
 };
 
+/// Returns the sentence on a feed that the simulation held up; empty where it went on in real time, but for
+/// its first moments.
+std::string slow_motion_sentence(const FeedProgress& done, double speed);
+
 /// Sends one moment of a plan where there is no server to talk to.
 using SendMoment = std::function<bool(double time_s, const Pose&, const std::optional<glm::vec3>& wind_mps)>;
 

@@ -340,6 +340,9 @@ void keep_style(v1::Scene& message, bool had_file, const std::vector<std::string
 // What hair on hair is in scenes of full quality (strandcast-report coherence shows what each does).
 constexpr double kFullFrictionPerS = 20.0;
 constexpr double kFullRepulsionPerS2 = 18'000.0;
+// Hair that was thrown over other hair lies in it more densely than in the groom, and has to get back through
+// it: what pushes at the groom's own density holds it where it was thrown.
+constexpr double kFullRestDensity = 1.5;
 // Cells as wide as a lock: finer ones cost more, and hair holds together less.
 constexpr uint32_t kFullResolution = 16;
 // Hair that is shaken needs steps no longer than this, whatever the scene's own are.
@@ -349,6 +352,7 @@ constexpr double kMostFullSubsteps = 6.0;
 void add_hair_in_air(v1::Scene& message) {
   message.mutable_volume()->set_friction_per_s(kFullFrictionPerS);
   message.mutable_volume()->set_repulsion_per_s2(kFullRepulsionPerS2);
+  message.mutable_volume()->set_rest_density_scale(kFullRestDensity);
   message.mutable_volume()->set_resolution(kFullResolution);
   message.mutable_air()->set_acts(true);
 }
@@ -520,6 +524,13 @@ Result<SceneDesc> load_scene(const std::filesystem::path& path, const std::vecto
 Result<SceneDesc> parse_scene(const std::string& text, const std::string& place,
                               const std::vector<std::string>& overrides) {
   return parse(text, place, {}, overrides);
+}
+
+Result<SceneDesc> parse_recorded_scene(const std::string& text, const std::string& place) {
+  ASSIGN_OR_RETURN(const SceneDesc chosen, parse_scene(text, place, {}));
+  ASSIGN_OR_RETURN(SceneDesc scene, parse_scene(text, place, {std::string("quality=") + kCustomQuality}));
+  scene.quality = chosen.quality;
+  return scene;
 }
 
 Result<SceneDesc> with_overrides(const SceneDesc& scene, const std::vector<std::string>& overrides) {

@@ -21,6 +21,9 @@ Result<SceneDesc> load_scene(const std::filesystem::path& path, const std::vecto
 Result<SceneDesc> parse_scene(const std::string& text, const std::string& place,
                               const std::vector<std::string>& overrides);
 
+/// Parses the text of a scene that ran, which says all: what its quality stands for is what it was then.
+Result<SceneDesc> parse_recorded_scene(const std::string& text, const std::string& place);
+
 /// Returns the built-in scene with overrides applied.
 Result<SceneDesc> built_in_scene_with(const std::vector<std::string>& overrides);
 

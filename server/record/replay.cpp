@@ -243,7 +243,7 @@ Result<std::unique_ptr<StateSource>> make_replayed(const ReplayConfig& config, R
                                                    ReplayScript& script, InputHub& inputs) {
   const RecordingStart& start = reader.start();
   SimulationConfig simulation;
-  ASSIGN_OR_RETURN(simulation.scene, parse_scene(start.scene_text, "the recording's scene", {}));
+  ASSIGN_OR_RETURN(simulation.scene, parse_recorded_scene(start.scene_text, "the recording's scene"));
   simulation.device = choose_device(config, start);
   simulation.script = &script;
   ASSIGN_OR_RETURN(auto source, make_simulation(std::move(simulation), inputs));
@@ -277,7 +277,7 @@ Result<ReplayResult> replay_recording(const ReplayConfig& config) {
   auto source = make_replayed(config, *reader, script, inputs);
   if (!source) return at(config.recording.string(), source.error());
   ASSIGN_OR_RETURN(const SceneDesc scene,
-                   parse_scene(reader->start().scene_text, "the recording's scene", {}));
+                   parse_recorded_scene(reader->start().scene_text, "the recording's scene"));
   const int64_t begin_ns = now_ns();
   RETURN_IF_ERROR((*source)->start(script, scene.stream));
   while (!script.wait(kPoll) && !(*source)->failure()) {

@@ -1,6 +1,7 @@
 // What a source of files makes of a simulation that is slower than real time: slow motion, unless it is live.
 #include "client/app/feed.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -103,6 +104,22 @@ TEST(Feed, ASlowSimulationIsFedInSlowMotion) {
   EXPECT_NEAR(fed.heard.back().held_back, 0.75, 1e-3);
   EXPECT_NEAR(fed.progress.pace, 0.25, 1e-3);
   EXPECT_LT(fed.progress.motion_s, 0.9 * fed.progress.elapsed_s);
+}
+
+// A start that takes a tenth of a second is no fault that a person has to read about.
+TEST(Feed, SaysSlowMotionOfASimulationThatIsSlowAndNotOfItsStart) {
+  const auto said = [](double motion_s, double elapsed_s, double speed) {
+    FeedProgress done;
+    done.motion_s = motion_s;
+    done.elapsed_s = elapsed_s;
+    return slow_motion_sentence(done, speed);
+  };
+  EXPECT_EQ(said(4.3, 4.4, 1.0), "");
+  EXPECT_EQ(said(0.8, 1.0, 1.0), "") << "its first moments";
+  EXPECT_EQ(said(58.5, 60.0, 1.0), "") << "as good as real time";
+  EXPECT_EQ(said(4.4, 2.2, 2.0), "") << "as fast as it is asked for";
+  EXPECT_THAT(said(4.3, 8.6, 1.0), testing::StartsWith("slow motion: 4.3 s of the motion in 8.6 s"));
+  EXPECT_THAT(said(4.3, 4.4, 2.0), testing::StartsWith("slow motion"));
 }
 
 TEST(Feed, APausedSimulationHoldsTheMotion) {

@@ -322,8 +322,8 @@ TEST_P(ShippedScenario, Holds) {
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedScenario,
                          testing::Values("auto_mode", "bad_input", "broken_line", "calm_stream", "full_disk",
-                                         "hostile", "look", "lossy_line", "pace", "relay_dies", "restart",
-                                         "same_bits", "shake", "slow_motion", "thin_line"),
+                                         "hostile", "look", "lossy_line", "pace", "relay_dies", "rest",
+                                         "restart", "same_bits", "shake", "slow_motion", "thin_line"),
                          [](const auto& one) { return std::string(one.param); });
 
 }  // namespace

@@ -122,7 +122,8 @@ class Loop {
 // What a step takes is a hundredth of the time there is in the one scene, and many times as much in the
 // other.
 TEST(SimLoopQuality, AutoIsFullWhereStepsAreQuickAndElseFast) {
-  const auto running = [](const std::vector<std::string>& overrides, bool is_lockstep) {
+  std::string reason;
+  const auto running = [&](const std::vector<std::string>& overrides, bool is_lockstep) {
     SimLoopConfig config;
     config.scene = with_overrides(test::small_scene(400, 16), overrides).value();
     config.is_lockstep = is_lockstep;
@@ -130,9 +131,12 @@ TEST(SimLoopQuality, AutoIsFullWhereStepsAreQuickAndElseFast) {
     config.on_scene = [&](const SceneDesc& scene, const std::string&) { started = scene; };
     const Loop loop(std::move(config));
     EXPECT_TRUE(loop) << loop.trouble();
+    if (loop) reason = loop->stats().quality_reason;
     return started;
   };
   const SceneDesc quick = running({"quality=auto", "step_rate_hz=10"}, false);
+  EXPECT_THAT(reason, testing::AllOf(testing::StartsWith("a step of full takes "),
+                                     testing::EndsWith(" ms of the 100.0 ms there are")));
   EXPECT_EQ(quick.solver.name, "direct_rod");
   EXPECT_TRUE(quick.volume.air.acts);
   const std::vector<std::string> slow = {"quality=auto", "step_rate_hz=1000", "substeps=64"};
@@ -140,7 +144,57 @@ TEST(SimLoopQuality, AutoIsFullWhereStepsAreQuickAndElseFast) {
   EXPECT_EQ(lowered.solver.name, "dftl");
   EXPECT_FALSE(lowered.volume.acts());
   EXPECT_EQ(lowered.quality, kAutoQuality);
+  EXPECT_THAT(reason, testing::StartsWith("a step of full takes "));
   EXPECT_EQ(running(slow, true).solver.name, "direct_rod") << "simulated time waits: nothing is measured";
+  EXPECT_EQ(reason, "");
+}
+
+/// Largest way of a vertex between two states, m.
+double largest_way_m(const Snapshot& from, const Snapshot& to) {
+  double largest_m = 0.0;
+  const size_t size = from.plane_size();
+  for (size_t i = 0; i < size; ++i) {
+    glm::dvec3 way_m;
+    for (int axis = 0; axis < 3; ++axis)
+      way_m[axis] = static_cast<double>(to.quantum_m) * to.lattice[axis * size + i] -
+                    static_cast<double>(from.quantum_m) * from.lattice[axis * size + i];
+    largest_m = std::max(largest_m, glm::length(way_m));
+  }
+  return largest_m;
+}
+
+// Hair that is blown goes on from where it is by another model, no faster than it went. To begin anew, as a
+// reset does, is a jump.
+TEST(SimLoopQuality, SteppingDownIsNoJump) {
+  std::mutex mutex;
+  std::shared_ptr<const Snapshot> newest;
+  SimLoopConfig config;
+  config.scene =
+      with_overrides(test::small_scene(60, 16), {"quality=auto", "wind.mean_mps={ x: 4 z: 2 }"}).value();
+  config.is_lockstep = true;
+  config.on_publish = [&](const std::shared_ptr<const Snapshot>& state) {
+    const std::lock_guard lock(mutex);
+    newest = state;
+  };
+  const Loop loop(std::move(config));
+  ASSERT_TRUE(loop) << loop.trouble();
+  const auto after = [&](const ControlCommand& command) {
+    std::promise<void> done;
+    loop->post(command, [&](const Notice&) { done.set_value(); });
+    done.get_future().wait();
+    const std::lock_guard lock(mutex);
+    return newest;
+  };
+  const auto blown = after({Command::StepOnce, 30});
+  const auto next = after({Command::StepOnce, 1});
+  const double usual_m = largest_way_m(*blown, *next);
+  EXPECT_GT(usual_m, 2e-4) << "it moves";
+  ASSERT_FALSE(loop.ask("quality=fast").is_error);
+  const auto lowered = after({Command::StepOnce, 1});
+  EXPECT_EQ(lowered->tick, next->tick + 1);
+  EXPECT_LT(largest_way_m(*next, *lowered), 2.0 * usual_m);
+  const auto reset = after({Command::Reset});
+  EXPECT_GT(largest_way_m(*lowered, *reset), 10.0 * usual_m) << "that is a jump";
 }
 
 TEST(SimLoopJobs, AFloodOfChangesOfTheStreamIsPublishedTwiceASecondAndTheLastOneCounts) {

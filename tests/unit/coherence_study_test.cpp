@@ -10,6 +10,7 @@
 
 #include "common/scene/scene_file.h"
 #include "server/report/crowded_hair.h"
+#include "tests/support/test_grid.h"
 
 namespace strandcast::coherence_study_test {
 namespace {
@@ -45,6 +46,28 @@ TEST_F(CoherenceOfAHead, AirMakesRodsMoveAsOne) {
   const double full = incoherent_share({.has_contact = true, .has_air = true});
   EXPECT_LT(full, 0.5 * alone) << "contact " << contact;
   EXPECT_GT(contact, 1.3 * full) << "alone " << alone;
+}
+
+// The whole head in the whole shake; rates of steps that take longer are for nights.
+TEST_F(CoherenceOfAHead, TheBuiltInHairMovesAsOne) {
+  CoherenceStudyDesc desc;
+  desc.scene = built_in_scene();
+  desc.hold_s = desc.look_s = 0.1;
+  double at_60_hz = 0.0;
+  for (const double rate_hz : {60.0, 30.0, 240.0}) {
+    if (rate_hz != 60.0 && test_grid() == TestGrid::Small) continue;
+    SCOPED_TRACE(rate_hz);
+    const HairCompany company{.has_contact = true, .has_air = true};
+    const auto found = measure_row(
+        desc, {"row", "direct_rod", company, rate_hz, false, rate_hz < 60.0 ? 2u : 1u}, *executor_);
+    ASSERT_TRUE(found) << found.error().to_string();
+    const Coherence& coherence = found->coherence;
+    EXPECT_LE(coherence.incoherent_share(), 0.05);
+    EXPECT_LE(coherence.lone_share(), 0.015);
+    EXPECT_GE(coherence.order(), 0.91);
+    if (rate_hz == 60.0) at_60_hz = coherence.incoherent_share();
+    EXPECT_NEAR(coherence.incoherent_share(), at_60_hz, 0.2 * at_60_hz);
+  }
 }
 
 // Of long steps rods take more than one, and the volume is as young then.

@@ -195,7 +195,7 @@ TEST(ScenarioFile, EveryShippedScenarioParses) {
       EXPECT_TRUE(std::filesystem::exists(expect->picture->golden)) << expect->picture->golden;
     }
   }
-  EXPECT_EQ(names.size(), 15u);
+  EXPECT_EQ(names.size(), 16u);
   const auto example = load_scenario(std::filesystem::path(STRANDCAST_SOURCE_DIR) /
                                      "examples/ci/same_as_last_release.textproto");
   EXPECT_TRUE(example) << example.error().to_string();

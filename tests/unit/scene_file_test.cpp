@@ -459,7 +459,7 @@ TEST(SceneFile, BuiltInSceneIsValidAndTakesOverrides) {
   ASSERT_TRUE(groom);
   EXPECT_EQ(groom->strand_count, 2000u);
   EXPECT_EQ(groom->vertex_count, 16u);
-  EXPECT_NEAR(glm::length(same->wind.mean_mps), 1.5, 0.01);
+  EXPECT_NEAR(glm::length(same->wind.mean_mps), 0.9, 0.01);
   EXPECT_GT(same->wind.gust_intensity, 0.0f);
   EXPECT_TRUE(same->has_auto_collider);
   EXPECT_EQ(built_in_scene_with({"substeps=2"})->substeps, 2u);
@@ -532,6 +532,20 @@ TEST(SceneFile, AQualityStandsForSolverVolumeAirAndCollider) {
   }
   EXPECT_FALSE(parsed("solver { name: 'direct_rod' } volume { interval: 2 }").volume.acts())
       << "told otherwise";
+}
+
+// What a quality stands for changes; a run that was recorded is simulated as it ran.
+TEST(SceneFile, ARecordedSceneIsWhatItWasWhateverItsQualityStandsForNow) {
+  SceneDesc older = with_overrides(built_in_scene(), {"quality=full"}).value();
+  older.volume.rest_density_scale = 1.0;
+  older.volume.resolution = 24;
+  older.substeps = 3;
+  EXPECT_EQ(parse_recorded_scene(to_line(older), "recording").value(), older);
+  EXPECT_NE(parse_scene(to_line(older), "scene", {}).value(), older);
+  for (const std::string quality : {"fast", "auto", "full"}) {
+    const SceneDesc now = with_overrides(built_in_scene(), {"quality=" + quality}).value();
+    EXPECT_EQ(parse_recorded_scene(to_line(now), "recording").value(), now) << quality;
+  }
 }
 
 // A running scene changes by one assignment at a time, to what that stands for.
