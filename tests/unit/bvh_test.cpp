@@ -61,6 +61,29 @@ TEST(Bvh, RestPoseIsUprightAndOffsetsAddUp) {
   EXPECT_NEAR(angle_between_rad(clip.world_from_head[1].rotation, glm::dquat(1, 0, 0, 0)), 0.0, 1e-12);
 }
 
+TEST(Bvh, LineEndsMakeNoDifference) {
+  const std::string rows = "1 2 3 0 0 0 0 0 0 0 0 0\n4 5 6 0 0 0 0 0 0 0 0 0\n";
+  std::string unix_text;
+  for (const char c : small_with(rows))
+    if (c != '\r') unix_text += c;
+  const auto ended = [&](const std::string& end) {
+    std::string text;
+    for (const char c : unix_text) text += c == '\n' ? end : std::string(1, c);
+    return text;
+  };
+  const MotionClip expected = parsed(unix_text);
+  ASSERT_EQ(expected.world_from_head.size(), 2u);
+  for (const char* const end : {"\r", "\r\n", "\r\r\n", "\n\r"}) {
+    const MotionClip clip = parsed(ended(end));
+    ASSERT_EQ(clip.world_from_head.size(), 2u);
+    EXPECT_EQ(clip.world_from_head[1].position_m, expected.world_from_head[1].position_m);
+    EXPECT_TRUE(clip.repairs.empty());
+  }
+  std::string broken = ended("\r");
+  broken.replace(broken.find("Frames:"), 7, "Framez:");
+  EXPECT_THAT(error_of(broken), StartsWith("m.bvh:22: ")) << "lines are counted";
+}
+
 TEST(Bvh, RotationsApplyInTheOrderOfTheChannels) {
   // Rz(90) Ry(90) Rx(90) on the neck: a vector first turns about X, then Y, then Z.
   const MotionClip clip = parsed(small_with("0 0 0 0 0 0 90 90 90 0 0 0\n0 0 0 0 0 0 0 0 0 0 0 0"));

@@ -249,6 +249,20 @@ TEST(WindCsv, ReadsSemicolonsAndDecimalCommas) {
   EXPECT_THAT(repaired("t_s\tu\tv\tw\n0\t1\t2\t3\n").repairs, ElementsAre("values are separated by tabs"));
 }
 
+TEST(WindCsv, LineEndsMakeNoDifference) {
+  const std::string text = "# made\nt_s,u,v,w\n0,1,2,3\n1,4,5,6\n";
+  const WindSeries expected = repaired(text);
+  ASSERT_EQ(expected.time_s.size(), 2u);
+  for (const char* const end : {"\r", "\r\n"}) {
+    std::string other;
+    for (const char c : text) other += c == '\n' ? end : std::string(1, c);
+    const WindSeries series = repaired(other);
+    EXPECT_EQ(series.time_s, expected.time_s);
+    EXPECT_EQ(series.velocity_mps, expected.velocity_mps);
+    EXPECT_TRUE(series.repairs.empty());
+  }
+}
+
 TEST(WindCsv, LeavesOutRowsThatCannotBeReadAndCountsThem) {
   const auto text = [](size_t good) {
     std::string rows =
