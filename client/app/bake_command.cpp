@@ -70,6 +70,7 @@ Result<ExportReport> bake(const BakeCommand& command, const std::atomic<bool>& s
                    bake_export(command, curves ? curves->duration_s() : plan.motion_s));
   ASSIGN_OR_RETURN(const std::filesystem::path server, find_server_program(command.server));
   ASSIGN_OR_RETURN(auto states, BakedStates::start(server, server_words(command), stop));
+  for (const std::string& note : states->hair_notes()) std::cerr << note << '\n';
   ASSIGN_OR_RETURN(std::optional<HairOrigin> origin, origin_of(*states));
   if (curves) {
     if (!origin)
@@ -92,7 +93,8 @@ void declare_motion_file(CLI::App& app, MotionFileOptions& options, const std::s
       ->capture_default_str();
   app.add_option(prefix + "up", options.up, "Up axis of the BVH file (default: guessed from the rest pose)")
       ->check(CLI::IsMember({"y", "z"}));
-  app.add_option("--joint", options.joint, "Head joint of the BVH file (default: found by name)");
+  app.add_option("--joint", options.joint,
+                 "Head joint of the BVH file, NAME#2 for the second of that name (default: found by name)");
   app.add_option("--body-joint", options.body_joints,
                  "Joints of the BVH file to send besides neck, chest, shoulders and elbows, by their names");
   app.add_flag("--filter-glitches", options.is_filtering_glitches,

@@ -154,6 +154,10 @@ Status BakedStates::pump(milliseconds timeout) {
   return session_->pump(timeout);
 }
 
+std::vector<std::string> BakedStates::hair_notes() const {
+  return server_->said_of("scene");
+}
+
 /// A server that has ended has said why.
 Error BakedStates::ended(const Error& error) {
   if (server_ == nullptr || stop_ || client_ == nullptr || !server_->has_ended()) return error;

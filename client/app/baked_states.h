@@ -50,6 +50,8 @@ class BakedStates : public ExportSource {
   /// the server has ended.
   Result<std::shared_ptr<const Snapshot>> next() override;
   std::vector<std::string> remarks() const override;
+  /// Returns what the server says of the hair before it moves: what was left out, guessed and fitted.
+  std::vector<std::string> hair_notes() const;
   /// Returns the scene that the server simulates.
   const SceneDesc& simulated() const { return simulated_; }
 

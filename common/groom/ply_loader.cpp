@@ -357,7 +357,8 @@ Guess<uint32_t> guess_strand_vertex_count(std::span<const glm::vec3> points) {
 }
 
 Result<StatedGroom> read_ply(std::span<const std::byte> file, uint32_t strand_vertex_count) {
-  const std::string_view text(reinterpret_cast<const char*>(file.data()), file.size());
+  const std::string_view text =
+      without_byte_order_mark({reinterpret_cast<const char*>(file.data()), file.size()});
   ASSIGN_OR_RETURN(const PlyHeader header, read_ply_header(text));
   ASSIGN_OR_RETURN(PlyRowsRead read, read_rows(text, header));
   const Statements said = statements_of(header.comment);

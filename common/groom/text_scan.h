@@ -19,6 +19,12 @@
 
 namespace strandcast {
 
+/// The text behind the mark that some editors begin it with.
+inline std::string_view without_byte_order_mark(std::string_view text) {
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+  return text.starts_with(kByteOrderMark) ? text.substr(kByteOrderMark.size()) : text;
+}
+
 class TextScan {
  public:
   explicit TextScan(std::string_view text) : text_(text) {}

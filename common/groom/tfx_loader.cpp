@@ -6,6 +6,7 @@
 
 #include "common/base/file.h"
 #include "common/base/mercy.h"
+#include "common/groom/text_scan.h"
 
 namespace strandcast {
 namespace {
@@ -209,8 +210,9 @@ Result<StatedGroom> read_tfx_binary(const ByteView& file) {
 
 Result<StatedGroom> load_tfx(const std::filesystem::path& path) {
   ASSIGN_OR_RETURN(const std::string bytes, load_text(path, kMaxGroomFileBytes));
-  const bool is_text = std::string_view(bytes).substr(0, kTextMark.size()) == kTextMark;
-  auto stated = is_text ? read_tfx_text(bytes) : read_tfx_binary(ByteView(std::as_bytes(std::span(bytes))));
+  const std::string_view text = without_byte_order_mark(bytes);
+  auto stated = text.starts_with(kTextMark) ? read_tfx_text(text)
+                                            : read_tfx_binary(ByteView(std::as_bytes(std::span(bytes))));
   if (!stated) return at(path.string(), stated.error());
   stated->groom.name = path.stem().string();
   return stated;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <limits>
 
 #include "common/groom/text_scan.h"
 
@@ -99,6 +100,20 @@ Result<double> UsdaScan::number() {
   return error(ErrorCode::BadInput, "{} is no number", found());
 }
 
+Result<double> UsdaScan::number_or_nan() {
+  const size_t begin = (skip_space(), at_);
+  std::string_view text = word();
+  // "-1.#IND" of some C libraries: no comment begins there.
+  const bool is_cut = text.ends_with("1.") && text_.substr(at_).starts_with('#');
+  if (is_cut && at_ + 1 < text_.size() && std::isupper(static_cast<unsigned char>(text_[at_ + 1])) != 0) {
+    ++at_;
+    word();
+    text = text_.substr(begin, at_ - begin);
+  }
+  if (text.empty()) return error(ErrorCode::BadInput, "{} is no number", found());
+  return parse_number<double>(text).value_or(std::numeric_limits<double>::quiet_NaN());
+}
+
 Result<double> UsdaScan::time_code() {
   skip_space();
   // Names hold colons, numbers do not.
@@ -132,7 +147,7 @@ Result<std::vector<double>> UsdaScan::numbers(size_t limit) {
       open.pop_back();
     } else {
       if (values.size() == limit) return error(ErrorCode::LimitExceeded, "more than {} numbers", limit);
-      ASSIGN_OR_RETURN(const double value, number());
+      ASSIGN_OR_RETURN(const double value, number_or_nan());
       values.push_back(value);
     }
     if (!open.empty() && !values.empty()) take(',');
@@ -163,7 +178,7 @@ Result<std::vector<glm::vec3>> UsdaScan::points(size_t limit) {
     RETURN_IF_ERROR(expect('('));
     for (int axis = 0; axis < 3; ++axis) {
       if (axis > 0) RETURN_IF_ERROR(expect(','));
-      ASSIGN_OR_RETURN(const double value, number());
+      ASSIGN_OR_RETURN(const double value, number_or_nan());
       point[axis] = static_cast<float>(value);
     }
     RETURN_IF_ERROR(expect(')'));
@@ -173,7 +188,7 @@ Result<std::vector<glm::vec3>> UsdaScan::points(size_t limit) {
 
 Result<std::vector<float>> UsdaScan::floats(size_t limit) {
   return array<float>(limit, [this]() -> Result<float> {
-    ASSIGN_OR_RETURN(const double value, number());
+    ASSIGN_OR_RETURN(const double value, number_or_nan());
     return static_cast<float>(value);
   });
 }

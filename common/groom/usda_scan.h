@@ -32,6 +32,8 @@ class UsdaScan {
   /// Reads a string in any of USD's quotes; escapes are not resolved. BadInput if there is none.
   Result<std::string_view> string();
   Result<double> number();
+  /// Returns the next of many numbers, NaN for a word that is no number, so that it costs its strand alone.
+  Result<double> number_or_nan();
   /// Reads the time before a time sample, as in "1.5 :".
   Result<double> time_code();
 

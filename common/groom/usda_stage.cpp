@@ -247,6 +247,7 @@ class StageReader {
 }  // namespace
 
 Result<UsdStage> read_usda_stage(std::string_view text) {
+  text = without_byte_order_mark(text);
   if (!text.starts_with("#usda 1."))
     return make_error(ErrorCode::BadInput, "does not begin with '#usda 1.0': not a USD text file");
   return StageReader(text).read();

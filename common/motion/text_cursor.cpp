@@ -15,6 +15,11 @@ bool is_blank(char c) {
   return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
 }
 
+/// LF, CRLF and CR end lines; of CRLF the second character does.
+bool is_line_end(std::string_view text, size_t at) {
+  return text[at] == '\n' || (text[at] == '\r' && !text.substr(at + 1).starts_with('\n'));
+}
+
 char lower(char c) {
   return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
 }
@@ -60,7 +65,7 @@ TextCursor::TextCursor(std::string_view text, std::string place) : text_(text), 
 
 std::string_view TextCursor::next_token() {
   while (offset_ < text_.size() && (is_blank(text_[offset_]) || text_[offset_] == '\n')) {
-    if (text_[offset_] == '\n') ++line_;
+    if (is_line_end(text_, offset_)) ++line_;
     ++offset_;
   }
   const size_t begin = offset_;
@@ -70,7 +75,8 @@ std::string_view TextCursor::next_token() {
 }
 
 std::string_view TextCursor::rest_of_line() {
-  const size_t end = std::min(text_.find('\n', offset_), text_.size());
+  size_t end = offset_;
+  while (end < text_.size() && !is_line_end(text_, end)) ++end;
   const std::string_view rest = trim(text_.substr(offset_, end - offset_));
   offset_ = end;
   token_line_ = line_;

@@ -1,5 +1,5 @@
-// Reads untrusted text line by line and token by token, counting lines for error messages. Private to
-// common/motion.
+// Reads untrusted text line by line (LF, CRLF or CR) and token by token, counting lines for error messages.
+// Private to common/motion.
 #pragma once
 
 #include <cstdint>

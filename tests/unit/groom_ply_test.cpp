@@ -194,6 +194,17 @@ TEST(Ply, AStrandOfOnePointIsLeftOutAndDecimalCommasAreRead) {
                                                    HasSubstr("1 strands of fewer than 2 points")));
 }
 
+TEST(Ply, AByteOrderMarkIsNoPartOfTheFile) {
+  const std::string text =
+      header("binary_little_endian", kFivePoints + "element strand 1\nproperty uchar nverts\n");
+  std::string rows;
+  for (const glm::vec3& point : kFive)
+    for (int axis = 0; axis < 3; ++axis) rows += raw(point[axis], false);
+  const auto groom = read("\xef\xbb\xbf" + text + rows + raw(uint8_t{5}, false));
+  ASSERT_TRUE(groom) << groom.error().to_string();
+  EXPECT_EQ(groom->groom.rest_position_m, kFive);
+}
+
 TEST(Ply, AFileThatIsCutOffGivesWhatItHas) {
   const std::vector<glm::vec3> points = hanging(50, 20);
   const std::string whole = bare(points);

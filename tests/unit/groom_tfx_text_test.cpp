@@ -73,7 +73,8 @@ TEST(TfxText, LineEndsBlankLinesAndCommasMakeNoDifference) {
     commas += c;
   }
   ASSERT_NE(commas, unix_text);
-  for (const std::string& text : {dos, mac, mixed, commas, unix_text.substr(0, unix_text.size() - 1)}) {
+  for (const std::string& text :
+       {dos, mac, mixed, commas, unix_text.substr(0, unix_text.size() - 1), "\xef\xbb\xbf" + unix_text}) {
     const auto groom = load(text);
     ASSERT_TRUE(groom) << groom.error().to_string();
     EXPECT_EQ(groom->rest_position_m, expected->rest_position_m);

@@ -52,6 +52,33 @@ TEST(Usda, ReadsLinesWithUnitAndUpAxis) {
   EXPECT_EQ(groom->is_z_up, true);
 }
 
+TEST(Usda, AByteOrderMarkIsNoPartOfTheFile) {
+  const auto groom = read_usd("\xef\xbb\xbf" + stage(kLines));
+  ASSERT_TRUE(groom) << groom.error().to_string();
+  EXPECT_EQ(groom->groom.rest_position_m, kPoints);
+}
+
+// "#" begins a comment elsewhere.
+TEST(Usda, AWordThatIsNoNumberCostsItsStrandAlone) {
+  std::string counts, points;
+  for (int strand = 0; strand < 10; ++strand) {
+    counts += "2, ";
+    points += fmt::format("({0}, 0, 0), ({0}, 1, 0), ", strand);
+  }
+  for (const std::string word : {"-1.#IND", "1.#QNAN00", "abc", "nan"}) {
+    std::string broken = points;
+    broken.replace(broken.find("(3, 1") + 4, 1, word);
+    const auto groom = read_usd(stage("uniform token type = \"linear\"\nint[] curveVertexCounts = [" +
+                                      counts + "]\npoint3f[] points = [" + broken + "] # 1.#END\n"));
+    ASSERT_TRUE(groom) << word << ": " << groom.error().to_string();
+    EXPECT_EQ(groom->groom.strand_count(), 9u) << word;
+    EXPECT_THAT(groom->notes,
+                Contains(AllOf(HasSubstr("1 of 10 strands cannot be used"), HasSubstr("strand 3 vertex 1"))))
+        << word;
+  }
+  EXPECT_THAT(refusal(stage("point3f[] points = [(0, 0, \"a\")]\n")), HasSubstr("is no number"));
+}
+
 TEST(Usda, UnitAndAxisAreStatedAndSaidInTheNotes) {
   const TemporaryFolder folder;
   GroomFileOptions options;

@@ -20,6 +20,7 @@
 #include "common/base/file.h"
 #include "common/base/profile.h"
 #include "common/base/text.h"
+#include "common/log/log.h"
 
 extern char** environ;
 
@@ -137,6 +138,16 @@ std::string ServerProcess::last_line() const {
   for (std::string line; std::getline(log, line);)
     if (!line.empty()) last = line;
   return excerpt(last, kMaxShownChars);
+}
+
+std::vector<std::string> ServerProcess::said_of(const std::string& tag) const {
+  std::ifstream log(log_file());
+  const std::string mark = " [" + tag + "] ";
+  std::vector<std::string> said;
+  for (std::string line; std::getline(log, line);)
+    if (const size_t at = line.find(mark); at != std::string::npos)
+      said.push_back(one_line(line.substr(at + mark.size()), kMaxLogMessageChars));
+  return said;
 }
 
 Status ServerProcess::wait_for_port(double timeout_s, const std::atomic<bool>& stop) {

@@ -52,6 +52,8 @@ class ServerProcess {
   uint16_t port() const { return port_; }
   /// Returns what the server said last, for a person.
   std::string last_line() const;
+  /// Returns what it has logged of one stage so far, a sentence each.
+  std::vector<std::string> said_of(const std::string& tag) const;
   std::filesystem::path token_file() const { return config_.folder / "tokens"; }
   std::filesystem::path log_file() const { return config_.folder / "server.log"; }
 
