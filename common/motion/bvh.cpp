@@ -181,24 +181,44 @@ class HierarchyParser {
   Skeleton skeleton_;
 };
 
-/// True for "Head", "mixamorig:Head", "joint_head", "Bip01 Head".
+/// True for "Head", "mixamorig:Head", "joint_head", "Bip01 Head", "root.head", "Head1", "head_01", "Head_M"
+/// and "C_head_JNT", not for "Head_End".
 bool is_head_name(std::string_view name) {
-  const size_t separator = name.find_last_of(":_ ");
-  if (separator != std::string_view::npos) name.remove_prefix(separator + 1);
-  return equals_ignoring_case(name, "head");
+  constexpr std::string_view kDigits = "0123456789";
+  while (!name.empty()) {
+    const size_t separator = name.find_last_of(":_ .");
+    std::string_view word = separator == std::string_view::npos ? name : name.substr(separator + 1);
+    word = word.substr(0, word.find_last_not_of(kDigits) + 1);
+    if (equals_ignoring_case(word, "head")) return true;
+    // What may follow it: a number, the middle, what it is.
+    const bool is_passed = word.empty() || equals_ignoring_case(word, "m") ||
+                           equals_ignoring_case(word, "jnt") || equals_ignoring_case(word, "joint") ||
+                           equals_ignoring_case(word, "bone");
+    if (separator == std::string_view::npos || !is_passed) return false;
+    name = name.substr(0, separator);
+  }
+  return false;
+}
+
+/// The name of a joint, "Head#2" for the second of that name: performers may be named alike.
+std::string label_of(const Skeleton& skeleton, uint32_t joint) {
+  const std::string& name = skeleton.joints[joint].name;
+  const auto before = std::count_if(skeleton.joints.begin(), skeleton.joints.begin() + joint,
+                                    [&](const Joint& other) { return other.name == name; });
+  return before == 0 ? name : fmt::format("{}#{}", name, before + 1);
 }
 
 std::string known_joints(const Skeleton& skeleton) {
   std::string known;
-  for (const Joint& joint : skeleton.joints)
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", shown(joint.name));
+  for (uint32_t i = 0; i < skeleton.joints.size(); ++i)
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", shown(label_of(skeleton, i)));
   return known;
 }
 
 Result<uint32_t> find_head(const Skeleton& skeleton, const std::string& wanted) {
   for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
     const std::string& name = skeleton.joints[i].name;
-    if (wanted.empty() ? is_head_name(name) : name == wanted) return i;
+    if (wanted.empty() ? is_head_name(name) : name == wanted || label_of(skeleton, i) == wanted) return i;
   }
   return make_error(ErrorCode::NotFound, "no joint named {} (--joint NAME takes another, known: {})",
                     wanted.empty() ? "Head or head" : shown(wanted), known_joints(skeleton));
@@ -214,11 +234,11 @@ std::string other_heads(const Skeleton& skeleton, uint32_t head) {
   std::string others;
   for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
     if (!is_head_name(skeleton.joints[i].name) || root_of(skeleton, i) == root_of(skeleton, head)) continue;
-    others += fmt::format("{}{}", others.empty() ? "" : ", ", shown(skeleton.joints[i].name));
+    others += fmt::format("{}{}", others.empty() ? "" : ", ", shown(label_of(skeleton, i)));
   }
   if (others.empty()) return {};
   return fmt::format("of several performers the one with {} is taken, others have {} (--joint takes another)",
-                     shown(skeleton.joints[head].name), others);
+                     shown(label_of(skeleton, head)), others);
 }
 
 /// Joints from the root down to the head.
@@ -245,6 +265,17 @@ struct FileUp {
 constexpr double kLeastLegShare = 0.1;  // of the height above the hips
 // Legs that end at a knee: the hips stand so many times higher over the floor than their bones reach.
 constexpr double kShortLegs = 1.2, kShortestLegs = 2.5;
+// Hips of a person who stands, in heights of the body (Winter, Biomechanics and Motor Control of Human
+// Movement, 4th ed., figure 4.1: the greater trochanter). Who sits, or is moved from the hips on, has them
+// lower than so many times the bones above them.
+constexpr double kHipsShare = 0.53, kLowestHips = 0.8;
+constexpr double kLongestSpineBone = 0.4;  // of the way from the hips to the crown
+
+/// Height of a body in file units, 0 for one without extent, and what was measured.
+struct BodyHeight {
+  double units = 0.0;
+  std::string of;
+};
 
 /// Where a joint lies from the one above it: its positions in a row go before its OFFSET.
 glm::dvec3 place_of(const Joint& joint, std::span<const double> row) {
@@ -254,11 +285,18 @@ glm::dvec3 place_of(const Joint& joint, std::span<const double> row) {
   return place;
 }
 
+/// Length of the first bone above the root that has one, 0 for none.
+double first_bone(const std::vector<const Joint*>& path, std::span<const double> row) {
+  for (size_t i = 1; i < path.size(); ++i)
+    if (const double length = glm::length(place_of(*path[i], row)); length > 0.0) return length;
+  return 0.0;
+}
+
 /// Body height, file units: the bones from the hips down to the lowest point and up to the highest one, as
 /// long as they are; rest poses often spread the legs. Where the hips stand higher over the floor than these
-/// legs reach, that counts. Of the tree of `head` alone; 0 for a skeleton without extent.
-double body_height(const Skeleton& skeleton, uint32_t head, const FileUp& axes,
-                   std::span<const double> first_row) {
+/// legs reach, that counts. Of the tree of `head` alone.
+BodyHeight body_height(const Skeleton& skeleton, uint32_t head, const FileUp& axes,
+                       std::span<const double> first_row) {
   struct Reach {
     double height = 0.0;  // above the root with all rotations zero
     double bones = 0.0;   // length of the bones from the root
@@ -283,30 +321,35 @@ double body_height(const Skeleton& skeleton, uint32_t head, const FileUp& axes,
   }
   const auto [lowest, highest] = std::minmax_element(
       reach.begin(), reach.end(), [](const Reach& a, const Reach& b) { return a.height < b.height; });
-  // Of a body without legs the hips are as high as these would be long.
   const bool has_legs = lowest->height < -kLeastLegShare * highest->height;
   const bool are_legs_cut =
       root_height > kShortLegs * lowest->bones && root_height < kShortestLegs * lowest->bones;
-  return (has_legs && !are_legs_cut ? lowest->bones : std::max(root_height, 0.0)) + highest->bones;
+  if (has_legs && !are_legs_cut) return {lowest->bones + highest->bones, "the bones from foot to crown"};
+  // Of a body without legs the hips are as high as these would be long, where it stands. A root from which
+  // the first bone is as long as legs stands on the floor.
+  const bool is_standing = root_height >= kLowestHips * highest->bones;
+  if (is_standing || first_bone(path_to(skeleton, head), first_row) >= kLongestSpineBone * highest->bones)
+    return {std::max(root_height, 0.0) + highest->bones,
+            "the height of the root and the bones from there to the crown"};
+  constexpr double kBodies = 1.0 / (1.0 - kHipsShare);
+  return {kBodies * highest->bones,
+          fmt::format("{:.3g} times the bones from hips to crown (there are no legs)", kBodies)};
 }
 
-/// Sets the clip's unit to the one that makes a body of `height` file units about as tall as people are.
-void guess_unit(MotionClip& clip, double height) {
-  const double guess_m = kAssumedBodyHeightM / height;
+/// Sets the clip's unit to the one that makes a body of this height about as tall as people are.
+void guess_unit(MotionClip& clip, const BodyHeight& height) {
+  const double guess_m = kAssumedBodyHeightM / height.units;
   for (const LengthUnit& unit : kClipUnits) {
     if (std::abs(guess_m / unit.m - 1.0) > kUnitSnap) continue;
     clip.file_unit_m = unit.m;
-    clip.unit_reason = fmt::format(
-        "one unit is taken as {:.4g} m: the bones from foot to crown, {:.4g} units, are {:.2f} m in {}",
-        unit.m, height, height * unit.m, unit.name);
+    clip.unit_reason = fmt::format("one unit is taken as {:.4g} m: {}, {:.4g} units, are {:.2f} m in {}",
+                                   unit.m, height.of, height.units, height.units * unit.m, unit.name);
     return;
   }
   clip.file_unit_m = guess_m;
   clip.unit_reason = fmt::format(
-      "one unit is taken as {:.4g} m, which makes the bones from foot to crown, {:.4g} units, {:g} m long: "
-      "no "
-      "usual unit is near",
-      guess_m, height, kAssumedBodyHeightM);
+      "one unit is taken as {:.4g} m, which makes {}, {:.4g} units, {:g} m long: no usual unit is near",
+      guess_m, height.of, height.units, kAssumedBodyHeightM);
 }
 
 /// Pose of the last joint of the path in the file's axes and units.
@@ -372,17 +415,23 @@ Result<MotionHeader> parse_motion_header(TextCursor& cursor, double stated_s) {
   return header;
 }
 
-Status parse_row(const TextCursor& cursor, std::string_view rest, size_t frame, std::span<double> row) {
+/// `idle` counts values that are no numbers where others can stand in.
+Status parse_row(const TextCursor& cursor, std::string_view rest, size_t frame,
+                 std::span<const std::optional<double>> instead, std::span<double> row, BadItems& idle) {
   for (size_t i = 0; i < row.size(); ++i) {
     const auto word = take_token(rest);
     if (word.empty())
       return cursor.fail(ErrorCode::BadInput, "frame {} has {} values, the hierarchy has {} channels", frame,
                          i, row.size());
     const auto value = channel_value(word);
-    if (!value)
-      return cursor.fail(ErrorCode::BadInput, "value {} of frame {} is \"{}\", not a number within 1e9", i,
-                         frame, shown(word));
-    row[i] = *value;
+    if (!value) {
+      Error problem =
+          cursor.fail(ErrorCode::BadInput, "value {} of frame {} is \"{}\", not a number within 1e9", i,
+                      frame, shown(word));
+      if (!instead[i]) return problem;
+      idle.add(std::move(problem));
+    }
+    row[i] = value ? *value : *instead[i];
   }
   if (!trim(rest).empty())
     return cursor.fail(ErrorCode::BadInput, "frame {} has more values than the {} channels of the hierarchy",
@@ -398,21 +447,40 @@ struct Rows {
   glm::dvec3 lift{0.0};                // sums of good ones: from the root to the head, and the root's place
   glm::dvec3 root{0.0};
   BadItems bad;
+  BadItems idle;  // values in channels that nobody uses
 };
 
 using JointPath = std::vector<const Joint*>;  // from the root
+
+/// Of each channel what stands in for a value that is no number: the rest pose's, nothing where a joint needs
+/// it.
+std::vector<std::optional<double>> stand_ins(const Skeleton& skeleton, const JointPath& head,
+                                             const std::vector<JointPath>& body) {
+  std::vector<std::optional<double>> values;
+  for (const Joint& joint : skeleton.joints)
+    for (const Channel& channel : joint.channels)
+      values.emplace_back(channel.is_rotation ? 0.0 : joint.offset[channel.axis]);
+  const auto need = [&](const JointPath& path) {
+    for (const Joint* const joint : path)
+      std::fill_n(values.begin() + joint->first_channel, joint->channels.size(), std::nullopt);
+  };
+  need(head);
+  for (const JointPath& path : body) need(path);
+  return values;
+}
 
 /// Reads rows up to the end of the text, each one of `clip`.
 Result<Rows> read_rows(TextCursor& cursor, const Skeleton& skeleton, const JointPath& head,
                        const std::vector<JointPath>& body, MotionClip& clip) {
   Rows rows;
   std::vector<double> row(skeleton.channel_count);
+  const auto instead = stand_ins(skeleton, head, body);
   size_t good_count = 0;
   while (const auto line = cursor.next_line()) {
     const size_t frame = rows.is_good.size();
     if (frame == kMaxBvhFrames)
       return cursor.fail(ErrorCode::LimitExceeded, "more than {} frames", kMaxBvhFrames);
-    const Status read = parse_row(cursor, *line, frame, row);
+    const Status read = parse_row(cursor, *line, frame, instead, row, rows.idle);
     rows.is_good.push_back(read ? 1 : 0);
     if (!read) {
       rows.bad.add(read.error());
@@ -562,6 +630,9 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   bridge(clip, rows.is_good);
   if (rows.bad.count() > 0)
     clip.repairs.push_back(rows.bad.sentence(rows.is_good.size(), "frames", "and are bridged or left out"));
+  if (rows.idle.count() > 0)
+    clip.repairs.push_back(fmt::format("{} values are no numbers, in joints that nobody needs; the first: {}",
+                                       rows.idle.count(), rows.idle.first().to_string()));
   if (rows.is_good.size() != header.frame_count)
     clip.repairs.push_back(
         fmt::format("{} frames are announced, {} are there", header.frame_count, rows.is_good.size()));
@@ -581,9 +652,9 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
         up.is_z_in_motion ? 'Z' : 'Y', up.is_z_at_rest ? 'Z' : 'Y');
   else if (up.is_z_at_rest && !options.is_z_up)
     clip.up_reason = "+Z is taken as up: there the head is above the hips in the rest pose";
-  const double height = body_height(skeleton, *head, up, rows.first);
+  const BodyHeight height = body_height(skeleton, *head, up, rows.first);
   const bool is_guessed = options.unit_m == 0.0;
-  if (is_guessed && !(height > 0.0))
+  if (is_guessed && !(height.units > 0.0))
     return at(place, make_error(ErrorCode::BadInput,
                                 "the skeleton has no height to guess the unit from: give the unit"));
   if (is_guessed)

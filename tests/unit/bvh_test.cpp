@@ -201,13 +201,16 @@ TEST(Bvh, UnitUpAxisAndRecentring) {
 
 TEST(Bvh, FindsTheHeadByCommonNames) {
   const std::string rows = "0 0 0 0 0 0 0 0 0 0 0 0\n0 0 0 0 0 0 0 0 0 0 0 0\n";
-  for (const char* name : {"head", "mixamorig:Head", "joint_Head", "Bip01 Head", "HEAD"}) {
+  for (const char* name : {"head", "mixamorig:Head", "joint_Head", "Bip01 Head", "HEAD", "head_01", "Head1",
+                           "Head_M", "C_head_JNT", "root.head"}) {
     std::string text = small_with(rows);
     text.replace(text.find("JOINT Head"), 10, std::string("JOINT ") + name);
     EXPECT_EQ(error_of(text), "no error") << name;
   }
   std::string text = small_with(rows);
-  text.replace(text.find("JOINT Head"), 10, "JOINT Forehead joint");
+  text.replace(text.find("JOINT Head"), 10, "JOINT Head_End");
+  EXPECT_THAT(error_of(text), HasSubstr("no joint named Head"));
+  text.replace(text.find("JOINT Head_End"), 14, "JOINT Forehead joint");
   EXPECT_THAT(
       error_of(text),
       HasSubstr(
@@ -258,14 +261,38 @@ TEST(Bvh, ErrorsNameFileAndLine) {
 TEST(Bvh, UnitIsGuessedFromTheHeightOfTheSkeleton) {
   BvhOptions options = kPlain;
   options.unit_m = 0.0;
-  // Hips, neck 1 up, head 1 up and 0.5 forward, end site 1 up: the bones are as long as the body is tall.
+  // Hips, neck 1 up, head 1 up and 0.5 forward, end site 1 up. There are no legs, so the hips' own height
+  // stands for them.
   const double bones = 2.0 + std::sqrt(1.25);
-  const MotionClip low = parsed(small_with("0 0 0 0 0 0 0 0 0 0 0 0\n0 0 0 0 0 0 0 0 0 0 0 0"), options);
-  EXPECT_DOUBLE_EQ(low.file_unit_m, kAssumedBodyHeightM / bones);
-  // There are no legs, so the hips' own height stands for them.
-  const MotionClip clip = parsed(small_with("0 1 0 0 0 0 0 0 0 0 0 0\n0 1 0 0 0 0 0 0 0 0 0 0"), options);
-  EXPECT_DOUBLE_EQ(clip.file_unit_m, kAssumedBodyHeightM / (1.0 + bones));
-  EXPECT_NEAR(clip.world_from_head[0].position_m.y, 3.0 * clip.file_unit_m, 1e-12);
+  const MotionClip clip = parsed(small_with("0 10 0 0 0 0 0 0 0 0 0 0\n0 10 0 0 0 0 0 0 0 0 0 0"), options);
+  EXPECT_DOUBLE_EQ(clip.file_unit_m, kAssumedBodyHeightM / (10.0 + bones));
+  EXPECT_NEAR(clip.world_from_head[0].position_m.y, 12.0 * clip.file_unit_m, 1e-12);
+  EXPECT_THAT(clip.unit_reason, HasSubstr("the height of the root and the bones from there to the crown"));
+}
+
+// A person of 1.7 m in cm, with hips at 53 hundredths of that: on their feet, on a chair, and moved from the
+// hips on.
+TEST(Bvh, AnUpperBodyIsMeasuredByItsBonesWhereverItsRootIs) {
+  BvhOptions options = kPlain;
+  options.unit_m = 0.0;
+  for (const double unit_m : {0.01, 1.0, 0.0254}) {
+    const auto clip_of = [&](double hips_m, double spine_m) {
+      return parsed(
+          fmt::format("HIERARCHY\nROOT Hips\n{{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition "
+                      "Zposition\nJOINT Spine\n{{\nOFFSET 0 {} 0\nCHANNELS 0\nJOINT Head\n{{\nOFFSET 0 "
+                      "{} 0\nCHANNELS 0\nEnd Site\n{{\nOFFSET 0 {} 0\n}}\n}}\n}}\n}}\nMOTION\nFrames: "
+                      "1\nFrame Time: .01\n0 {} 0\n",
+                      spine_m / unit_m, 0.42 / unit_m, 0.18 / unit_m, hips_m / unit_m),
+          options);
+    };
+    for (const double hips_m : {0.9, 0.5, 0.3, 0.0, -0.4}) {
+      const MotionClip clip = clip_of(hips_m, 0.2);
+      EXPECT_EQ(clip.file_unit_m, unit_m) << hips_m;
+      EXPECT_THAT(clip.unit_reason, HasSubstr(hips_m > 0.6 ? "the height of the root" : "there are no legs"));
+      EXPECT_THAT(clip.unit_reason, testing::Not(HasSubstr("foot")));
+    }
+    EXPECT_EQ(clip_of(0.0, 1.1).file_unit_m, unit_m) << "the root stands on the floor, as in many rigs";
+  }
 }
 
 TEST(Bvh, UnitIsGuessedWherePositionsStandInTheRowsAlone) {
@@ -316,6 +343,28 @@ TEST(Bvh, ATenthOfTheFramesMayBeBadAndIsBridged) {
   std::string text = kSmall;
   EXPECT_THAT(error_of(text + rising_rows(30, {{7, "x"}, {8, "x"}, {9, "x"}, {20, "x"}})),
               StartsWith("m.bvh:31: value 0 of frame 7 is \"x\""));
+}
+
+TEST(Bvh, WhatNobodyNeedsMayBeNoNumber) {
+  const std::string end = "End Site\n{\nOFFSET 0 0 0\n}\n}\n";
+  const std::string text =
+      "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\nJOINT "
+      "Head\n{\nOFFSET 0 80 "
+      "0\nCHANNELS 1 Yrotation\n" +
+      end + "JOINT Foot\n{\nOFFSET 0 -90 0\nCHANNELS 1 Yposition\n" + end +
+      "}\nMOTION\nFrames: 2\nFrame Time: .01\n";
+  BvhOptions options = kPlain;
+  options.unit_m = 0.0;
+  const MotionClip clip = parsed(text + "1 90 3 5 nan\n2 90 3 5 -1.#IND\n", options);
+  ASSERT_EQ(clip.world_from_head.size(), 2u);
+  EXPECT_DOUBLE_EQ(clip.world_from_head[1].position_m.x, 0.02);
+  EXPECT_EQ(clip.file_unit_m, 0.01) << "the foot is where it rests";
+  EXPECT_THAT(clip.repairs,
+              testing::ElementsAre(AllOf(HasSubstr("2 values are no numbers, in joints that nobody needs"),
+                                         HasSubstr("value 4 of frame 0 is \"nan\""))));
+  EXPECT_THAT(error_of(text + "1 90 3 nan 1\n2 90 3 nan 1\n", options), HasSubstr("value 3 of frame 0"));
+  options.body_joints = {"Foot"};
+  EXPECT_THAT(error_of(text + "1 90 3 5 nan\n2 90 3 5 nan\n", options), HasSubstr("value 4 of frame 0"));
 }
 
 TEST(Bvh, ThereAreAsManyFramesAsRows) {
@@ -388,60 +437,6 @@ TEST(Bvh, EveryJointIsListedWhenTheHeadIsNotFound) {
   EXPECT_THAT(error, HasSubstr("--joint NAME"));
 }
 
-/// A head that walks at 1 m/s and turns at 90 degrees/s, 100 frames a second.
-MotionClip walk(size_t frame_count) {
-  MotionClip clip;
-  clip.frame_s = 0.01;
-  for (size_t i = 0; i < frame_count; ++i) {
-    const double t_s = clip.frame_s * static_cast<double>(i);
-    clip.world_from_head.push_back(
-        {{t_s, 1.6, 0.0}, glm::angleAxis(glm::radians(90.0 * t_s), glm::dvec3(0, 1, 0))});
-  }
-  return clip;
-}
-
-TEST(MotionGlitches, CountsStepsThatNoHeadMakes) {
-  MotionClip clip = walk(100);
-  EXPECT_EQ(find_glitches(clip).step_count, 0u);
-  EXPECT_NEAR(find_glitches(clip).fastest_mps, 1.0, 1e-9);
-  EXPECT_NEAR(find_glitches(clip).fastest_deg_per_s, 90.0, 1e-5);
-  clip.world_from_head[40].position_m.z += 0.44;  // 44 m/s, there and back
-  clip.world_from_head[70].rotation = glm::angleAxis(glm::radians(60.0), glm::dvec3(1, 0, 0));
-  const MotionGlitches glitches = find_glitches(clip);
-  EXPECT_EQ(glitches.step_count, 4u);
-  EXPECT_NEAR(glitches.first_s, 0.39, 1e-12);
-  EXPECT_NEAR(glitches.fastest_mps, std::hypot(44.0, 1.0), 1e-9);
-  EXPECT_GT(glitches.fastest_deg_per_s, 6000.0);
-}
-
-TEST(MotionGlitches, FilteringLeavesTheRestAndFindsNoneAfterwards) {
-  const MotionClip good = walk(100);
-  MotionClip clip = good;
-  for (const size_t i : {20u, 40u, 41u, 42u, 99u}) clip.world_from_head[i].position_m.z += 5.0;
-  clip.world_from_head[70].rotation = glm::angleAxis(glm::radians(150.0), glm::dvec3(1, 0, 0));
-  EXPECT_EQ(filter_glitches(clip), 6u);
-  EXPECT_EQ(find_glitches(clip).step_count, 0u);
-  for (size_t i = 0; i < 99; ++i) {
-    EXPECT_NEAR(glm::distance(clip.world_from_head[i].position_m, good.world_from_head[i].position_m), 0.0,
-                1e-12)
-        << i;
-    EXPECT_NEAR(angle_between_rad(clip.world_from_head[i].rotation, good.world_from_head[i].rotation), 0.0,
-                1e-7)
-        << i;
-  }
-  EXPECT_EQ(clip.world_from_head[99], clip.world_from_head[98]) << "nothing follows the last one";
-}
-
-TEST(MotionGlitches, AJumpThatStaysIsReachedAtTheLimit) {
-  MotionClip clip = walk(100);
-  for (size_t i = 50; i < 100; ++i) clip.world_from_head[i].position_m.z += 3.0;
-  EXPECT_EQ(filter_glitches(clip), 20u) << "3 m at 15 m/s are 0.2 s; the frame that gets there is good";
-  EXPECT_EQ(find_glitches(clip).step_count, 0u);
-  EXPECT_EQ(clip.world_from_head[99].position_m.z, 3.0);
-  MotionClip untouched = walk(100);
-  EXPECT_EQ(filter_glitches(untouched), 0u);
-}
-
 TEST(MotionFile, SaysWhatWasAssumedAndFound) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "m.bvh";
@@ -454,7 +449,9 @@ TEST(MotionFile, SaysWhatWasAssumedAndFound) {
   const auto plain = load_motion_file(path, {});
   ASSERT_TRUE(plain) << plain.error().to_string();
   ASSERT_EQ(plain->notes.size(), 2u);
-  EXPECT_THAT(plain->notes[0], StartsWith(path.string() + ": one unit is taken as 0.5452 m"));
+  EXPECT_THAT(plain->notes[0],
+              StartsWith(path.string() + ": one unit is taken as 0.3048 m: 2.13 times the bones from hips to "
+                                         "crown (there are no legs)"));
   EXPECT_THAT(plain->notes[0], HasSubstr("--unit"));
   EXPECT_THAT(plain->notes[1], HasSubstr("the head makes 2 steps faster than any head moves"));
   EXPECT_THAT(plain->notes[1], HasSubstr("--filter-glitches"));
@@ -617,6 +614,24 @@ TEST(Bvh, ABodyIsAsHighAsItsHipsStand) {
   EXPECT_EQ(unit_at(95.0), 0.01);
   EXPECT_NE(unit_at(0.0), 0.01) << "by 123 units of bones alone";
   EXPECT_EQ(unit_at(0.0), unit_at(500.0)) << "on a roof";
+}
+
+TEST(Bvh, PerformersMayBeNamedAlike) {
+  const std::string performer =
+      "ROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\nJOINT Head\n{\nOFFSET 0 1 "
+      "0\nCHANNELS "
+      "0\nEnd Site\n{\nOFFSET 0 0 0\n}\n}\n}\n";
+  const std::string text =
+      "HIERARCHY\n" + performer + performer + "MOTION\nFrames: 1\nFrame Time: .01\n0 0 0 5 0 0\n";
+  const MotionClip first = parsed(text);
+  EXPECT_EQ(first.world_from_head[0].position_m.x, 0.0);
+  EXPECT_THAT(first.repairs,
+              testing::ElementsAre(HasSubstr("the one with Head is taken, others have Head#2")));
+  BvhOptions options = kPlain;
+  options.head_joint = "Head#2";
+  EXPECT_EQ(parsed(text, options).world_from_head[0].position_m.x, 5.0);
+  options.head_joint = "Head#3";
+  EXPECT_THAT(error_of(text, options), HasSubstr("Head#2"));
 }
 
 TEST(Bvh, OfSeveralPerformersOneIsTakenAndNamed) {

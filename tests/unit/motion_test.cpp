@@ -4,6 +4,7 @@
 #include <complex>
 #include <numbers>
 
+#include "common/motion/motion_glitches.h"
 #include "common/motion/wind_csv.h"
 
 namespace strandcast::motion_test {
@@ -156,6 +157,60 @@ TEST(Gusts, SpectrumFallsWithTheFiveThirdsPower) {
   }
   // Energy in an octave is density times width: over two octaves the density falls by high/low/4.
   EXPECT_NEAR(std::log2(high / low / 4.0) / 2.0, -5.0 / 3.0, 0.1);
+}
+
+/// A head that walks at 1 m/s and turns at 90 degrees/s, 100 frames a second.
+MotionClip walk(size_t frame_count) {
+  MotionClip clip;
+  clip.frame_s = 0.01;
+  for (size_t i = 0; i < frame_count; ++i) {
+    const double t_s = clip.frame_s * static_cast<double>(i);
+    clip.world_from_head.push_back(
+        {{t_s, 1.6, 0.0}, glm::angleAxis(glm::radians(90.0 * t_s), glm::dvec3(0, 1, 0))});
+  }
+  return clip;
+}
+
+TEST(MotionGlitches, CountsStepsThatNoHeadMakes) {
+  MotionClip clip = walk(100);
+  EXPECT_EQ(find_glitches(clip).step_count, 0u);
+  EXPECT_NEAR(find_glitches(clip).fastest_mps, 1.0, 1e-9);
+  EXPECT_NEAR(find_glitches(clip).fastest_deg_per_s, 90.0, 1e-5);
+  clip.world_from_head[40].position_m.z += 0.44;  // 44 m/s, there and back
+  clip.world_from_head[70].rotation = glm::angleAxis(glm::radians(60.0), glm::dvec3(1, 0, 0));
+  const MotionGlitches glitches = find_glitches(clip);
+  EXPECT_EQ(glitches.step_count, 4u);
+  EXPECT_NEAR(glitches.first_s, 0.39, 1e-12);
+  EXPECT_NEAR(glitches.fastest_mps, std::hypot(44.0, 1.0), 1e-9);
+  EXPECT_GT(glitches.fastest_deg_per_s, 6000.0);
+}
+
+TEST(MotionGlitches, FilteringLeavesTheRestAndFindsNoneAfterwards) {
+  const MotionClip good = walk(100);
+  MotionClip clip = good;
+  for (const size_t i : {20u, 40u, 41u, 42u, 99u}) clip.world_from_head[i].position_m.z += 5.0;
+  clip.world_from_head[70].rotation = glm::angleAxis(glm::radians(150.0), glm::dvec3(1, 0, 0));
+  EXPECT_EQ(filter_glitches(clip), 6u);
+  EXPECT_EQ(find_glitches(clip).step_count, 0u);
+  for (size_t i = 0; i < 99; ++i) {
+    EXPECT_NEAR(glm::distance(clip.world_from_head[i].position_m, good.world_from_head[i].position_m), 0.0,
+                1e-12)
+        << i;
+    EXPECT_NEAR(angle_between_rad(clip.world_from_head[i].rotation, good.world_from_head[i].rotation), 0.0,
+                1e-7)
+        << i;
+  }
+  EXPECT_EQ(clip.world_from_head[99], clip.world_from_head[98]) << "nothing follows the last one";
+}
+
+TEST(MotionGlitches, AJumpThatStaysIsReachedAtTheLimit) {
+  MotionClip clip = walk(100);
+  for (size_t i = 50; i < 100; ++i) clip.world_from_head[i].position_m.z += 3.0;
+  EXPECT_EQ(filter_glitches(clip), 20u) << "3 m at 15 m/s are 0.2 s; the frame that gets there is good";
+  EXPECT_EQ(find_glitches(clip).step_count, 0u);
+  EXPECT_EQ(clip.world_from_head[99].position_m.z, 3.0);
+  MotionClip untouched = walk(100);
+  EXPECT_EQ(filter_glitches(untouched), 0u);
 }
 
 TEST(Gusts, SameSeedSameWindAndOtherSeedOtherWind) {
