@@ -168,6 +168,16 @@ glm::vec3 size_of(const Groom& groom) {
   return high - low;
 }
 
+/// What to say of a unit with which the head under this hair is none of a person; empty where it may be one.
+std::string unlikely_head(float unit_m, const Groom& groom) {
+  constexpr float kSmallestHeadM = 0.05f, kLargestHeadM = 0.2f;
+  const float radius = covered_head_radius(groom), radius_m = radius * unit_m;
+  if (radius == 0.0f || (radius_m >= kSmallestHeadM && radius_m <= kLargestHeadM)) return {};
+  return fmt::format(
+      "the head under this hair has a radius of {} then, as nobody's: groom.file.unit_m={:.4g} makes it {}",
+      unit_text(radius_m), guess_unit(groom).value, unit_text(radius * guess_unit(groom).value));
+}
+
 /// What to say of a unit with which no head has this hair; empty where one might. `size`: in file units.
 std::string unlikely_unit(float unit_m, const glm::vec3& size) {
   constexpr float kSmallestHairM = 0.03f, kLargestHairM = 6.0f;
@@ -184,34 +194,51 @@ std::string unlikely_unit(float unit_m, const glm::vec3& size) {
   return sentence;
 }
 
-/// A simulation pins all strands alike: at each end as many vertices as all of them pin. Returns what to say
-/// of strands that pinned more; empty if there are none.
+/// Vertices that a strand holds in a row from its root on, and up to its tip.
+struct HeldEnds {
+  size_t root = 0, tip = 0;
+  bool operator==(const HeldEnds&) const = default;
+};
+
+HeldEnds held_ends(std::span<const uint8_t> pins) {
+  const auto is_free = [](uint8_t pin) { return pin == 0; };
+  return {static_cast<size_t>(std::find_if(pins.begin(), pins.end(), is_free) - pins.begin()),
+          static_cast<size_t>(std::find_if(pins.rbegin(), pins.rend(), is_free) - pins.rbegin())};
+}
+
+/// A simulation pins all strands alike: at each end as many vertices as most of them, of equally many the
+/// fewer. Returns what to say of strands that pin others; empty if there are none.
 std::string pin_alike(Groom& groom) {
+  const size_t count = groom.vertex_count(0);
   const auto pins_of = [&](uint32_t strand) {
     return std::span(groom.pinned).subspan(groom.offset[strand], groom.vertex_count(strand));
   };
-  const auto is_free = [](uint8_t pin) { return pin == 0; };
-  const size_t count = pins_of(0).size();
-  size_t root = count, tip = count;
+  std::vector<size_t> roots(count + 1), tips(count + 1);  // strands that hold so many
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
+    const HeldEnds ends = held_ends(pins_of(strand));
+    ++roots[ends.root];
+    ++tips[ends.tip];
+  }
+  const auto most = [](const std::vector<size_t>& strands) {
+    return static_cast<size_t>(std::max_element(strands.begin(), strands.end()) - strands.begin());
+  };
+  const HeldEnds held{most(roots), most(tips)};
+  size_t changed = 0;
   for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
     const auto pins = pins_of(strand);
-    root =
-        std::min(root, static_cast<size_t>(std::find_if(pins.begin(), pins.end(), is_free) - pins.begin()));
-    tip =
-        std::min(tip, static_cast<size_t>(std::find_if(pins.rbegin(), pins.rend(), is_free) - pins.rbegin()));
+    bool is_other = false;
+    for (size_t i = 0; i < count; ++i) {
+      const uint8_t pin = i < held.root || i + held.tip >= count ? 1 : 0;
+      is_other = is_other || pin != pins[i];
+      pins[i] = pin;
+    }
+    changed += is_other ? 1 : 0;
   }
-  size_t freed = 0;
-  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
-    const auto pins = pins_of(strand);
-    const auto between = pins.subspan(root, root + tip < count ? count - root - tip : 0);
-    freed += std::all_of(between.begin(), between.end(), is_free) ? 0 : 1;
-    std::fill(between.begin(), between.end(), uint8_t{0});
-  }
-  if (freed == 0) return {};
+  if (changed == 0) return {};
   return fmt::format(
-      "{} of {} strands hold other vertices than the {} at the root and {} at the tip that all hold: "
-      "these are free (groom.file.pinning states what all hold)",
-      freed, groom.strand_count(), root, tip);
+      "{} of {} strands hold other vertices than most: {} at the root and {} at the tip are held of all now "
+      "(groom.file.pinning states it)",
+      changed, groom.strand_count(), held.root, held.tip);
 }
 
 /// What strands can be made of; the rest is left out and named.
@@ -242,50 +269,89 @@ std::string size_text(const Groom& groom) {
   return fmt::format("{:.2f} x {:.2f} x {:.2f} m", size_m.x, size_m.y, size_m.z);
 }
 
-/// Turns, moves and scales a groom in file units. What the options do not say the file may; the rest is
-/// guessed.
-PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
-  Groom& groom = stated.groom;
-  PlacedGroom placed;
-  placed.notes = std::move(stated.notes);
-  GroomPlacement& placement = placed.placement;
-  const auto note = [&](const std::string& what, const std::string& reason, const char* setting) {
-    placed.notes.push_back(fmt::format("{}: {} (groom.file.{} states it)", what, reason, setting));
-  };
+/// What to say of hair whose side that is up is another than the one that is taken, which the file states or
+/// nothing does; empty where it may be right.
+std::string unlikely_side(const Groom& groom, const UpSide& taken, bool is_stated) {
+  const Guess<UpSide> guess = is_stated ? guess_up(groom, taken) : Guess<UpSide>{taken, {}};
+  if (!guess.reason.empty())
+    return fmt::format(
+        "{} of the file is up by what it says, but {} by its hair, which covers that side: "
+        "groom.file.up_axis={} turns it up",
+        name_of(taken), name_of(guess.value), setting_of(guess.value));
+  const char* const side = lies_aside(groom, taken);
+  if (side == nullptr) return {};
+  return fmt::format(
+      "the hair covers {} of the file and hangs from it, and no setting turns that side up: turn "
+      "it where it was made",
+      side);
+}
+
+void note_guess(PlacedGroom& placed, const std::string& what, const std::string& reason,
+                const char* setting) {
+  placed.notes.push_back(fmt::format("{}: {} (groom.file.{} states it)", what, reason, setting));
+}
+
+/// Turns a groom upright, +Y up.
+void turn_up(StatedGroom& stated, const GroomFileOptions& options, PlacedGroom& placed) {
+  GroomPlacement upright;
   if (options.is_z_up) {
-    placement.is_z_up = *options.is_z_up;
-    placement.is_upside_down = options.is_upside_down;
+    upright.is_z_up = *options.is_z_up;
+    upright.is_upside_down = options.is_upside_down;
   } else if (stated.is_z_up) {
-    placement.is_z_up = *stated.is_z_up;
+    upright.is_z_up = *stated.is_z_up;
     placed.notes.push_back(fmt::format("+{} of the file is up: {} (groom.file.up_axis overrides it)",
                                        *stated.is_z_up ? 'Z' : 'Y', stated.up_axis_reason));
   } else {
-    const Guess<UpSide> guess = guess_up(groom);
-    placement.is_z_up = guess.value.is_z_up;
-    placement.is_upside_down = guess.value.is_upside_down;
+    const Guess<UpSide> guess = guess_up(stated.groom);
+    upright.is_z_up = guess.value.is_z_up;
+    upright.is_upside_down = guess.value.is_upside_down;
     if (!guess.reason.empty())
-      note(fmt::format("{} of the file is up", name_of(guess.value)), guess.reason, "up_axis");
+      note_guess(placed, fmt::format("{} of the file is up", name_of(guess.value)), guess.reason, "up_axis");
   }
-  GroomPlacement upright;
-  upright.is_z_up = placement.is_z_up;
-  upright.is_upside_down = placement.is_upside_down;
-  for (glm::vec3& point : groom.rest_position_m) point = upright.place(point);
+  if (!options.is_z_up) {
+    const UpSide side{upright.is_z_up, upright.is_upside_down};
+    placed.unlikely = unlikely_side(stated.groom, side, stated.is_z_up.has_value());
+    if (!placed.unlikely.empty()) placed.notes.push_back(placed.unlikely);
+  }
+  for (glm::vec3& point : stated.groom.rest_position_m) point = upright.place(point);
+  placed.placement.is_z_up = upright.is_z_up;
+  placed.placement.is_upside_down = upright.is_upside_down;
+}
+
+/// Finds the face of an upright groom.
+void turn_ahead(const Groom& groom, const GroomFileOptions& options, PlacedGroom& placed) {
+  GroomPlacement& placement = placed.placement;
   if (options.yaw_deg) {
     placement.yaw_deg = *options.yaw_deg;
   } else {
     const Guess<float> guess = guess_yaw_deg(groom);
     placement.yaw_deg = guess.value;
     if (guess.reason.empty()) {
-      note("the face is taken to be at +Z", "the hairline is as high all around", "yaw_deg");
+      note_guess(placed, "the face is taken to be at +Z", "the hairline is as high all around", "yaw_deg");
     } else if (guess.value == 0.0f) {
-      note("it faces +Z", guess.reason, "yaw_deg");
+      note_guess(placed, "it faces +Z", guess.reason, "yaw_deg");
     } else {
-      note(fmt::format("turned by {} degrees to face +Z", guess.value), guess.reason, "yaw_deg");
+      note_guess(placed, fmt::format("turned by {} degrees to face +Z", guess.value), guess.reason,
+                 "yaw_deg");
     }
   }
+}
+
+/// Turns, moves and scales a groom in file units. What the options do not say the file may; the rest is
+/// guessed.
+PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
+  PlacedGroom placed;
+  placed.notes = std::move(stated.notes);
+  turn_up(stated, options, placed);
+  turn_ahead(stated.groom, options, placed);
+  Groom& groom = stated.groom;
+  GroomPlacement& placement = placed.placement;
   const auto judge_unit = [&](float unit_m) {
-    placed.unlikely_unit = unlikely_unit(unit_m, size_of(groom));
-    if (!placed.unlikely_unit.empty()) placed.notes.push_back(placed.unlikely_unit);
+    std::string unlikely = unlikely_unit(unit_m, size_of(groom));
+    if (unlikely.empty()) unlikely = unlikely_head(unit_m, groom);
+    if (unlikely.empty()) return;
+    placed.notes.push_back(unlikely);
+    if (placed.unlikely.empty()) placed.unlikely = std::move(unlikely);
   };
   if (options.unit_m > 0.0f) {
     placement.unit_m = options.unit_m;
@@ -298,8 +364,8 @@ PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
   } else {
     const Guess<float> guess = guess_unit(groom);
     placement.unit_m = guess.value;
-    note(fmt::format("1 unit = {}", unit_text(guess.value)),
-         guess.reason.empty() ? "the roots say nothing of a head" : guess.reason, "unit_m");
+    note_guess(placed, fmt::format("1 unit = {}", unit_text(guess.value)),
+               guess.reason.empty() ? "the roots say nothing of a head" : guess.reason, "unit_m");
   }
   placed.material = usable_material(stated.material.scaled(placement.unit_m), placed.notes);
   placed.is_of_head = is_hair_of_head(groom);

@@ -38,8 +38,8 @@ struct PlacedGroom {
   StrandLabels labels;  // of its strands and vertices
   HairMaterial material;
   GroomPlacement placement;
-  bool is_of_head = true;     // its roots might be those of a head
-  std::string unlikely_unit;  // why no head has hair in this unit, and which one fits; empty: it may
+  bool is_of_head = true;  // its roots might be those of a head
+  std::string unlikely;    // why no head has hair in this unit or this side up, and what fits; empty: it may
   std::vector<std::string>
       notes;  // a sentence for each thing that the file says or that was guessed, and why
 };

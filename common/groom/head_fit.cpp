@@ -80,6 +80,14 @@ bool is_hair_of_head(const Groom& groom) {
   return 10 * static_cast<size_t>(near_count) >= kOfTen * roots.size();
 }
 
+float covered_head_radius(const Groom& groom) {
+  constexpr size_t kMinCoveredRoots = 64;
+  const std::vector<glm::vec3> roots = roots_of(groom);
+  if (roots.size() < kMinCoveredRoots || !is_hair_of_head(groom)) return 0.0f;
+  const FittedSphere fitted = fit_sphere(roots);
+  return std::isfinite(fitted.radius_m) && extent_m(roots) >= 2.0f * fitted.radius_m ? fitted.radius_m : 0.0f;
+}
+
 FittedSphere fit_head(const Groom& groom) {
   const FittedSphere fitted = fit_head_sphere(groom);
   if (groom.strand_count() >= kMinFittedRoots && fitted.radius_m >= kSmallestRadiusM &&

@@ -20,6 +20,10 @@ FittedSphere fit_head_sphere(const Groom& groom);
 /// them best.
 bool is_hair_of_head(const Groom& groom);
 
+/// Returns the radius of the head under the roots, in the groom's units; 0 where these are few, fur, or on
+/// too little of a head to say it.
+float covered_head_radius(const Groom& groom);
+
 /// Finds the head of a groom in metres. Uses the sphere through the roots if it has the size of a person's
 /// head. Otherwise it places a head of usual size so that the roots stand on it in the direction of growth.
 FittedSphere fit_head(const Groom& groom);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <numbers>
 #include <vector>
 
@@ -38,8 +39,14 @@ constexpr double kHairlineShare = 0.05;
 /// A hairline that rises and falls by less, in head radii, has no front.
 constexpr double kMinHairlineSwing = 0.15;
 constexpr double kQuarterTurnDeg = 90.0;
-/// A face nearer than this to a quarter turn is there: parts of a head of hair are up to 29 degrees off.
-constexpr double kSnapDeg = 32.0;
+/// A face nearer than this to a quarter turn is there: by the mirror, or where roots are not alike on both
+/// sides by the hairline alone, which is up to 29 degrees off.
+constexpr double kSnapDeg = 8.0, kHairlineSnapDeg = 32.0;
+/// The mirror is looked for so far from where the hairline is highest.
+constexpr int kMirrorReachDeg = 45;
+/// Roots whose two sides differ more, 0 to 1, are no mirror images. Heads of hair and their parts have up to
+/// 0.1.
+constexpr double kMostSkew = 0.12;
 
 double angle_of(const glm::dvec3& direction) {
   return std::atan2(direction.x, direction.z);
@@ -58,6 +65,57 @@ std::vector<glm::dvec3> root_directions(const Groom& groom, RootReach reach) {
     directions.push_back(offset / length);
   }
   return directions;
+}
+
+/// How roots lie around +Y: their first harmonics, in three weights of height.
+class RootHarmonics {
+ public:
+  explicit RootHarmonics(const std::vector<glm::dvec3>& directions) {
+    for (const glm::dvec3& direction : directions) {
+      const double across = std::hypot(direction.x, direction.z), angle = angle_of(direction),
+                   y = direction.y;
+      const std::array weights = {1.0, y, 2.0 * y * y - 1.0};  // Chebyshev's
+      for (size_t order = 0; order < kOrders; ++order)
+        for (size_t band = 0; band < weights.size(); ++band)
+          harmonic_[order][band] +=
+              std::polar(across, static_cast<double>(order + 1) * angle) * weights[band];
+    }
+  }
+  /// Returns how unlike the two sides of the upright plane at this angle are: 0 = mirror images, at most 1.
+  double skew(double angle) const {
+    double odd = 0.0, all = 0.0;
+    for (size_t order = 0; order < kOrders; ++order)
+      for (const std::complex<double>& sum : harmonic_[order]) {
+        const double part = (sum * std::polar(1.0, -static_cast<double>(order + 1) * angle)).imag();
+        odd += part * part;
+        all += std::norm(sum);
+      }
+    return all > 0.0 ? odd / all : 1.0;
+  }
+
+ private:
+  static constexpr size_t kOrders = 8;
+  std::array<std::array<std::complex<double>, 3>, kOrders> harmonic_{};
+};
+
+/// The angle of the face near that of the hairline, in degrees, and from where on it is taken as a quarter
+/// turn.
+struct FaceAngle {
+  double deg = 0.0, snap_deg = kHairlineSnapDeg;
+};
+
+FaceAngle face_by_mirror(const std::vector<glm::dvec3>& directions, double hairline_deg) {
+  const RootHarmonics roots(directions);
+  FaceAngle best{hairline_deg};
+  double least = kMostSkew;
+  for (int step = -kMirrorReachDeg; step <= kMirrorReachDeg; ++step) {
+    const double deg = std::round(hairline_deg) + step;
+    const double skew = roots.skew(deg * std::numbers::pi / 180.0);
+    if (skew >= least) continue;
+    best = {std::remainder(deg, 360.0), kSnapDeg};
+    least = skew;
+  }
+  return best;
 }
 
 /// What speaks for +Y being up.
@@ -83,6 +141,18 @@ Uprightness uprightness(const Groom& groom) {
   return result;
 }
 
+double score_of(const Uprightness& up) {
+  return up.top + up.fall;
+}
+
+Groom upright_by(Groom groom, const UpSide& side) {
+  GroomPlacement placement;
+  placement.is_z_up = side.is_z_up;
+  placement.is_upside_down = side.is_upside_down;
+  for (glm::vec3& point : groom.rest_position_m) point = placement.turn(point);
+  return groom;
+}
+
 }  // namespace
 
 glm::vec3 GroomPlacement::turn(const glm::vec3& direction) const {
@@ -100,18 +170,13 @@ glm::vec3 GroomPlacement::yawed(const glm::vec3& v) const {
   return {static_cast<float>(c * v.x + s * v.z), v.y, static_cast<float>(c * v.z - s * v.x)};
 }
 
-Guess<UpSide> guess_up(const Groom& groom) {
-  if (groom.strand_count() < kMinRoots) return {};
-  const auto score_of = [](const Uprightness& up) { return up.top + up.fall; };
-  Guess<UpSide> best;
-  double best_score = score_of(uprightness(groom)) + kClearlyBetter;
-  for (const UpSide& side : {UpSide{true, false}, {false, true}, {true, true}}) {
-    GroomPlacement placement;
-    placement.is_z_up = side.is_z_up;
-    placement.is_upside_down = side.is_upside_down;
-    Groom turned = groom;
-    for (glm::vec3& point : turned.rest_position_m) point = placement.turn(point);
-    const Uprightness up = uprightness(turned);
+Guess<UpSide> guess_up(const Groom& groom, const UpSide& assumed) {
+  if (groom.strand_count() < kMinRoots) return {assumed, {}};
+  Guess<UpSide> best{assumed, {}};
+  double best_score = score_of(uprightness(upright_by(groom, assumed))) + kClearlyBetter;
+  for (const UpSide& side : {UpSide{}, {true, false}, {false, true}, {true, true}}) {
+    if (side == assumed) continue;
+    const Uprightness up = uprightness(upright_by(groom, side));
     if (!(up.top > kOnTop && score_of(up) > best_score)) continue;
     best = {side, "the hair covers that side and hangs from it"};
     best_score = score_of(up);
@@ -119,14 +184,31 @@ Guess<UpSide> guess_up(const Groom& groom) {
   return best;
 }
 
+const char* lies_aside(const Groom& groom, const UpSide& assumed) {
+  if (groom.strand_count() < kMinRoots) return nullptr;
+  const double least = score_of(uprightness(upright_by(groom, assumed))) + kClearlyBetter;
+  for (const float sign : {1.0f, -1.0f}) {
+    Groom turned = groom;
+    for (glm::vec3& point : turned.rest_position_m) point = {-sign * point.y, sign * point.x, point.z};
+    const Uprightness up = uprightness(turned);
+    if (up.top > kOnTop && score_of(up) > least) return sign > 0.0f ? "+X" : "-X";
+  }
+  return nullptr;
+}
+
 const char* name_of(const UpSide& up) {
   return up.is_z_up ? (up.is_upside_down ? "-Z" : "+Z") : (up.is_upside_down ? "-Y" : "+Y");
+}
+
+const char* setting_of(const UpSide& up) {
+  return up.is_z_up ? (up.is_upside_down ? "MINUS_Z" : "Z") : (up.is_upside_down ? "MINUS_Y" : "Y");
 }
 
 Guess<float> guess_yaw_deg(const Groom& groom) {
   if (groom.strand_count() < kMinRoots) return {};
   std::array<std::vector<double>, kSectors> heights;
-  for (const glm::dvec3& direction : root_directions(groom, RootReach::Everywhere)) {
+  const std::vector<glm::dvec3> directions = root_directions(groom, RootReach::Everywhere);
+  for (const glm::dvec3& direction : directions) {
     const double turns = angle_of(direction) / (2.0 * std::numbers::pi) + 1.0;
     heights[static_cast<size_t>(turns * kSectors + 0.5) % kSectors].push_back(direction.y);
   }
@@ -139,12 +221,12 @@ Guess<float> guess_yaw_deg(const Groom& groom) {
     rise += 2.0 / kSectors * height * glm::dvec3(std::sin(angle), 0.0, std::cos(angle));
   }
   if (!(glm::length(rise) >= kMinHairlineSwing)) return {};
-  const double face_deg = angle_of(rise) * 180.0 / std::numbers::pi;
+  const auto [face_deg, snap_deg] = face_by_mirror(directions, angle_of(rise) * 180.0 / std::numbers::pi);
   const double quarter_deg = kQuarterTurnDeg * std::round(face_deg / kQuarterTurnDeg);
-  if (std::abs(face_deg - quarter_deg) > kSnapDeg) {
+  if (std::abs(face_deg - quarter_deg) > snap_deg) {
     const double whole_deg = std::round(face_deg);
     return {static_cast<float>(-whole_deg),
-            fmt::format("the hairline is highest {} degrees from +Z towards +X", whole_deg)};
+            fmt::format("the hairline is highest about {} degrees from +Z towards +X", whole_deg)};
   }
   constexpr std::array kNames = {"-Z", "-X", "+Z", "+X", "-Z"};
   const auto quarters = static_cast<size_t>(quarter_deg / kQuarterTurnDeg + 2.5);

@@ -39,16 +39,22 @@ struct Guess {
 struct UpSide {
   bool is_z_up = false;
   bool is_upside_down = false;
+  bool operator==(const UpSide&) const = default;
 };
 
-/// Guesses which of +Y, +Z, -Y and -Z is up: +Y, unless hair covers, and hangs from, another side clearly
-/// more. Any units.
-Guess<UpSide> guess_up(const Groom& groom);
+/// Guesses which of +Y, +Z, -Y and -Z is up: the assumed one, unless hair covers, and hangs from, another
+/// side clearly more; the reason is empty then. Any units.
+Guess<UpSide> guess_up(const Groom& groom, const UpSide& assumed = {});
+/// Returns "+X" or "-X" where that side is so, and nullptr for other hair.
+const char* lies_aside(const Groom& groom, const UpSide& assumed);
 /// Returns the name of a side: "+Z".
 const char* name_of(const UpSide& up);
+/// Returns how groom.file.up_axis names it.
+const char* setting_of(const UpSide& up);
 
 /// Guesses the rotation about +Y, in whole degrees, that turns the face to +Z; nearly a quarter turn is taken
-/// as one. The face is where the lowest roots are highest. `groom` is upright (+Y), in any unit.
+/// as one. The face is where the lowest roots are highest, in the plane to whose sides the roots are alike.
+/// `groom` is upright (+Y), in any unit.
 Guess<float> guess_yaw_deg(const Groom& groom);
 
 /// Guesses the unit: the first of metre, centimetre, millimetre and inch that gives the sphere through the

@@ -1,12 +1,14 @@
 #include "common/groom/usable_strands.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "common/base/mercy.h"
+#include "common/base/quantile.h"
 #include "common/math/point_tree.h"
 
 namespace strandcast {
@@ -38,6 +40,49 @@ std::string bridge_root_uv(Groom& groom) {
   for (const uint32_t strand : bad)
     groom.root_uv[strand] = groom.root_uv[good[tree.nearest(root(strand), 1).front().index]];
   return count + " those are as of the nearest root";
+}
+
+/// Strands that go further from the middle of the roots than so many times what half of them reach: a point
+/// of a broken export, and no hair.
+constexpr float kStrayReaches = 25.0f;
+constexpr size_t kMinJudgedStrands = 20;  // fewer do not say how far hair goes
+
+/// How far each strand goes from the middle of the roots; empty where that says nothing. Strands that are not
+/// kept go nowhere.
+std::vector<float> reaches_of(const Groom& groom, std::span<const uint8_t> is_kept) {
+  std::array<std::vector<float>, 3> roots;
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand)
+    for (int axis = 0; axis < 3 && is_kept[strand] != 0; ++axis)
+      roots[static_cast<size_t>(axis)].push_back(groom.rest_position_m[groom.offset[strand]][axis]);
+  if (roots[0].size() < kMinJudgedStrands) return {};
+  glm::vec3 middle;
+  for (int axis = 0; axis < 3; ++axis) middle[axis] = median(std::move(roots[static_cast<size_t>(axis)]));
+  std::vector<float> reaches(groom.strand_count(), 0.0f);
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand)
+    for (uint32_t i = groom.offset[strand]; i < groom.offset[strand + 1] && is_kept[strand] != 0; ++i)
+      reaches[strand] = std::max(reaches[strand], glm::distance(groom.rest_position_m[i], middle));
+  return reaches;
+}
+
+/// Takes out strands with a point where no hair is, if they are few: else the hair is like that.
+void find_strays(const Groom& groom, std::vector<uint8_t>& is_kept, BadItems& broken) {
+  const std::vector<float> reaches = reaches_of(groom, is_kept);
+  std::vector<float> kept;
+  for (size_t strand = 0; strand < reaches.size(); ++strand)
+    if (is_kept[strand] != 0) kept.push_back(reaches[strand]);
+  if (kept.empty()) return;
+  const float usual = median(std::move(kept)), furthest = kStrayReaches * usual;
+  const auto is_stray = [&](float reach) { return usual > 0.0f && reach > furthest; };
+  const auto count = static_cast<uint64_t>(std::count_if(reaches.begin(), reaches.end(), is_stray));
+  if (count * kMostBadShare > groom.strand_count()) return;
+  for (size_t strand = 0; strand < reaches.size(); ++strand) {
+    if (!is_stray(reaches[strand])) continue;
+    is_kept[strand] = 0;
+    broken.add(
+        make_error(ErrorCode::BadInput,
+                   "strand {} goes {:.4g} units from the middle of the roots, half of all at most {:.4g}",
+                   strand, reaches[strand], usual));
+  }
 }
 
 /// With what is said of coordinates of roots, which come last: roots are finite by then.
@@ -110,6 +155,7 @@ Result<StatedGroom> with_usable_strands(StatedGroom stated) {
     if (is_empty) ++empty_count;
     if (is_broken || is_empty) is_kept[strand] = 0;
   }
+  find_strays(groom, is_kept, broken);
   RETURN_IF_ERROR(broken.judge(strand_count, "strands"));
   if (broken.count() + empty_count == 0) return with_usable_uv(std::move(stated));
   if (broken.count() + empty_count == strand_count)

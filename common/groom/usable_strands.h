@@ -9,9 +9,9 @@
 
 namespace strandcast {
 
-/// Leaves out strands with a point that is not finite, and those that show nothing: of fewer than two points
-/// or without length. Coordinates of roots that are not finite are bridged. Notes count them. BadInput when
-/// nothing is left, or when more than a tenth is not finite.
+/// Leaves out strands with a point that is not finite or far from all other hair, and those that show
+/// nothing: of fewer than two points or without length. Coordinates of roots that are not finite are bridged.
+/// Notes count them. BadInput when nothing is left, or when more than a tenth is broken.
 Result<StatedGroom> with_usable_strands(StatedGroom stated);
 
 /// Removes the strands whose element is 0, with all that is said of them; takes no further memory.

@@ -186,9 +186,8 @@ Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::p
   const Result<std::string> stepped = step_groom(scene, content, config);
   if (stepped) text += *stepped;
   RETURN_IF_ERROR(save_file(folder / "groom.txt", std::as_bytes(std::span(text))));
-  if (!content.unlikely_unit.empty())
-    return make_error(ErrorCode::BadInput, "{} (the picture is in {})", content.unlikely_unit,
-                      folder.string());
+  if (!content.unlikely.empty())
+    return make_error(ErrorCode::BadInput, "{} (the picture is in {})", content.unlikely, folder.string());
   if (!stepped) return stepped.error();
   return text;
 }

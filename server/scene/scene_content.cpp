@@ -140,7 +140,7 @@ Result<SceneContent> load_scene_content(const SceneDesc& scene) {
     ASSIGN_OR_RETURN(FileGroom hair, load_file_groom(*file));
     content.groom = hair.simulated();
     content.notes = std::move(hair.placed.notes);
-    content.unlikely_unit = std::move(hair.placed.unlikely_unit);
+    content.unlikely = std::move(hair.placed.unlikely);
     content.material = hair.placed.material;
     placement = hair.placed.placement;
     // Fur gets none, unless somebody says where it is.

@@ -23,7 +23,7 @@ struct SceneContent {
   std::vector<SphereCollider> colliders;            // head space: the scene's own, or those of the head
   BustRig bust;                                     // of the head; none without shoulders
   std::vector<std::string> notes;                   // a sentence for each thing that was guessed or fitted
-  std::string unlikely_unit;                        // as PlacedGroom
+  std::string unlikely;                             // as PlacedGroom
   HairMaterial material;                            // likewise
   std::shared_ptr<const Groom> volume_target;       // head space; where the scene names one
   std::shared_ptr<const DistanceField> head_field;  // head space; where the scene asks for one

@@ -247,15 +247,25 @@ TEST(BrokenTfx, PartsThatAreHeldOtherwiseStartAllTheSame) {
   options.unit_m = 0.01f;
   options.path = folder.write("both_ends.tfx", small_v3(6, 1).text());
   EXPECT_EQ(load_groom(options)->pinned, (std::vector<uint8_t>{1, 1, 0, 0, 1, 1, 1, 1, 0, 0, 1, 1}));
-  options.more_paths = {folder.write("free_tips.tfx", small_v3(6, 0).text())};
-  const auto placed = load_placed_groom(options);
-  ASSERT_TRUE(placed) << placed.error().to_string();
-  for (uint32_t strand = 0; strand < 4; ++strand)
-    for (uint32_t vertex = 0; vertex < 6; ++vertex)
-      EXPECT_EQ(placed->groom.pinned[6 * strand + vertex], vertex < 2 ? 1 : 0) << strand << ' ' << vertex;
-  EXPECT_THAT(placed->notes,
-              Contains(HasSubstr("2 of 4 strands hold other vertices than the 2 at the root and 0 at "
-                                 "the tip that all hold")));
+  const auto free_tips = folder.write("free_tips.tfx", small_v3(6, 0).text());
+  const auto both_ends = options.path;
+  // What most do; of equally many the fewer.
+  for (const bool is_tied : {false, true}) {
+    options.more_paths = {free_tips};
+    if (is_tied) options.more_paths.push_back(both_ends);
+    const auto placed = load_placed_groom(options);
+    ASSERT_TRUE(placed) << placed.error().to_string();
+    const uint32_t strand_count = placed->groom.strand_count();
+    for (uint32_t strand = 0; strand < strand_count; ++strand)
+      for (uint32_t vertex = 0; vertex < 6; ++vertex)
+        EXPECT_EQ(placed->groom.pinned[6 * strand + vertex], vertex < 2 || (is_tied && vertex > 3) ? 1 : 0)
+            << strand << ' ' << vertex;
+    EXPECT_THAT(
+        placed->notes,
+        Contains(HasSubstr(fmt::format("2 of {} strands hold other vertices than most: 2 at the root and {} "
+                                       "at the tip",
+                                       strand_count, is_tied ? 2 : 0))));
+  }
   options.pinning = Pinning::BothEnds;
   EXPECT_EQ(load_groom(options)->pinned[6 * 3 + 5], 1) << "stated";
 }
@@ -441,6 +451,30 @@ TEST(BrokenStrands, ATenthMayBeBrokenAndIsLeftOutAndCounted) {
     EXPECT_THAT(more.error().to_string(),
                 AllOf(HasSubstr(name), HasSubstr("5 of 40 strands cannot be used, a tenth at most")));
   }
+}
+
+TEST(BrokenStrands, APointFarFromAllHairCostsItsStrandAlone) {
+  const TemporaryFolder folder;
+  GroomFileOptions options;
+  options.unit_m = 0.1f;
+  const auto loaded = [&](uint32_t far_count, float x) {
+    SomeHair hair({}, {});
+    for (uint32_t strand = 0; strand < far_count; ++strand)
+      hair.points[(7 + 3 * strand) * SomeHair::kPoints + 1].x = x;
+    options.path = folder.write("far.ply", hair.ply());
+    return load_placed_groom(options);
+  };
+  const auto whole = loaded(0, 0.0f);
+  ASSERT_TRUE(whole) << whole.error().to_string();
+  for (const float x : {2.5e3f, -1e20f}) {
+    const auto one = loaded(1, x);
+    ASSERT_TRUE(one) << one.error().to_string();
+    EXPECT_EQ(one->groom.strand_count(), whole->groom.strand_count() - 1);
+    EXPECT_THAT(one->notes, Contains(AllOf(HasSubstr("1 of 40 strands cannot be used, and are left out"),
+                                           HasSubstr("strand 7 goes "))));
+  }
+  // A quarter of all is no accident.
+  EXPECT_EQ(loaded(10, 600.0f)->groom.strand_count(), whole->groom.strand_count());
 }
 
 }  // namespace

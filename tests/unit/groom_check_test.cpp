@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "common/base/file.h"
+#include "common/groom/groom_file.h"
 #include "common/pictures/image_codec.h"
 #include "server/scene/scene_content.h"
 #include "tests/support/temporary_folder.h"
@@ -86,16 +87,71 @@ TEST(GroomCheck, FailsForAUnitInWhichNoHeadHasThisHair) {
   const std::string text = straight_hair(0.2f);
   ASSERT_TRUE(save_file(folder.path() / "hair.ply", std::as_bytes(std::span(text))));
   SceneDesc scene = scene_of_file(folder.path() / "hair.ply");
-  EXPECT_EQ(load_scene_content(scene).value().unlikely_unit, "");
+  EXPECT_EQ(load_scene_content(scene).value().unlikely, "");
   const char* const part = "m long then, as on no head: groom.file.unit_m=1";
   for (const float unit_m : {100.0f, 0.01f}) {
     std::get<FileGroomDesc>(scene.groom).unit_m = unit_m;
-    EXPECT_THAT(load_scene_content(scene).value().unlikely_unit, HasSubstr(part)) << unit_m;
+    EXPECT_THAT(load_scene_content(scene).value().unlikely, HasSubstr(part)) << unit_m;
   }
   const auto checked = check_groom(scene, folder.path(), {});
   ASSERT_FALSE(checked);
   EXPECT_THAT(checked.error().to_string(), HasSubstr(part));
   EXPECT_THAT(load_text(folder.path() / "groom.txt", 1 << 20).value(), HasSubstr(part));
+}
+
+// A head of 0.1 m that is said to be one of inches in metres, and other such mistakes that leave hair of a
+// likely length.
+TEST(GroomCheck, FailsForAUnitThatFitsTheHairAndNotTheHead) {
+  const TemporaryFolder folder;
+  const std::string text = straight_hair(0.2f);
+  ASSERT_TRUE(save_file(folder.path() / "hair.ply", std::as_bytes(std::span(text))));
+  GroomFileOptions options;
+  options.path = folder.path() / "hair.ply";
+  for (const float unit_m : {2.54f, 3.28f, 1.0f / 2.54f, 0.3048f}) {
+    options.unit_m = unit_m;
+    EXPECT_THAT(load_placed_groom(options).value().unlikely,
+                HasSubstr("as nobody's: groom.file.unit_m=1 makes it"))
+        << unit_m;
+  }
+  options.unit_m = 1.2f;
+  EXPECT_EQ(load_placed_groom(options).value().unlikely, "") << "a large one";
+}
+
+TEST(GroomCheck, FailsForASideThatIsNotUp) {
+  const TemporaryFolder folder;
+  // Strands that leave the upper half of a head and fall from it, with the file's axes and what it says of
+  // them.
+  const auto judged = [&](const glm::mat3& file_from_head, const std::string& said) {
+    std::string text =
+        "ply\nformat ascii 1.0\ncomment strand_vertex_count 3\n" + said +
+        "element vertex 600\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+    for (int strand = 0; strand < 200; ++strand) {
+      const float y = 1.0f - (static_cast<float>(strand) + 0.5f) / 200.0f,
+                  around = 2.399963f * static_cast<float>(strand);
+      const float across = std::sqrt(1.0f - y * y);
+      const glm::vec3 out(across * std::sin(around), y, across * std::cos(around));
+      for (const glm::vec3& point : {0.1f * out, 0.12f * out, 0.12f * out - glm::vec3(0, 0.2f, 0)}) {
+        const glm::vec3 p = file_from_head * point;
+        text += fmt::format("{} {} {}\n", p.x, p.y, p.z);
+      }
+    }
+    EXPECT_TRUE(save_file(folder.path() / "hair.ply", std::as_bytes(std::span(text))));
+    GroomFileOptions options;
+    options.path = folder.path() / "hair.ply";
+    options.is_z_up.reset();
+    return load_placed_groom(options).value().unlikely;
+  };
+  const glm::mat3 y_up(1.0f), z_up({1, 0, 0}, {0, 0, 1}, {0, -1, 0}), x_up({0, -1, 0}, {1, 0, 0}, {0, 0, 1});
+  const std::string says_y = "comment up_axis Y\n", says_z = "comment up_axis Z\n";
+  EXPECT_EQ(judged(y_up, ""), "");
+  EXPECT_EQ(judged(y_up, says_y), "");
+  EXPECT_EQ(judged(z_up, ""), "") << "found";
+  EXPECT_EQ(judged(z_up, says_z), "");
+  EXPECT_THAT(judged(z_up, says_y), HasSubstr("groom.file.up_axis=Z turns it up"));
+  EXPECT_THAT(judged(y_up, says_z), HasSubstr("groom.file.up_axis=Y turns it up"));
+  EXPECT_THAT(judged(-z_up * glm::mat3({-1, 0, 0}, {0, 1, 0}, {0, 0, 1}), says_y),
+              HasSubstr("up_axis=MINUS_Z"));
+  EXPECT_THAT(judged(x_up, ""), HasSubstr("the hair covers +X of the file"));
 }
 
 TEST(GroomCheck, FailsWhereAServerWouldNotStart) {

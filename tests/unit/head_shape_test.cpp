@@ -316,7 +316,7 @@ TEST(Placement, EverySideThatIsUpIsFoundAndTurnedUp) {
 
 TEST(Placement, AFaceBetweenTwoQuarterTurnsIsFound) {
   const Groom groom = full_head();
-  for (const float yaw_deg : {45.0f, -45.0f, 135.0f, -135.0f}) {
+  for (const float yaw_deg : {15.0f, 30.0f, 45.0f, 70.0f, -20.0f, -45.0f, -110.0f, 135.0f, -135.0f, 165.0f}) {
     GroomPlacement turn;
     turn.yaw_deg = yaw_deg;
     const Groom turned = moved(groom, [&](const glm::vec3& p) { return turn.place(p); });
