@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/kernels/head_path.h"
+
 namespace strandcast {
 namespace {
 
