@@ -20,8 +20,8 @@ bool SceneDesc::operator==(const SceneDesc&) const = default;
 
 SceneDesc built_in_scene() {
   SceneDesc scene;
-  // A light breeze from the front left: strong enough to see, too weak to blow locks over the shoulders.
-  scene.wind.mean_mps = {0.54f, 0.0f, -0.72f};
+  // A light breeze from the front left: strong enough to see, too weak to lift the hair off the head.
+  scene.wind.mean_mps = {0.9f, 0.0f, -1.2f};
   scene.wind.gust_intensity = 0.5f;
   scene.solver.parameters["sag_free"] = 1.0;
   return scene;

@@ -158,15 +158,16 @@ TEST_F(ScenarioProgram, AStretchThatFailsSaysWhereAndWhatHelps) {
 
 // Each of these is seen to hold, and to fail where more is asked for than there is.
 TEST_F(ScenarioProgram, OrderCoherenceAndProcessorShareAreMeasured) {
-  const auto path = write("hair.textproto",
-                          "name: \"hair\"\n"
-                          "do { start { set: \"groom.procedural.strand_count=150\" set: "
-                          "\"stream.bound_m=0.00001\" lockstep: true } }\n"
-                          "do { view { name: \"a\" } }\n"
-                          "do { feed { motion: \"shake\" } }\n"
-                          "do { step: 40 }\n"
-                          "do { expect { order_above: 0.2 incoherent_below: 0.9 cpu_share_below: 64 } }\n"
-                          "do { expect { order_above: 1 incoherent_below: 1e-6 cpu_share_below: 1e-6 } }\n");
+  const auto path =
+      write("hair.textproto",
+            "name: \"hair\"\n"
+            "do { start { set: \"groom.procedural.strand_count=150\" set: \"quality=full\" set: "
+            "\"stream.bound_m=0.00001\" lockstep: true } }\n"
+            "do { view { name: \"a\" } }\n"
+            "do { feed { motion: \"shake\" } }\n"
+            "do { step: 40 }\n"
+            "do { expect { order_above: 0.2 incoherent_below: 0.9 cpu_share_below: 64 } }\n"
+            "do { expect { order_above: 1 incoherent_below: 1e-6 cpu_share_below: 1e-6 } }\n");
   EXPECT_EQ(run({"--scenario", path.string()}), 1) << text_of("said");
   const std::string said = text_of("said");
   EXPECT_THAT(said, AllOf(HasSubstr("3 of 6"), Not(HasSubstr("FAIL  line 6")))) << said;

@@ -459,7 +459,7 @@ TEST(SceneFile, BuiltInSceneIsValidAndTakesOverrides) {
   ASSERT_TRUE(groom);
   EXPECT_EQ(groom->strand_count, 2000u);
   EXPECT_EQ(groom->vertex_count, 16u);
-  EXPECT_NEAR(glm::length(same->wind.mean_mps), 0.9, 0.01);
+  EXPECT_NEAR(glm::length(same->wind.mean_mps), 1.5, 0.01);
   EXPECT_GT(same->wind.gust_intensity, 0.0f);
   EXPECT_TRUE(same->has_auto_collider);
   EXPECT_EQ(built_in_scene_with({"substeps=2"})->substeps, 2u);

@@ -20,7 +20,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kExpectPoll{50};
-constexpr double kStillS = 1.5, kLongestStillS = 15.0;  // without another picture; of waiting for that
+constexpr double kStillS = 4.0, kLongestStillS = 15.0;  // without another picture; of waiting for that
 constexpr size_t kMaxExpectedChars = 300;
 constexpr double kRefusalTimeoutS = 10.0;
 constexpr size_t kHashChars = 16;
