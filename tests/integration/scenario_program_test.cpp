@@ -161,11 +161,11 @@ TEST_F(ScenarioProgram, OrderCoherenceAndProcessorShareAreMeasured) {
   const auto path =
       write("hair.textproto",
             "name: \"hair\"\n"
-            "do { start { set: \"groom.procedural.strand_count=150\" set: \"quality=full\" set: "
+            "do { start { set: \"groom.procedural.strand_count=300\" set: \"quality=full\" set: "
             "\"stream.bound_m=0.00001\" lockstep: true } }\n"
             "do { view { name: \"a\" } }\n"
             "do { feed { motion: \"shake\" } }\n"
-            "do { step: 40 }\n"
+            "do { step: 120 }\n"
             "do { expect { order_above: 0.2 incoherent_below: 0.9 cpu_share_below: 64 } }\n"
             "do { expect { order_above: 1 incoherent_below: 1e-6 cpu_share_below: 1e-6 } }\n");
   EXPECT_EQ(run({"--scenario", path.string()}), 1) << text_of("said");
