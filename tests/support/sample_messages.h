@@ -23,7 +23,7 @@ inline std::vector<ClientMessage> sample_client_messages() {
   CameraChange camera;
   camera.camera = {{1.0f, 2.0f, -3.0f}, {0.5f, 0.25f, 0.125f}, 1.25f};
   return {Hello{Role::Controller, StreamMode::Auto, "Zoë", "secret", 640, 360, true, kAllPictureCodecs, true,
-                12.5, "delta", true, "ben", "fedcba9876543210", 5},
+                12.5, "delta", true, "ben", "fedcba9876543210", 5, 2},
           motion,
           wind,
           camera,
