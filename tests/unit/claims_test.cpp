@@ -103,7 +103,7 @@ std::vector<std::string> built_claims() {
       fmt::format("({:g} times while the time of a server without a GPU is only guessed)",
                   kGuessedFramesGain),
       fmt::format("within {:g} mm of what was simulated", 1e3 * scene_fields::kStreamBound.minimum),
-      fmt::format("more than a {} of it is broken", kMostBadShare == 10 ? "tenth" : "share"),
+      fmt::format("more than a {} refuses it", kMostBadShare == 10 ? "tenth" : "share"),
       fmt::format("no change follows another within {:g} s", kFirstDwellNs / kNsPerS),
   };
 }
