@@ -82,6 +82,18 @@ LatticeFrame turned_frame(const LightLatticeDesc& desc, const LightDirections& l
   return frame;
 }
 
+// How far above the skin a place is that the head has no effect on, units of LatticeFrame::soft_m.
+constexpr float kNoSolid = -4.0f;
+
+// Share of a cell that is head, from how far below the skin it lies.
+float near_share(float below) {
+  return std::clamp(0.5f + (0.5f / kSolidRamp) * (below - kSolidInset), 0.0f, 1.0f);
+}
+// The same for what lies far behind it.
+float far_share(float below) {
+  return std::clamp(0.5f + (0.5f / kSolidFarRamp) * (below - kSolidFarInset), 0.0f, 1.0f);
+}
+
 // The lattice is as large as the hair and stands on whole cells, so that a shadow does not shimmer when the
 // hair's extent changes a little.
 void set_size(const LightLatticeDesc& desc, Bounds bounds, LatticeFrame& frame) {
@@ -116,6 +128,10 @@ LatticeFrame fit_lattice(const LightLatticeDesc& desc, const LightDirections& li
   bounds.high += room_m;
   set_size(desc, bounds, frame);
   return frame;
+}
+
+int solid_far_cells(const LatticeFrame& frame) {
+  return std::max(static_cast<int>(std::lround(kSolidFar * frame.soft_m / frame.cell_m)), 1);
 }
 
 float strand_depth_per_m(const LatticeFrame& frame, float width_m) {
@@ -199,9 +215,10 @@ void LightLattice::sum_strands(const StrandPoints& points, const LightStrands& s
   summed_.push_back(sums_[0].data());
 }
 
-// Shares of one row of cells. Far from the skin distances tell of how many cells nothing changes.
-void LightLattice::find_solid(int y, int z, std::vector<float>& share) const {
-  std::fill(share.begin(), share.end(), 0.0f);
+// How far below the skin one row of cells lies, in units of soft_m. Far from the skin distances tell of how
+// many cells no share changes.
+void LightLattice::find_solid(int y, int z, std::vector<float>& below) const {
+  std::fill(below.begin(), below.end(), kNoSolid);
   const auto is_border = [](int at, int size) {
     return at < kSolidBorderCells || at >= size - kSolidBorderCells;
   };
@@ -231,8 +248,10 @@ void LightLattice::find_solid(int y, int z, std::vector<float>& share) const {
   }
   // Distances from cell to cell are up to an eighth too long, and rounded.
   constexpr float kSure = 0.8f;
-  const float per_ramp = 1.0f / (kSolidRamp * view_.soft_m);
-  const float cells_per_ramp = 1.0f / (per_ramp * view_.cell_m);
+  const float per_soft = 1.0f / view_.soft_m;
+  const float cells_per_soft = view_.soft_m / view_.cell_m;
+  // From here on every share is 0 or 1.
+  constexpr float kWholeFrom = std::max(kSolidInset + kSolidRamp, kSolidFarInset + kSolidFarRamp);
   if (!(first <= last)) return;
   const int end = static_cast<int>(std::floor(last)) + 1;
   for (int x = static_cast<int>(std::ceil(first)); x < end;) {
@@ -246,11 +265,10 @@ void LightLattice::find_solid(int y, int z, std::vector<float>& share) const {
     const glm::vec3 beyond =
         is_bust_turned ? cell - glm::clamp(cell, glm::vec3(0.0f), glm::vec3(head.size - 1)) : glm::vec3(0.0f);
     const float distance_m = distance_at(head, cell) + head.cell_m * glm::length(beyond);
-    const float outside = (distance_m + kSolidInset * view_.soft_m) * per_ramp;
-    const float solid = std::clamp(0.5f - 0.5f * outside, 0.0f, 1.0f);
+    const float here = -distance_m * per_soft;
     const int alike =
-        1 + static_cast<int>(std::max(kSure * (std::abs(outside) - 1.0f) * cells_per_ramp, 0.0f));
-    for (const int until = std::min(x + alike, end); x < until; ++x) share[x] = solid;
+        1 + static_cast<int>(std::max(kSure * (std::abs(here) - kWholeFrom) * cells_per_soft, 0.0f));
+    for (const int until = std::min(x + alike, end); x < until; ++x) below[x] = here;
   }
 }
 
@@ -277,9 +295,13 @@ void LightLattice::sweep_key(WorkerPool& workers) {
     std::vector<float> solid(size.x);
     std::vector<float> most_solid(size.x);
     std::vector<int32_t> sum(size.x);
+    // How far below the skin the last rows towards the light lie.
+    const auto far = static_cast<size_t>(solid_far_cells(view_));
+    std::vector<std::vector<float>> below(far, std::vector<float>(size.x));
     for (size_t y = 2 * begin; y < 2 * end; ++y) {
       std::fill(passed.begin(), passed.end(), 0.0f);
       std::fill(most_solid.begin(), most_solid.end(), 0.0f);
+      for (auto& row : below) std::fill(row.begin(), row.end(), kNoSolid);
       for (int z = 0; z < size.z; ++z) {
         const size_t row = static_cast<size_t>(z) * slice + y * size.x;
         std::copy_n(summed_[0] + row, size.x, sum.data());
@@ -288,7 +310,12 @@ void LightLattice::sweep_key(WorkerPool& workers) {
           for (int x = 0; x < size.x; ++x) sum[x] += from[x];
         }
         for (int x = 0; x < size.x; ++x) here[x] = static_cast<float>(sum[x]) * kLightSumUnit;
-        if (has_solid()) find_solid(static_cast<int>(y), z, solid);
+        if (has_solid()) {
+          std::vector<float>& here_below = below[static_cast<size_t>(z) % far];
+          for (int x = 0; x < size.x; ++x) most_solid[x] = std::max(most_solid[x], far_share(here_below[x]));
+          find_solid(static_cast<int>(y), z, here_below);
+          for (int x = 0; x < size.x; ++x) solid[x] = near_share(here_below[x]);
+        }
         uint16_t* const key = key_.data() + row;
         constexpr float kStored = 1.0f / kLightDepthUnit;
         for (int x = 0; x < size.x; ++x) {

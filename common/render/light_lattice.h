@@ -72,6 +72,13 @@ inline constexpr int kMaxLightCellsPerAxis = 160;
 inline constexpr float kSolidInset = 0.5f;
 inline constexpr float kSolidRamp = 0.8f;
 inline constexpr float kSkinLift = 0.9f;
+/// From this far behind the head on, its edge counts in a wider ramp, which no cell's border shows in. Nearer
+/// than that, lit skin would darken itself. Units of LatticeFrame::soft_m.
+inline constexpr float kSolidFar = 3.0f;
+inline constexpr float kSolidFarInset = 0.2f;
+inline constexpr float kSolidFarRamp = 1.6f;
+/// kSolidFar in whole cells of a lattice.
+int solid_far_cells(const LatticeFrame& frame);
 /// Cells along the lattice's sides in which the head has no effect. Lookups outside the lattice use them, and
 /// a body that continues there must not shade itself.
 inline constexpr int kSolidBorderCells = 2;
@@ -117,7 +124,7 @@ class LightLattice {
   void sweep_key(WorkerPool& workers);
   void store_others(WorkerPool& workers);
   bool has_solid() const { return desc_.solid && !desc_.solid->is_empty(); }
-  void find_solid(int y, int z, std::vector<float>& share) const;
+  void find_solid(int y, int z, std::vector<float>& below) const;
   /// Sweeps across the lattice of half resolution; the head has this opacity per LatticeFrame::soft_m.
   std::vector<float> halved_with(float solid_depth) const;
   void sweep_from_eye(const glm::vec3& eye, int axis);

@@ -180,7 +180,7 @@ TEST_F(LightLatticeTest, AHeadIsOpaqueAndBesideItNothingIs) {
     EXPECT_LT(key_depth(lattice.view(), kRadiusM * (1.15f * aside - 1.1f * to_light)), 0.5);
     // The surface that counts lies a little below its skin.
     const float seen_m = kRadiusM - kSolidInset * lattice.view().soft_m;
-    const float room_m = (kSolidRamp + 1.0f) * lattice.view().soft_m;
+    const float room_m = (kSolidFarRamp + 1.0f) * lattice.view().soft_m;
     EXPECT_LT(key_depth(lattice.view(), (seen_m + room_m) * aside - 1.1f * kRadiusM * to_light), 0.1);
     EXPECT_GT(key_depth(lattice.view(), (seen_m - room_m) * aside - 1.1f * kRadiusM * to_light),
               0.9 * kSolidDepth);
@@ -237,6 +237,46 @@ double smooth_key_depth(const LightLatticeView& view, const glm::vec3& point) {
                                  view.axis[2] * (view.origin_m.z + view.cell_m * at.z));
   }
   return depth;
+}
+
+// What lies behind the head's edge is lit alike all along it: the shadow's edge shows no cells.
+TEST_F(LightLatticeTest, TheEdgeOfTheHeadsShadowShowsNoCells) {
+  constexpr float kRadiusM = 0.08f;
+  OccupancyRequest request;
+  request.ball = FittedSphere{glm::vec3(0.0f), kRadiusM};
+  LightLattice lattice({0.45f, kLightCells, true, *request.ball,
+                        std::make_shared<const HeadOccupancy>(make_head_occupancy(Mesh(), request))});
+  const glm::vec3 to_light = glm::normalize(glm::vec3(0.3f, 1, 0.2f));
+  build(lattice, strands_in_box(10, 0.25f), {kWidthM, 1.0f, 0.0f}, {to_light, {0, 1, 0}, {0, 1, 0}, false},
+        workers_);
+  const glm::vec3 aside = glm::normalize(glm::cross(to_light, glm::vec3(0.3f, 0.1f, 1)));
+  const glm::vec3 across = glm::cross(to_light, aside);
+  // Mean light on a circle around the shadow's axis, and how much it differs along it.
+  const auto light_at = [&](float radius_m) {
+    constexpr int kPlaces = 720;
+    double sum = 0.0;
+    double squares = 0.0;
+    for (int i = 0; i < kPlaces; ++i) {
+      const float angle = 6.2831853f * static_cast<float>(i) / kPlaces;
+      const glm::vec3 place =
+          radius_m * (std::cos(angle) * aside + std::sin(angle) * across) - kRadiusM * to_light;
+      const double light = std::exp(-smooth_key_depth(lattice.view(), place));
+      sum += light / kPlaces;
+      squares += light * light / kPlaces;
+    }
+    return std::pair(sum, std::sqrt(std::max(squares - sum * sum, 0.0)));
+  };
+  float dark_m = 0.9f * kRadiusM;
+  float lit_m = 1.1f * kRadiusM;
+  ASSERT_LT(light_at(dark_m).first, 0.1);
+  ASSERT_GT(light_at(lit_m).first, 0.9);
+  for (int i = 0; i < 20; ++i) {
+    const float middle_m = 0.5f * (dark_m + lit_m);
+    (light_at(middle_m).first < 0.5 ? dark_m : lit_m) = middle_m;
+  }
+  EXPECT_LT(light_at(dark_m).second, 0.06);
+  // The edge lies where the head's is, within half a cell.
+  EXPECT_NEAR(dark_m, kRadiusM, 0.5f * lattice.view().soft_m);
 }
 
 /// Skin of a face that a light shines at: how much of it the head hides from the light even this far above
@@ -413,6 +453,7 @@ TEST_F(LightLatticeTest, NoCellOfTheHeadIsSkipped) {
   for (int y = 0; y < view.size.y; ++y)
     for (int x = 0; x < view.size.x; ++x) {
       double most = 0.0;
+      std::vector<double> below(static_cast<size_t>(view.size.z), -100.0);
       for (int z = 0; z < view.size.z; ++z) {
         const glm::vec3 along = view.origin_m + view.cell_m * glm::vec3(x, y, z);
         const glm::vec3 place = (along.x * view.axis[0] + along.y * view.axis[1] + along.z * view.axis[2] -
@@ -423,8 +464,14 @@ TEST_F(LightLatticeTest, NoCellOfTheHeadIsSkipped) {
                               glm::all(glm::lessThan(at, view.size - kSolidBorderCells)) &&
                               glm::all(glm::greaterThan(place, glm::vec3(-0.5f))) &&
                               glm::all(glm::lessThan(place, glm::vec3(desc.solid->size) - 0.5f));
-        const float outside = distance_at(*desc.solid, place) / view.soft_m + kSolidInset;
-        if (is_there) most = std::max(most, std::clamp(0.5 - outside * 0.5 / kSolidRamp, 0.0, 1.0));
+        if (is_there) below[static_cast<size_t>(z)] = -distance_at(*desc.solid, place) / view.soft_m;
+        const auto share = [](double depth, double inset, double ramp) {
+          return std::clamp(0.5 + (depth - inset) * 0.5 / ramp, 0.0, 1.0);
+        };
+        most = std::max(most, share(below[static_cast<size_t>(z)], kSolidInset, kSolidRamp));
+        const int far = z - static_cast<int>(kSolidFar);  // cells are as large as soft_m
+        if (far >= 0)
+          most = std::max(most, share(below[static_cast<size_t>(far)], kSolidFarInset, kSolidFarRamp));
         const double depth = kSolidDepth * most * most * most;
         const size_t cell = (static_cast<size_t>(z) * view.size.y + y) * static_cast<size_t>(view.size.x) + x;
         worst = std::max(worst, std::abs(view.key[cell] * double{kLightDepthUnit} - depth));

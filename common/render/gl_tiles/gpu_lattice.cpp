@@ -99,8 +99,10 @@ void GpuLattice::build(const LatticeFrame& frame, const LightDirections& lights,
   key_.set("u_sum_unit", kLightSumUnit);
   key_.set("u_solid_depth", kSolidDepth);
   key_.set("u_solid_border", kSolidBorderCells);
-  key_.set("u_solid_inset_m", kSolidInset * frame.soft_m);
-  key_.set("u_solid_ramp_m", kSolidRamp * frame.soft_m);
+  key_.set("u_soft_m", frame.soft_m);
+  key_.set("u_solid_near", glm::vec2(kSolidInset, kSolidRamp));
+  key_.set("u_solid_far", glm::vec2(kSolidFarInset, kSolidFarRamp));
+  key_.set("u_solid_far_cells", solid_far_cells(frame));
   key_.set("u_solid_reach_m", solid_reach_m_);
   key_.set("u_solid_origin_m", solid_origin_m_);
   key_.set("u_solid_from_m", solid_from_m_);
@@ -124,6 +126,7 @@ void GpuLattice::halve(const LatticeFrame& frame, float solid_depth) {
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
   half_.use();
   half_.set("u_solid_depth", solid_depth);
+  half_.set("u_solid_near", glm::vec2(kSolidInset, kSolidRamp));
   dispatch_cells(frame.half_size.x, frame.half_size.y, frame.half_size.z);
 }
 
