@@ -10,6 +10,7 @@
 
 #include "common/motion/motion_clip.h"
 #include "common/scene/scene_file.h"
+#include "common/strands/shared_strands.h"
 #include "common/strands/strand_codec.h"
 #include "tests/support/stepped_hair.h"
 
@@ -60,9 +61,15 @@ class Stream {
   }
   uint64_t encoder_steps() const { return encoder_->step_count(); }
   uint64_t witness_steps() const { return witness_->step_count(); }
+  /// From the next frame on states come on a lattice of half the resolution.
+  void coarsen() { is_coarse_ = true; }
   /// Whether viewers had to be corrected in the frame, or were told a rounded state.
   bool send(const InputFrame& input, bool joins = false) {
     state_ = hair_.step(input);
+    if (is_coarse_) {
+      state_.snapshot.quantum_m *= 2.0f;
+      for (int32_t& value : state_.snapshot.lattice) value /= 2;
+    }
     // As it comes from afar, now sooner, now later.
     const auto jitter_ns = static_cast<int64_t>(state_.snapshot.tick * 7919 % 4'000'000);
     state_.snapshot.motion_time_ns = 1'000'000'000'000 + state_.snapshot.sim_time_ns + jitter_ns;
@@ -139,6 +146,7 @@ class Stream {
   }
 
   SteppedHair hair_;
+  bool is_coarse_ = false;
   const bool shares_;
   const size_t delay_;
   std::deque<std::shared_ptr<SharedUpdate>> told_;
@@ -470,6 +478,17 @@ TEST_P(SharedStrands, GoOnOverOtherScenesAndJumps) {
   jump.has_teleported = true;
   stream.send(jump);
   EXPECT_EQ(stream.corrected(201, 20), 0);
+}
+
+// The bound changes while frames are exact: the encoder begins anew, without anything of the lattice before.
+TEST_P(SharedStrands, BeginAnewOnAnotherLattice) {
+  Stream stream(scene_of(GetParam()), true);
+  stream.corrected(0, kSettledFrames + 5);
+  EXPECT_TRUE(is_exact(stream.frame()));
+  stream.coarsen();
+  stream.send(shaken(kSettledFrames + 5));
+  EXPECT_EQ(stream.frame().header.opcode, Opcode::StrandKeyframe);
+  stream.corrected(kSettledFrames + 6, 5);  // which decode
 }
 
 }  // namespace

@@ -167,8 +167,9 @@ void EncoderSteps::restart(const SnapshotInfo& snapshot, const tangent::Layout& 
   told_model_.reset();
   told_scene_.reset();
   has_model_ = false;
+  told_state_.reset();
   base_ = {};
-  is_stepping_ = false;
+  is_stepping_ = is_following_ = is_handing_ = is_settled_ = false;  // of the last frame, by another lattice
   last_ = moment_of(snapshot);
   bytes_.clear();
   flags_ = 0;
