@@ -150,7 +150,10 @@ Status RecordDesk::attach(Stream stream) {
 }
 
 void RecordDesk::begin() {
-  if (whole_ != nullptr) whole_->begin(stream_->describe(), stream_->asset());
+  if (whole_ != nullptr) {
+    whole_->set_shared(stream_->is_shared);
+    whole_->begin(stream_->describe(), stream_->asset());
+  }
   if (!folder_) return;
   if (folder_->file_ending.empty())
     log_info("record", "who controls may record into {}", folder_->path.string());
@@ -320,6 +323,7 @@ Result<std::string> RecordDesk::start_recording(const RecordCommand& command) {
   RecordingStart start = stream_->describe();
   start.slate = command.slate;
   start.take = command.take;
+  take->set_shared(stream_->is_shared);
   take->begin(std::move(start), stream_->asset());
   const std::lock_guard lock(mutex_);
   take_ = std::move(take);

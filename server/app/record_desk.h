@@ -61,6 +61,7 @@ class RecordDesk {
     std::function<RecordingStart()> describe;  // as it runs; any thread
     std::function<EncodedFramePtr()> asset;    // message of the newest
     std::string scene_name;
+    bool is_shared = false;  // the simulation goes on from what keyframes tell
   };
 
   /// Makes the desk, and the file of a recording that starts with the server. Returns the errors of

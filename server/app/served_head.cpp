@@ -132,8 +132,9 @@ Status ServedHead::start(NetServer& net) {
   net_ = &net;
   desk_->connect(net);
   if (records_ != nullptr)
-    RETURN_IF_ERROR(records_->attach({*hub_, *source_, [this] { return describe_recording(); },
-                                      [this] { return desk_->asset(); }, config_.scene.name}));
+    RETURN_IF_ERROR(
+        records_->attach({*hub_, *source_, [this] { return describe_recording(); },
+                          [this] { return desk_->asset(); }, config_.scene.name, !config_.is_lockstep}));
   stages_.set_source_times([this](int64_t arrival_ns) { return inputs_.source_time_ns(arrival_ns); });
   if (!config_.trace_path.empty()) RETURN_IF_ERROR(stages_.open_trace(config_.trace_path));
   RETURN_IF_ERROR(source_->start(*hub_, config_.scene.stream));

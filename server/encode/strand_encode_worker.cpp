@@ -54,7 +54,10 @@ StrandEncodeWorker::~StrandEncodeWorker() {
 }
 
 void StrandEncodeWorker::set_listeners(StrandListeners listeners) {
-  if (listeners != StrandListeners::None && !has_listeners()) is_restarting_ = true;
+  if (listeners != StrandListeners::None && !has_listeners()) {
+    restart_version_ = slot_.latest().version;
+    is_restarting_ = true;
+  }
   listeners_ = listeners;
   slot_.notify();
 }
@@ -107,6 +110,8 @@ gl::PassReport StrandEncodeWorker::pass() const {
 bool StrandEncodeWorker::has_work(const SnapshotSlot::View& view) const {
   if (is_stopping_) return true;
   if (!has_listeners() || !has_state(view, config())) return false;
+  // A state from before anybody listened may be old: a new one comes soon, unless the server is paused.
+  if (is_restarting_ && view.version == restart_version_) return false;
   return is_due(view) || is_restarting_ || (is_keyframe_wanted_ && keyframe_ != nullptr);
 }
 
@@ -126,7 +131,8 @@ bool StrandEncodeWorker::is_due(const SnapshotSlot::View& view) const {
 SnapshotSlot::View StrandEncodeWorker::wait_for_work() const {
   const auto has_work_now = [this](const SnapshotSlot::View& now) { return has_work(now); };
   const auto has_news = [this](const SnapshotSlot::View& now) {
-    return has_work(now) || (has_listeners() && has_state(now, config()) && is_keyframe_wanted_);
+    return has_work(now) ||
+           (has_listeners() && has_state(now, config()) && (is_keyframe_wanted_ || is_restarting_));
   };
   const bool is_on_request = listeners_ == StrandListeners::OnRequest;
   const int64_t request_wait_ns = has_request() ? state_wanted_ns_ - now_ns() : 0;
@@ -136,7 +142,8 @@ SnapshotSlot::View StrandEncodeWorker::wait_for_work() const {
     (void)slot_.wait(has_news);
   else
     (void)slot_.wait_for(kLongestStateWait, has_news);
-  return slot_.wait_for(is_keyframe_wanted_ ? kKeyframePatience : std::chrono::milliseconds(0), has_work_now);
+  return slot_.wait_for(
+      is_keyframe_wanted_ || is_restarting_ ? kKeyframePatience : std::chrono::milliseconds(0), has_work_now);
 }
 
 void StrandEncodeWorker::run() {

@@ -121,7 +121,8 @@ class StrandEncodeWorker {
   std::atomic<uint64_t> answered_requests_{0};
   std::atomic<int64_t> state_wanted_ns_{0};  // of the earliest that is not answered
   std::atomic<bool> is_keyframe_wanted_{false};
-  std::atomic<bool> is_restarting_{false};  // nobody has the chain's last frame
+  std::atomic<bool> is_restarting_{false};    // nobody has the chain's last frame
+  std::atomic<uint64_t> restart_version_{0};  // of the state that was the newest then
 
   // Of the worker's thread.
   uint64_t encoded_version_ = 0;

@@ -19,6 +19,11 @@ namespace {
 constexpr double kBytesPerMb = 1e6;
 /// While it waits for one.
 constexpr int64_t kNever = -1;
+/// The simulation goes on from what a keyframe tells, and frames are exact from then on. The first one comes
+/// too early for that.
+constexpr int64_t kSecondKeyframeNs = 200'000'000;
+/// Strands of a state so much older than the first recorded one are from before the recording.
+constexpr int64_t kOldFrameNs = 250'000'000;
 
 int64_t unix_time_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -197,7 +202,10 @@ void Recorder::write(const Item& item) {
   if (const auto* state = std::get_if<StatePtr>(&item.what)) {
     const Snapshot& snapshot = **state;
     sim_time_ns_ = snapshot.sim_time_ns;
-    if (!first_sim_ns_) first_sim_ns_ = sim_time_ns_;
+    if (!first_sim_ns_) {
+      first_sim_ns_ = sim_time_ns_;
+      take_early_frame();
+    }
     vertex_count_ = snapshot.plane_size();
     tick_ = snapshot.tick;
     writer_->add(item.time_ns, sim_time_ns_,
@@ -217,10 +225,15 @@ void Recorder::write(const Item& item) {
 void Recorder::write_frame(int64_t time_ns, const EncodedFramePtr& frame) {
   const FrameHeader& header = frame->header;
   const bool is_keyframe = header.opcode == Opcode::StrandKeyframe;
+  if (!first_sim_ns_ && is_keyframe) {
+    early_frame_ = Item{time_ns, frame};
+    return;
+  }
   const auto* held = held_frame_ ? &std::get<EncodedFramePtr>(held_frame_->what) : nullptr;
   if (is_keyframe && held != nullptr && (*held)->header.sequence == header.sequence) held_frame_.reset();
   write_held_frame();
   if (is_keyframe) {
+    ++keyframes_;
     is_chain_broken_ = false;
     keyframe_sim_ns_ = header.sim_time_ns;
     seek_cost_ = SeekCost(is_predicted_);
@@ -233,6 +246,19 @@ void Recorder::write_frame(int64_t time_ns, const EncodedFramePtr& frame) {
   }
   if (is_chain_broken_) return;
   held_frame_ = Item{time_ns, frame};
+}
+
+/// Before the first state a keyframe may be that of a server that nobody has read for long.
+void Recorder::take_early_frame() {
+  const std::optional<Item> early = std::exchange(early_frame_, std::nullopt);
+  if (!early) return;
+  const auto& frame = std::get<EncodedFramePtr>(early->what);
+  if (*first_sim_ns_ - frame->header.sim_time_ns <= kOldFrameNs) {
+    write_frame(early->time_ns, frame);
+    return;
+  }
+  is_chain_broken_ = true;
+  hub_->request_keyframe(stream_id_);
 }
 
 void SeekCost::add(const Delta& delta) {
@@ -256,8 +282,11 @@ bool Recorder::is_keyframe_due(const EncodedFrame& delta) {
   const auto steps = static_cast<double>(tick_ - std::min(decoded_tick_, tick_));
   decoded_tick_ = tick_;
   seek_cost_.add({is_exact(delta), vertex_count_, steps * step_cost_});
-  return keyframe_sim_ns_ != kNever &&
-         seek_cost_.is_keyframe_due(delta.header.sim_time_ns - keyframe_sim_ns_);
+  if (keyframe_sim_ns_ == kNever) return false;
+  const int64_t passed_ns = delta.header.sim_time_ns - keyframe_sim_ns_;
+  const bool is_second_due =
+      is_shared_ && keyframes_ == 1 && is_predicted_ && !is_exact(delta) && passed_ns >= kSecondKeyframeNs;
+  return is_second_due || seek_cost_.is_keyframe_due(passed_ns);
 }
 
 void Recorder::write_held_frame() {
@@ -310,6 +339,10 @@ void Recorder::stop() {
   if (!thread_.joinable()) return;
   thread_.join();
   if (is_ended_) return;
+  if (early_frame_) {  // nothing was simulated
+    first_sim_ns_ = std::get<EncodedFramePtr>(early_frame_->what)->header.sim_time_ns;
+    take_early_frame();
+  }
   write_held_frame();
   writer_->finish();
   file_->finish();

@@ -99,6 +99,8 @@ class Recorder : public StreamReader, public StepTap {
   void add(const ServerStatus& status);
   /// Sets the cost of decoding a step relative to one of dftl; initially 1. Any thread.
   void set_step_cost(double steps) { step_cost_ = steps; }
+  /// Sets whether the simulation goes on from what keyframes tell; initially not. Before begin().
+  void set_shared(bool is_shared) { is_shared_ = is_shared; }
   /// Accepts nothing more from any caller, so that all recorded data ends at one moment. Any thread.
   void refuse();
   /// Unsubscribes, closes the file and logs its content; afterwards it is no longer a tap.
@@ -139,6 +141,7 @@ class Recorder : public StreamReader, public StepTap {
   void write(const Item& item);
   void write_frame(int64_t time_ns, const EncodedFramePtr& frame);
   void write_held_frame();
+  void take_early_frame();
   bool is_keyframe_due(const EncodedFrame& delta);
   void watch_losses();
   void end_early();
@@ -167,9 +170,12 @@ class Recorder : public StreamReader, public StepTap {
 
   // Of the recorder's thread.
   std::unique_ptr<RecordingWriter> writer_;
-  std::optional<Item> held_frame_;  // the newest delta: a keyframe of the same state takes its place
+  std::optional<Item> held_frame_;   // the newest delta: a keyframe of the same state takes its place
+  std::optional<Item> early_frame_;  // a keyframe that came before the first state
   uint64_t known_lost_frames_ = 0;
   bool is_chain_broken_ = true;
+  uint64_t keyframes_ = 0;
+  bool is_shared_ = false;
   bool is_predicted_ = false;  // by the codec
   int64_t keyframe_sim_ns_ = 0;
   SeekCost seek_cost_;

@@ -7,6 +7,7 @@
 
 #include "client/app/recording_commands.h"
 #include "client/app/recording_player.h"
+#include "common/base/units.h"
 #include "common/record/recording_check.h"
 #include "common/record/recording_reader.h"
 #include "common/record/strand_frames.h"
@@ -468,6 +469,16 @@ TEST_F(RecordCommands, BeginWhereTimeStandsStill) {
   EXPECT_FALSE(stop_recording().is_error);
   EXPECT_EQ(check(file("later.mcap")).states, 21u);
   EXPECT_EQ(first_recorded_tick(file("later.mcap")), std::optional<uint64_t>(20));
+  // Strands of the last state that somebody read are none of the next take's.
+  EXPECT_FALSE(ask(ControlCommand{Command::StepOnce, 120}).is_error);
+  EXPECT_FALSE(start_recording("after idling").is_error);
+  EXPECT_FALSE(ask(steps).is_error);
+  EXPECT_FALSE(stop_recording().is_error);
+  const auto reader = RecordingReader::open(file("after idling.mcap"));
+  ASSERT_TRUE(reader) << reader.error().to_string();
+  const RecordingInfo& info = (*reader)->info();
+  const double length_s = static_cast<double>(info.last_sim_time_ns - info.first_sim_time_ns) / kNsPerS;
+  EXPECT_NEAR(length_s, 20.0 / stepped.scene.step_rate_hz, 2.0 / stepped.scene.step_rate_hz);
 }
 
 TEST_F(RecordCommands, HaveKeyframesOftenerWhereStepsTakeLonger) {

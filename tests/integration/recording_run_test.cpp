@@ -129,6 +129,7 @@ TEST_F(RecordedRun, IsSimulatedAgainBitForBit) {
 /// Strands go on from those of viewers where a keyframe tells them: frames are exact, and the run can be
 /// simulated again for all that.
 TEST_F(RecordedRun, GoesOnFromWhatKeyframesTell) {
+  constexpr int64_t kSecondNs = 1'000'000'000;
   for (const std::string quality : {"fast", "full"}) {
     ServerConfig recorded = config();
     recorded.scene = test::bald_scene(40, 8);
@@ -144,7 +145,7 @@ TEST_F(RecordedRun, GoesOnFromWhatKeyframesTell) {
       ASSERT_NE(viewer, nullptr);
       EXPECT_TRUE(pump_until({viewer.get()}, [&] { return viewer->replay().stats().keyframes > 0; }));
     };
-    run_steps(30);
+    run_steps(60);
     for (int i = 0; i < 3; ++i) {
       join();
       run_steps(15);
@@ -158,15 +159,17 @@ TEST_F(RecordedRun, GoesOnFromWhatKeyframesTell) {
 
     const auto reader = RecordingReader::open(recorded.record->path);
     ASSERT_TRUE(reader) << reader.error().to_string();
-    int hand_overs = 0, exact_frames = 0;
+    int hand_overs = 0, exact_frames = 0, exact_alone = 0;
     for (auto item = (*reader)->next(); item && *item; item = (*reader)->next()) {
-      if (const auto* frame = std::get_if<RecordedFrame>(&(*item)->what))
+      if (const auto* frame = std::get_if<RecordedFrame>(&(*item)->what)) {
         exact_frames += is_exact(*frame->frame) ? 1 : 0;
-      else
+        exact_alone += is_exact(*frame->frame) && frame->frame->header.sim_time_ns < kSecondNs ? 1 : 0;
+      } else
         hand_overs += std::holds_alternative<RecordedHandOver>(std::get<RecordedMessage>((*item)->what));
     }
     EXPECT_GE(hand_overs, 3) << quality;
     EXPECT_GE(exact_frames, 20) << quality;
+    EXPECT_GE(exact_alone, 5) << quality << ": in its first second, before somebody joins";
     const ReplayResult result = replay(recorded.record->path);
     EXPECT_TRUE(result.is_equal()) << quality << ": " << to_sentence(result);
 
