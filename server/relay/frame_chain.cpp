@@ -17,10 +17,10 @@ void FrameChain::add(const EncodedFramePtr& frame, int64_t time_ns) {
   frames_.push_back(frame);
 }
 
-bool FrameChain::wants_keyframe() const {
-  if (frames_.empty()) return true;
+bool FrameChain::serves_joiners() const {
+  if (frames_.empty()) return false;
   const int64_t age_ns = newest_ns_ - keyframe_ns_;
-  return age_ns >= kLongestChainNs || (age_ns >= kChainNs && delta_bytes_ >= frames_.front()->message.size());
+  return age_ns < kChainNs || (age_ns < kLongestChainNs && delta_bytes_ < frames_.front()->message.size());
 }
 
 void FrameChain::clear() {

@@ -10,10 +10,9 @@
 
 namespace strandcast {
 
-/// Age at which a chain asks for a fresh keyframe if its deltas have as many bytes as its keyframe. Keyframes
-/// then take no more of the link than deltas.
+/// Age from which on a fresh keyframe serves joiners better if it has no more bytes than the chain's deltas.
 inline constexpr int64_t kChainNs = 1'000'000'000;
-/// Age at which it asks in any case.
+/// Age from which on it does in any case: a joiner has to step through all of it.
 inline constexpr int64_t kLongestChainNs = 2'000'000'000;
 /// Largest number of deltas that a joining viewer waits for a keyframe; a longer chain is dropped.
 inline constexpr size_t kMaxChainFrames = 240;
@@ -26,7 +25,8 @@ class FrameChain {
   void clear();
   /// A keyframe and what follows it; empty while there is no keyframe.
   const std::vector<EncodedFramePtr>& frames() const { return frames_; }
-  bool wants_keyframe() const;
+  /// Whether a joiner is to begin with these frames; if not, with a keyframe made for it.
+  bool serves_joiners() const;
 
  private:
   std::vector<EncodedFramePtr> frames_;

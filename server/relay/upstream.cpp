@@ -307,7 +307,6 @@ void Upstream::on_frame(Stream& stream, MediaEvent media) {
   ++counters_.frames;
   if (frame->header.opcode == Opcode::StrandKeyframe) ++counters_.keyframes;
   stream.chain.add(frame, time_ns);
-  if (stream.chain.wants_keyframe()) ask(stream);
   if (!is_of_now(stream)) return;
   newest_frame_ns_ = time_ns;
   net_->publish_strands(frame, number_);
@@ -327,7 +326,7 @@ void Upstream::join(SessionId session, uint16_t stream_id) {
   const auto found = streams_.find(stream_id);
   if (found == streams_.end()) return;  // it is opened soon, and begins with a keyframe
   Stream& stream = found->second;
-  if (stream.chain.frames().empty() || !is_of_now(stream)) return ask(stream);
+  if (!stream.chain.serves_joiners() || !is_of_now(stream)) return ask(stream);
   ++counters_.joins_from_chain;
   net_->send_chain(session, stream.chain.frames());
 }

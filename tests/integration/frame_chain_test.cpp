@@ -25,13 +25,13 @@ TEST(FrameChain, BeginsWithAKeyframeAndGoesOnWithWhatFollows) {
   FrameChain chain;
   chain.add(delta(3), 1);
   EXPECT_TRUE(chain.frames().empty());
-  EXPECT_TRUE(chain.wants_keyframe());
+  EXPECT_FALSE(chain.serves_joiners());
   chain.add(keyframe(3), 2);
   chain.add(delta(4), 3);
   chain.add(delta(5), 4);
   ASSERT_EQ(chain.frames().size(), 3u);
   EXPECT_EQ(chain.frames().back()->header.sequence, 5u);
-  EXPECT_FALSE(chain.wants_keyframe());
+  EXPECT_TRUE(chain.serves_joiners());
   chain.add(keyframe(5), 5);
   EXPECT_EQ(chain.frames().size(), 1u) << "a fresh one takes the place of all before";
 }
@@ -41,30 +41,29 @@ TEST(FrameChain, EndsWhereADeltaIsMissing) {
   chain.add(keyframe(1), 1);
   chain.add(delta(3), 2);
   EXPECT_TRUE(chain.frames().empty());
-  EXPECT_TRUE(chain.wants_keyframe());
+  EXPECT_FALSE(chain.serves_joiners());
 }
 
-TEST(FrameChain, WantsAKeyframeOnceThatCostsNoMoreThanItsDeltas) {
+TEST(FrameChain, ServesNoJoinerOnceAKeyframeCostsNoMoreThanItsDeltas) {
   FrameChain chain;
   chain.add(keyframe(1), 0);
   chain.add(delta(2, 60), kChainNs - 1);
   chain.add(delta(3, 30), kChainNs);
-  EXPECT_FALSE(chain.wants_keyframe()) << "90 bytes of deltas, 100 of the keyframe";
+  EXPECT_TRUE(chain.serves_joiners()) << "90 bytes of deltas, 100 of the keyframe";
   chain.add(delta(4, 10), kChainNs + 1);
-  EXPECT_TRUE(chain.wants_keyframe());
+  EXPECT_FALSE(chain.serves_joiners());
   chain.add(keyframe(4), kChainNs + 2);
   chain.add(delta(5, 1'000), 2 * kChainNs);
-  EXPECT_FALSE(chain.wants_keyframe()) << "not sooner, whatever it takes";
+  EXPECT_TRUE(chain.serves_joiners()) << "not sooner, whatever it takes";
 }
 
-TEST(FrameChain, WantsOneInAnyCaseAfterAWhileAndGivesUpWithoutIt) {
+TEST(FrameChain, ServesNoJoinerAfterAWhileAndIsGivenUpThen) {
   FrameChain chain;
   chain.add(keyframe(1), 0);
   chain.add(delta(2, 1), kLongestChainNs - 1);
-  EXPECT_FALSE(chain.wants_keyframe());
+  EXPECT_TRUE(chain.serves_joiners());
   chain.add(delta(3, 1), kLongestChainNs);
-  EXPECT_TRUE(chain.wants_keyframe());
-  EXPECT_EQ(chain.frames().size(), 3u) << "it still serves";
+  EXPECT_FALSE(chain.serves_joiners());
   for (uint32_t sequence = 4; sequence < 2 * kMaxChainFrames; ++sequence) {
     chain.add(delta(sequence), kLongestChainNs + sequence);
     EXPECT_LE(chain.frames().size(), kMaxChainFrames + 1);
