@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "common/strands/shared_strands.h"
+
 namespace strandcast {
 
 bool SendQueue::push_control(ServerMessage message) {
@@ -80,6 +82,8 @@ bool SendQueue::put_behind(const EncodedFramePtr& frame) {
   const size_t bytes = frame->message.size();
   if (takes_all_) {
     if (behind_.size() >= kMaxRelayFrames) return false;
+  } else if (bytes <= kExactFrameBytes && is_exact(*frame) && behind_.size() < kWaitingExactFrames) {
+    // Takes nothing of the room for others.
   } else if (catch_up_room_ > 0) {
     --catch_up_room_;
   } else if (bytes < keyframe_room_) {

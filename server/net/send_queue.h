@@ -25,6 +25,11 @@ inline constexpr size_t kMaxRelayFrames = 60;
 /// Number of new frames that may queue after each frame of a chain while it is sent.
 inline constexpr size_t kCatchUpFrames = 2;
 
+/// Exact frames of so few bytes wait while a link stands still, two seconds of them: a keyframe would take
+/// more, and the viewer steps twice as fast until it is there.
+inline constexpr size_t kWaitingExactFrames = 120;
+inline constexpr size_t kExactFrameBytes = 256;
+
 class SendQueue {
  public:
   enum class Offer {

@@ -52,6 +52,30 @@ TEST(SendQueue, SendsWelcomeThenAssetThenKeyframeThenDeltas) {
   EXPECT_EQ(queue.dropped_frames(), 0u);
 }
 
+TEST(SendQueue, ExactFramesWaitWhileALinkStandsStill) {
+  const auto exact = [](uint32_t sequence, size_t bytes) {
+    auto made = std::make_shared<EncodedFrame>(*delta(sequence));
+    made->message.resize(bytes);
+    made->message[kFrameHeaderBytes] = std::byte{128};  // WIRE.md: the frame is exact
+    return made;
+  };
+  SendQueue queue;
+  queue.start_strands();
+  ASSERT_EQ(queue.offer_strands(keyframe(1)), SendQueue::Offer::Queued);
+  (void)queue.take_next();
+  uint32_t sequence = 2;
+  while (queue.offer_strands(exact(sequence, 80)) == SendQueue::Offer::Queued) ++sequence;
+  EXPECT_EQ(sequence, 2 + 1 + kWaitingExactFrames) << "one in front";
+  EXPECT_EQ(queue.chain_losses(), 1u);
+
+  SendQueue other;
+  other.start_strands();
+  ASSERT_EQ(other.offer_strands(keyframe(1)), SendQueue::Offer::Queued);
+  (void)other.take_next();
+  ASSERT_EQ(other.offer_strands(exact(2, 80)), SendQueue::Offer::Queued);
+  EXPECT_EQ(other.offer_strands(exact(3, 4'000)), SendQueue::Offer::LostChain) << "too large to be one";
+}
+
 TEST(SendQueue, SecondPendingDeltaLosesTheChainAndIsCounted) {
   SendQueue queue;
   queue.start_strands();
