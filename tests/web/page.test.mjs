@@ -228,6 +228,7 @@ check('a token leaves the address', () => {
   assert.equal(page.readFragment('#view=0,0,0,0,0,0,1').camera, undefined);
   assert.equal(page.readFragment('#head=Zo%C3%AB&mode=strands').head, 'Zoë');
   assert.equal(page.readFragment('#mode=strands').head, '');
+  assert.deepEqual(page.readFragment('#size=9x99999').size, { width: 16, height: 2160 });
 });
 
 check('the camera turns about its target', () => {

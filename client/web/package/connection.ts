@@ -1,5 +1,5 @@
 // A connection as its user has it (strandcast.d.ts): commands out, and what the session tells by name.
-import type { Camera, FromNet, State as StreamState, ToNet } from '../page/messages';
+import { HIDDEN_MS, type Camera, type FromNet, type State as StreamState, type ToNet } from '../page/messages';
 import { cameraOf } from '../page/ui/orbit';
 import { Command, Mode, Role, type WelcomeMessage } from '../page/wire';
 import type { Session, SessionPlan } from './near';
@@ -18,6 +18,8 @@ function addressOf(url: string | URL): string {
   return address.href;
 }
 
+const PICTURE = { width: 640, height: 360 }; // a size that the server takes; no pictures are asked for
+
 const welcomeOf = (welcome: WelcomeMessage): Welcome => ({
   scene: welcome.scene_name, role: welcome.role === Role.viewer ? 'viewer' : 'controller', codec: welcome.codec,
   strandCount: welcome.strand_count, vertexCount: welcome.vertex_count, heads: welcome.heads, camera: cameraOf(welcome.camera),
@@ -35,6 +37,7 @@ export class UserConnection implements Connection {
   private isAsked = false;
   private isClosed = false;
   private failure?: Error;
+  private stopFollowing?: () => void;
 
   /** `open`: a session where it shall run. `states`: where its states go instead of to the listeners. */
   constructor(url: string | URL, options: Options, files: URL, open: (plan: SessionPlan) => Session, states?: MessagePort) {
@@ -46,7 +49,7 @@ export class UserConnection implements Connection {
     this.session = open({
       asked: {
         url: addressOf(url), token: options.token ?? '', mode: Mode.strands, role: ROLES[options.role ?? 'controller'],
-        codec: options.codec ?? '', head: options.head ?? '', pictures: '', width: 640, height: 360, drawsStrands: true,
+        codec: options.codec ?? '', head: options.head ?? '', pictures: '', ...PICTURE, drawsStrands: true,
         name: options.name ?? 'strandcast',
       },
       step: new URL('strand_step.wasm', files).href, whole: new URL('strand_core.wasm', files).href,
@@ -136,6 +139,7 @@ export class UserConnection implements Connection {
     if (this.isClosed) return;
     this.isClosed = true;
     this.failure = error;
+    this.stopFollowing?.();
     for (const { end } of this.waiting.splice(0)) end(error);
     this.session?.end();
   }
@@ -168,6 +172,26 @@ export class UserConnection implements Connection {
   /** What is drawn of the states: the server chooses by it. */
   report(drawMs: number, shownHz: number, device: number): void {
     this.session?.send({ kind: 'drawn', drawMs, shownHz, device });
+  }
+  /** For what draws in a document: nothing comes while nobody sees it. */
+  followVisibility(): void {
+    if (this.stopFollowing || this.isClosed) return;
+    let timer = 0;
+    const tell = (): void => this.session?.send({ kind: 'window', ...PICTURE, isHidden: document.hidden });
+    const follow = (): void => {
+      clearTimeout(timer);
+      if (document.hidden) timer = window.setTimeout(tell, HIDDEN_MS);
+      else {
+        tell();
+        this.session?.send({ kind: 'wake' });
+      }
+    };
+    document.addEventListener('visibilitychange', follow);
+    this.stopFollowing = () => {
+      clearTimeout(timer);
+      document.removeEventListener('visibilitychange', follow);
+    };
+    if (document.hidden) follow();
   }
   close(): void {
     this.finish();

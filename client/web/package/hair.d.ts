@@ -1,6 +1,6 @@
 // strandcast/three: a stream as an object of three.js (111 or later, WebGL2).
 import type { Object3D } from 'three';
-import type { Connection, State } from './strandcast';
+import type { Connection, State } from './strandcast.js';
 
 export interface HairOptions {
   /** Draws the server's own head as well. Without, yours is expected where that is: the joint of the head in the origin, the

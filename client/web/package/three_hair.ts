@@ -11,6 +11,7 @@ import overFrag from 'client/web/package/over.frag.glsl';
 import tileFrame from 'shaders/render/tile_frame.glsl';
 import { shaderText } from '../page/gl/shader_text';
 import { filesOf, startWorker } from './connect';
+import type { UserConnection } from './connection';
 import { POINTS_PER_ROW, STRANDS_PER_ROW, type FromPrepare, type Prepared, type ToPrepare } from './prepare';
 import type { Camera, Connection, State, Vec3 } from './strandcast';
 import type { HairOptions } from './hair';
@@ -107,6 +108,7 @@ export class StrandcastHair extends THREE.Object3D {
 
   constructor(readonly connection: Connection, private readonly options: HairOptions = {}) {
     super();
+    (connection as UserConnection).followVisibility();
     const files = filesOf(options.files);
     this.worker = startWorker(files, 'draw.js', 'prepare');
     this.worker.onmessage = ({ data }: MessageEvent<FromPrepare>) => this.hear(data);

@@ -34,6 +34,7 @@ class Shown {
       (core) => this.toDraw({ kind: 'core', core, states: states.port2 }, [states.port2]), (error: Error) => say(error.message));
     const options = { token: name('token'), head: name('head'), codec: name('codec'), files: name('files'), role: 'viewer' as const };
     this.connection = connectDrawer(new URL(name('src')!, document.baseURI).href, options, states.port1);
+    this.connection.followVisibility();
     this.connection.on('link', ({ state, reason }) => say(state === 'open' ? '' : state === 'connecting' ? 'Connecting' : reason));
     this.connection.on('look', (look) => this.toDraw({ kind: 'look', look: look as never }));
     this.connection.on('welcome', ({ camera }) => this.lookFrom(this.camera ?? fittedTo(camera, host.clientWidth / Math.max(host.clientHeight, 1))));
@@ -46,6 +47,7 @@ class Shown {
   private fromDraw(message: FromDraw): void {
     if (message.kind === 'ready') {
       this.device = message.device;
+      this.say('');
       this.resize();
     } else if (message.kind === 'figures') this.connection.report(message.figures.drawMs, message.figures.shownHz, this.device);
     else if (message.kind === 'failed') this.say(`Nothing can be drawn here: ${message.reason}`);
@@ -99,6 +101,8 @@ class StrandcastView extends HTMLElement {
   }
   connectedCallback(): void {
     if (!this.hasAttribute('tabindex')) this.tabIndex = 0;
+    if (!this.hasAttribute('role')) this.setAttribute('role', 'img');
+    if (!this.hasAttribute('aria-label')) this.setAttribute('aria-label', 'Simulated hair; drag or use the arrow keys to turn it');
     this.begin();
   }
   disconnectedCallback(): void {
@@ -111,6 +115,7 @@ class StrandcastView extends HTMLElement {
   private begin(): void {
     this.disconnectedCallback();
     const canvas = document.createElement('canvas');
+    canvas.setAttribute('aria-hidden', 'true');
     this.stage.replaceChildren(canvas, this.words);
     const say = (words: string): void => {
       this.words.textContent = words;

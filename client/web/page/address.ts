@@ -18,6 +18,11 @@ export interface Wishes {
 const MODES: { [name: string]: number } = { strands: 0, pictures: 1, frames: 1, auto: 2 };
 const DIGITS = 4;
 
+/** Sizes of pictures that a server draws, pixels (WIRE.md, section 7). */
+const LEAST_SIDE = 16;
+const MOST_WIDTH = 3840;
+const MOST_HEIGHT = 2160;
+
 export function readFragment(fragment: string): Wishes {
   const words = new URLSearchParams(fragment.replace(/^#/, ''));
   const wishes: Wishes = {
@@ -29,7 +34,8 @@ export function readFragment(fragment: string): Wishes {
       numbers[6]! > 0.02 && numbers[6]! < 2.8)
     wishes.camera = { offset: numbers.slice(0, 3) as Vec3, target: numbers.slice(3, 6) as Vec3, fov: numbers[6]! };
   const size = /^(\d+)x(\d+)$/.exec(words.get('size') ?? '');
-  if (size) wishes.size = { width: Number(size[1]), height: Number(size[2]) };
+  const within = (side: string, most: number) => Math.min(Math.max(Number(side), LEAST_SIDE), most);
+  if (size) wishes.size = { width: within(size[1]!, MOST_WIDTH), height: within(size[2]!, MOST_HEIGHT) };
   return wishes;
 }
 

@@ -3,7 +3,7 @@
 import { keepToken, keptToken, linkTo, readFragment, withoutToken } from './address';
 import { timecodeText } from './clock';
 import { compileCore } from './core';
-import type { Asked, Camera, DrawFigures, FromDraw, FromNet, NetFigures, ToDraw, ToNet } from './messages';
+import { HIDDEN_MS, type Asked, type Camera, type DrawFigures, type FromDraw, type FromNet, type NetFigures, type ToDraw, type ToNet } from './messages';
 import { element } from './ui/element';
 import { followFiles } from './ui/files';
 import { Hud, Row, Warnings } from './ui/hud';
@@ -21,7 +21,6 @@ const MOST_PICTURE_SIDE = 1280; // of pictures that the server draws for this wi
 const SAMPLES = 4;
 const FILLS_WITHIN = 0.05; // of a window's shape
 const WINDOW_MS = 150; // between two sizes that the server hears of
-const HIDDEN_MS = 2000; // so long a tab may be hidden before the server hears of it
 const QUIET_MS = 1500; // so long a picture may stand without a word about the connection
 
 // The token leaves the address before anything is asked for.
@@ -89,6 +88,7 @@ class Viewer {
   private drawnBy = '';
   private drawWhy = '';
   private device: number = Device.unknown;
+  private isDrawingLost = false;
   private rate = { bytes: 0, timeMs: 0, kbits: 0 };
   private pictureTimes: number[] = [];
   private pictureCount = 0;
@@ -344,6 +344,8 @@ class Viewer {
         this.drawnBy = message.drawnBy;
         this.drawWhy = message.why;
         this.sendSize();
+        if (this.isDrawingLost) this.toNet({ kind: 'mode', mode: this.asked.mode }); // the card is back
+        this.isDrawingLost = false;
         return;
       case 'figures':
         this.drawFigures = message.figures;
@@ -355,6 +357,7 @@ class Viewer {
         return;
       case 'failed':
         this.device = Device.none;
+        this.isDrawingLost = true;
         this.drawWhy = message.reason;
         warnings.say(`Strands cannot be drawn here: ${message.reason}. The server’s pictures are shown.`, true);
         return this.toNet({ kind: 'mode', mode: Mode.frames });

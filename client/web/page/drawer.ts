@@ -163,6 +163,7 @@ class Drawer {
   private shown: number[] = [];
   private counts = { strands: 0, segments: 0 };
   private shotAsked = false;
+  private tellReady = (): void => {};
 
   start(message: Extract<ToDraw, { kind: 'start' }>): void {
     this.canvas = message.canvas;
@@ -170,15 +171,17 @@ class Drawer {
     this.painter = painter;
     this.followCard(message.canvas);
     if (painter.device === Device.software) this.step = 2;
-    post({ kind: 'ready', device: painter.device, drawnBy: painter.drawnBy, why });
+    this.tellReady = () => post({ kind: 'ready', device: this.painter.device, drawnBy: this.painter.drawnBy, why });
+    this.tellReady();
   }
   /** It comes back after sleep or a fault of its driver, without anything that was on it. */
   private followCard(canvas: OffscreenCanvas): void {
     let patience = 0;
+    let isAway = false;
     canvas.addEventListener('webglcontextlost', (event) => {
       event.preventDefault();
       patience = self.setTimeout(() => {
-        this.picture = undefined;
+        isAway = true;
         post({ kind: 'failed', reason: 'the graphics card was taken away' });
       }, LOST_MS);
     });
@@ -187,6 +190,8 @@ class Drawer {
       this.painter = this.painter.again();
       if (this.picture) this.painter.setPicture(this.picture);
       this.moved();
+      if (isAway) this.tellReady();
+      isAway = false;
     });
   }
   async begin(message: Extract<ToDraw, { kind: 'core' }>): Promise<void> {

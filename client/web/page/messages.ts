@@ -122,3 +122,6 @@ export type FromDraw =
   | { kind: 'drawn' }
   | { kind: 'shot'; blob: Blob | null }
   | { kind: 'failed'; reason: string };
+
+/** So long a tab may be hidden before the server hears of it. */
+export const HIDDEN_MS = 2000;
