@@ -359,7 +359,7 @@ int run_feed(const CtlTarget& target, const FeedOptions& options, const std::ato
     std::cout << slow << '\n';
   std::cout << fmt::format(
       "fed {:.1f} s: {} motion and {} wind samples, at most {:.1f} ms late, {} skipped, {} unsent, {} "
-      "rejected\n",
+      "rejected of all sources\n",
       done->elapsed_s, done->motion_samples, done->wind_samples, done->worst_lateness_ms,
       done->skipped_samples, done->unsent_samples, done->rejected_samples);
   if (done->reconnects > 0)
@@ -392,6 +392,7 @@ int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>
   int64_t next_inputs_ns = 0;
   std::string told_detail;
   bool was_connected = false;
+  bool has_been_there = false;
   while (!stop && std::cout && !is_over()) {
     const Status pumped = client->pump(milliseconds(100), [&](const ClientEvent& event) {
       if (const auto* status = std::get_if<ServerStatus>(&event)) {
@@ -420,9 +421,12 @@ int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>
       continue;
     }
     if (!pumped) return ctl_failure(pumped.error(), has_joined ? kRefusedExit : kBadInputExit);
+    has_been_there = has_been_there || client->is_connected();
     if (std::exchange(was_connected, client->is_connected()) && !was_connected) print("not connected");
   }
-  return kDoneExit;
+  if (has_been_there || stop) return kDoneExit;
+  return ctl_failure(make_error(ErrorCode::Unavailable, "{} did not answer in all the time", target.connect),
+                     kRefusedExit);
 }
 
 namespace {
@@ -486,7 +490,7 @@ int run_save(const CtlTarget& target, const std::filesystem::path& path) {
     const auto scene = scene_of(*text);
     if (!scene) return ctl_failure(scene.error(), kRefusedExit);
     if (const auto saved = save_scene(path, to_text(*scene)); !saved) return ctl_failure(saved.error());
-    std::cout << fmt::format("saved {}: strandcast-server --scene {}\n", path.string(), path.string());
+    std::cout << fmt::format("saved {}: strandcast-server --scene '{}'\n", path.string(), path.string());
     return kDoneExit;
   });
 }
@@ -509,6 +513,9 @@ int run_health(const CtlTarget& target) {
   const auto answer = http_get(*address, "/healthz", kHealthTimeout, {target.tls_authorities, {}});
   if (!answer) return ctl_failure(answer.error());
   constexpr unsigned kHttpOk = 200;
+  if (answer->body.starts_with('<'))
+    return ctl_failure(make_error(ErrorCode::BadInput,
+                                  "{} answers with a web page: it is no Strandcast server", target.connect));
   print_lines(answer->body);
   return answer->status == kHttpOk ? kDoneExit : kRefusedExit;
 }

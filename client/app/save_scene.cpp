@@ -24,6 +24,13 @@ Status save_scene(const std::filesystem::path& path, const std::string& text) {
     std::filesystem::create_directories(path.parent_path(), failure);
     if (failure) return at(path.string(), make_error(ErrorCode::BadInput, "{}", failure.message()));
   }
+  // A file that is no scene was named by mistake.
+  if (std::error_code failure; std::filesystem::exists(path, failure)) {
+    const auto text_there = load_text(path, kMaxSceneFileBytes);
+    if (!text_there || !parse_scene(*text_there, path.string(), {}))
+      return at(path.string(),
+                make_error(ErrorCode::BadInput, "is there already and is no scene: it stays as it is"));
+  }
   return save_file(path, std::as_bytes(std::span(text)));
 }
 

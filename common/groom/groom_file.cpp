@@ -174,7 +174,8 @@ std::string unlikely_head(float unit_m, const Groom& groom) {
   const float radius = covered_head_radius(groom), radius_m = radius * unit_m;
   if (radius == 0.0f || (radius_m >= kSmallestHeadM && radius_m <= kLargestHeadM)) return {};
   return fmt::format(
-      "the head under this hair has a radius of {} then, as nobody's: groom.file.unit_m={:.4g} makes it {}",
+      "with its unit the head under this hair has a radius of {}, as nobody's: groom.file.unit_m={:.4g} "
+      "makes it {}",
       unit_text(radius_m), guess_unit(groom).value, unit_text(radius * guess_unit(groom).value));
 }
 
@@ -186,7 +187,8 @@ std::string unlikely_unit(float unit_m, const glm::vec3& size) {
     return largest * metres >= kSmallestHairM && largest * metres <= kLargestHairM;
   };
   if (is_likely(unit_m) || !(largest > 0.0f)) return {};
-  std::string sentence = fmt::format("this hair is {} long then, as on no head", unit_text(largest * unit_m));
+  std::string sentence =
+      fmt::format("with its unit this hair is {} long, as on no head", unit_text(largest * unit_m));
   for (const float other_m : {1.0f, 0.01f, 0.001f, 0.0254f})
     if (is_likely(other_m))
       return sentence +

@@ -13,6 +13,9 @@
 namespace strandcast {
 namespace {
 
+/// Work that takes less of a step's time than this is not what makes the simulation slow.
+constexpr double kLittleWork = 0.5;
+
 /// Half as many vertices per strand.
 std::string fewer_vertices(const SceneDesc& scene, uint32_t vertex_count) {
   const bool is_file = std::holds_alternative<FileGroomDesc>(scene.groom);
@@ -98,6 +101,11 @@ std::string slow_motion_text(double realtime_factor, const SceneDesc& scene, con
   const std::string pace = realtime_factor < kSlowFactor
                                ? fmt::format("the simulation runs at {:.2f} of real time", realtime_factor)
                                : "the simulation was slower than real time until a moment ago";
+  if (work.total_ms() < kLittleWork * kMsPerS / scene.step_rate_hz)
+    return fmt::format(
+        "Slow motion: {}; its work takes {:.1f} ms a step, a step has {:.1f} ms: other programs hold the "
+        "processors.",
+        pace, work.total_ms(), kMsPerS / scene.step_rate_hz);
   std::string text = fmt::format(
       "Slow motion: {}; its work takes {:.1f} ms a step on all threads, a step has {:.1f} ms. Cheapest ways "
       "out: ",

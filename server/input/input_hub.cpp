@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/base/units.h"
+#include "common/log/log.h"
 
 namespace strandcast {
 namespace {
@@ -125,9 +126,13 @@ void InputHub::accept(Stream<Value>& stream, uint64_t source_id, const TimedSamp
   if (stream.owner != source_id) {
     if (stream.owner && sample.arrival_ns - stream.accepted_ns <= stale_ns) {
       ++counters_.not_owner;
+      if (!std::exchange(stream.is_refusal_told, true))
+        log_warn("input", "samples from source {} are left out while source {} sends: one at a time is heard",
+                 source_id, *stream.owner);
       return;
     }
     stream.owner = source_id;
+    stream.is_refusal_told = false;
     restart(stream);
   }
   // A step of the source's clock: late samples would be refused for ever, or the mapping would be off by the

@@ -194,6 +194,7 @@ class InputHub {
   template <class Value>
   struct Stream {
     std::optional<uint64_t> owner;
+    bool is_refusal_told = false;   // that others send beside this owner
     int64_t accepted_ns = 0;        // arrival of the newest accepted sample
     bool is_cut = false;            // what is shown next does not follow what was
     double usual_spacing_ns = 0.0;  // between samples, by the source's clock; 0: not known

@@ -1,5 +1,8 @@
 #include "server/sim/solver_registry.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 
 #include "server/sim/solvers/angular_projection/angular_projection.h"
@@ -56,6 +59,20 @@ Status check_step(const SolverRow& row, const SolverParameters& complete, double
   return row.check_step ? row.check_step(complete, substep_s) : Status();
 }
 
+namespace {
+
+/// Says which solvers have a parameter; empty text if none has it.
+std::string others_with(const std::string& parameter) {
+  std::vector<std::string> names;
+  for (const SolverRow& row : solver_table())
+    for (const SolverParameterInfo& info : row.parameters)
+      if (info.name == parameter) names.push_back(row.name);
+  if (names.empty()) return {};
+  return fmt::format(", but {} has: choose it with solver.name={}", fmt::join(names, ", "), names.back());
+}
+
+}  // namespace
+
 Result<SolverParameters> complete_parameters(const SolverRow& row, const SolverParameters& given) {
   SolverParameters complete;
   std::string known;
@@ -68,8 +85,8 @@ Result<SolverParameters> complete_parameters(const SolverRow& row, const SolverP
         std::find_if(row.parameters.begin(), row.parameters.end(),
                      [&name](const SolverParameterInfo& candidate) { return candidate.name == name; });
     if (info == row.parameters.end()) {
-      return make_error(ErrorCode::BadInput, "solver '{}' has no parameter '{}' (known: {})", row.name, name,
-                        known);
+      return make_error(ErrorCode::BadInput, "solver '{}' has no parameter '{}'{} (known: {})", row.name,
+                        name, others_with(name), known);
     }
     // Written so that NaN is refused as well.
     if (!(value >= info->minimum && value <= info->maximum)) {

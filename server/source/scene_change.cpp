@@ -166,9 +166,13 @@ Result<SceneDesc> change_scene(const SceneDesc& scene, const std::string& assign
   const bool is_live = std::any_of(fields.begin(), fields.end(), [&](const std::string& field) {
     return path == field || path.starts_with(field + ".");
   });
-  if (!is_live)
+  if (!is_live) {
+    // A field that no scene has is said to be unknown.
+    if (const auto known = with_overrides(scene, {assignment}); !known && !path.empty())
+      return without_option(known.error());
     return make_error(ErrorCode::BadInput, "'{}' cannot change while running (known: {})", path,
                       fmt::join(fields, ", "));
+  }
   auto with_change = with_overrides(scene, {assignment});
   if (!with_change) return without_option(with_change.error());
   SceneDesc changed = std::move(*with_change);

@@ -84,7 +84,8 @@ std::optional<Notice> SimLoop::command(const ControlCommand& command, const Job&
       return Notice{false, fmt::format("Running from step {}.", tick_)};
     case Command::StepOnce:
       if (!clock_->add_single_steps(std::max<uint32_t>(command.step_count, 1)))
-        return Notice{true, "StepOnce needs a paused simulation: send Pause first."};
+        return Notice{
+            true, "Single steps need a simulation that is paused: strandcast-ctl pause, or the space bar."};
       if (command.step_count == 0) return Notice{false, fmt::format("Step {} follows.", tick_ + 1)};
       counted_steps_ = command.step_count;
       steps_reply_ = job.reply ? job.reply : [](const Notice&) {};

@@ -34,38 +34,9 @@ FAST = ["--set", "quality=fast"]
 SMALL = [*FAST, "--set", "groom.procedural.strand_count=200"]
 RECORD_S = 2  # a server that records runs for so long
 
-MOTION = """HIERARCHY
-ROOT Hips
-{
-  OFFSET 0 0 0
-  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
-  JOINT Neck
-  {
-    OFFSET 0 60 0
-    CHANNELS 3 Zrotation Xrotation Yrotation
-    JOINT Head
-    {
-      OFFSET 0 12 0
-      CHANNELS 3 Zrotation Xrotation Yrotation
-      End Site
-      {
-        OFFSET 0 18 0
-      }
-    }
-  }
-}
-MOTION
-Frames: 60
-Frame Time: 0.033333
-"""
-
-
 def write_inputs():
-    """A walk, tufts of hair and a head, made here: tests bring no data of others."""
-    with open("walk.bvh", "w", encoding="utf-8") as file:
-        file.write(MOTION)
-        for i in range(60):
-            file.write(f"0 {90 + 0.02 * i} {0.5 * i} 0 0 0 0 0 0 0 0 {0.1 * i}\n")
+    """The walk that comes with the source, tufts of hair and a head made here: tests bring no data of others."""
+    shutil.copy(os.path.join(source, "examples/files/walk.bvh"), "walk.bvh")
     roots = [(0.06 * (i % 5 - 2) / 2, 0.11, 0.06 * (i // 5 - 2) / 2) for i in range(25)]
     points = [f"({x * (1 + 0.3 * k)}, {y + 0.02 - 0.004 * k * k}, {z * (1 + 0.3 * k)})" for x, y, z in roots for k in range(6)]
     with open("hair.usda", "w", encoding="utf-8") as file:

@@ -6,6 +6,7 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <fstream>
 #include <set>
 #include <utility>
 
@@ -246,6 +247,14 @@ TEST(SaveScene, KeepsWhatTheViewerDoesNotKnowOfTheScene) {
   const auto loaded = load_scene(file, {});
   ASSERT_TRUE(loaded) << loaded.error().to_string();
   EXPECT_EQ(*loaded, running);
+  // Over a scene, but over nothing else.
+  EXPECT_TRUE(save_scene(file, to_text(*whole)));
+  const auto notes = folder.path() / "notes.txt";
+  std::ofstream(notes) << "remember the milk";
+  const auto refused = save_scene(notes, to_text(*whole));
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().to_string(), testing::HasSubstr("is no scene: it stays as it is"));
+  EXPECT_EQ(std::filesystem::file_size(notes), 17u);
   EXPECT_FALSE(save_scene({}, "x"));
   EXPECT_FALSE(save_scene(file / "below a file", "x"));
 }

@@ -606,6 +606,9 @@ TEST(SlowMotion, WaysOutSaveWhatTheySay) {
   EXPECT_THAT(text, HasSubstr("0.57 of real time; its work takes 20.0 ms a step"));
   EXPECT_THAT(text, HasSubstr("groom.file.vertex_count=8 (10.0 ms less, --set at start); step_rate_hz=30"));
   EXPECT_LE(text.size(), kMaxTextChars);
+  // Where the work is little, no setting helps.
+  EXPECT_THAT(slow_motion_text(0.4, scene, {0.7, 0.0, 0.0, 0.0, 0}),
+              HasSubstr("other programs hold the processors"));
   // Slow motion lasts for two seconds of real time; nobody is told of 1.00 as of something slow.
   const std::string ending = slow_motion_text(1.0, scene, {20.0, 0.0, 0.0, 0.0, 0});
   EXPECT_THAT(ending,

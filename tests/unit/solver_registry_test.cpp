@@ -96,6 +96,10 @@ TEST(SolverRegistry, ParametersAreFilledInAndChecked) {
   EXPECT_EQ(complete->at("s_damping"), 0.5);
   EXPECT_GT(complete->at("max_speed_mps"), 0.0);
 
+  const auto others = complete_parameters(row, {{"style_margin", 0.0}});
+  ASSERT_FALSE(others);
+  EXPECT_THAT(others.error().message,
+              testing::HasSubstr("but direct_rod has: choose it with solver.name=direct_rod"));
   const auto unknown = complete_parameters(row, {{"s_dumping", 0.5}});
   ASSERT_FALSE(unknown);
   EXPECT_EQ(unknown.error().code, ErrorCode::BadInput);

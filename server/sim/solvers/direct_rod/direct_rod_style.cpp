@@ -278,7 +278,7 @@ std::vector<std::string> describe(const StyleFit& fit) {
     notes.push_back(fmt::format(
         "the groom keeps its style: {} of {} strands ({:.1f} %) that would fall are made stiffer, "
         "{:.1f} times at their median, {:.1f} at the 99th percentile, {:.1f} at most; nothing need "
-        "be done (style_margin=0 leaves them as hair)",
+        "be done (direct_rod with style_margin=0 leaves them as hair)",
         raised.size(), fit.stiffening.size(),
         100.0 * static_cast<double>(raised.size()) / static_cast<double>(fit.stiffening.size()), at(0.5),
         at(0.99), raised.back()));
