@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Plants one-line faults in product code and tells which of them no test notices.
 
-usage: mutants.py --change [REVISION] | --random N [--seed N] [--under FOLDER] [--labels L,L] [--seconds S] [--most PERCENT]
+usage: mutants.py --change [REVISION] | --random N [--seed N] [--under FOLDER,FOLDER] [--files N] [--labels L,L] [--entries REGEX]
+                  [--seconds S] [--most PERCENT]
 
 --change takes the lines that differ from REVISION (HEAD: what is not committed yet), --random lines of any source. A source is compiled
 once with all its faults (plant.py), programs of tests are linked with it beside the others under BUILD/mutants, and each entry of ctest
@@ -92,11 +93,16 @@ class Bench:
         """For each path the (place, variant) pairs to plant."""
         everything, chance = [], random.Random(self.options.seed)
         lines = self.changed_lines() if self.options.change else None
-        for path in sorted(lines if lines is not None else self.units):
-            if not path.startswith(self.options.under) or path.endswith("_main.cpp"):
-                continue
+        paths = [p for p in sorted(lines if lines is not None else self.units)
+                 if p.startswith(tuple(self.options.under.split(","))) and not p.endswith("_main.cpp")]
+        all_places = {}
+        for path in paths:
             with open(os.path.join(self.root, path)) as file:
-                places = plant.places_of(file.read())
+                all_places[path] = plant.places_of(file.read())
+        if self.options.files:  # each drawn by its number of places, so that a line of a long source is as likely as one of a short
+            paths = sorted(sorted(paths, key=lambda p: -(chance.random() ** (1 / max(len(all_places[p]), 0.01))))[:self.options.files])
+        for path in paths:
+            places = all_places[path]
             for index, place in enumerate(places):
                 if lines is None or place[2] in lines[path]:
                     variants = list(range(len(place[4])))
@@ -214,7 +220,7 @@ class Bench:
         listed = json.loads(output_of(["ctest", "--show-only=json-v1"], cwd=self.build).stdout)["tests"]
         labels = set(self.options.labels.split(",")) if self.options.labels else set(LABELS)
         entries = [Entry(t) for t in listed if "command" in t]
-        entries = [e for e in entries if set(e.labels) & labels and os.path.dirname(e.command[0]) == os.path.join(self.build, "bin")]
+        entries = [e for e in entries if set(e.labels) & labels and re.search(self.options.entries, e.name) and os.path.dirname(e.command[0]) == os.path.join(self.build, "bin")]
         for name in os.listdir(os.path.join(self.build, "bin")):  # programs that tests start stand beside them
             there = os.path.join(self.out, "bin", name)
             if os.path.lexists(there):
@@ -292,8 +298,10 @@ def main():
     parser.add_argument("--change", nargs="?", const="HEAD", metavar="REVISION")
     parser.add_argument("--random", type=int, metavar="N")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--under", default="", metavar="FOLDER")
+    parser.add_argument("--under", default="", metavar="FOLDER,FOLDER")
+    parser.add_argument("--files", type=int, metavar="N", help="from so many sources, drawn by chance: quicker to compile")
     parser.add_argument("--labels", metavar="L,L", help="entries with one of these labels alone")
+    parser.add_argument("--entries", default="", metavar="REGEX", help="entries whose names match alone")
     parser.add_argument("--seconds", type=float, default=60, help="of tests for each fault")
     parser.add_argument("--most", type=float, default=100, metavar="PERCENT")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
