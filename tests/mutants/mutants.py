@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Plants one-line faults in product code and tells which of them no test notices.
 
-usage: mutants.py --change [REVISION] | --random N [--seed N] [--under FOLDER] [--labels L,L] [--seconds S] [--most PERCENT]
+usage: mutants.py --change [REVISION] | --random N [--seed N] [--under FOLDER,FOLDER] [--files N] [--labels L,L] [--entries REGEX]
+                  [--seconds S] [--most PERCENT]
 
 --change takes the lines that differ from REVISION (HEAD: what is not committed yet), --random lines of any source. A source is compiled
 once with all its faults (plant.py), programs of tests are linked with it beside the others under BUILD/mutants, and each entry of ctest
@@ -92,11 +93,16 @@ class Bench:
         """For each path the (place, variant) pairs to plant."""
         everything, chance = [], random.Random(self.options.seed)
         lines = self.changed_lines() if self.options.change else None
-        for path in sorted(lines if lines is not None else self.units):
-            if not path.startswith(self.options.under) or path.endswith("_main.cpp"):
-                continue
+        paths = [p for p in sorted(lines if lines is not None else self.units)
+                 if p.startswith(tuple(self.options.under.split(","))) and not p.endswith("_main.cpp")]
+        all_places = {}
+        for path in paths:
             with open(os.path.join(self.root, path)) as file:
-                places = plant.places_of(file.read())
+                all_places[path] = plant.places_of(file.read())
+        if self.options.files:  # each drawn by its number of places, so that a line of a long source is as likely as one of a short
+            paths = sorted(sorted(paths, key=lambda p: -(chance.random() ** (1 / max(len(all_places[p]), 0.01))))[:self.options.files])
+        for path in paths:
+            places = all_places[path]
             for index, place in enumerate(places):
                 if lines is None or place[2] in lines[path]:
                     variants = list(range(len(place[4])))
@@ -214,7 +220,7 @@ class Bench:
         listed = json.loads(output_of(["ctest", "--show-only=json-v1"], cwd=self.build).stdout)["tests"]
         labels = set(self.options.labels.split(",")) if self.options.labels else set(LABELS)
         entries = [Entry(t) for t in listed if "command" in t]
-        entries = [e for e in entries if set(e.labels) & labels and os.path.dirname(e.command[0]) == os.path.join(self.build, "bin")]
+        entries = [e for e in entries if set(e.labels) & labels and re.search(self.options.entries, e.name) and os.path.dirname(e.command[0]) == os.path.join(self.build, "bin")]
         for name in os.listdir(os.path.join(self.build, "bin")):  # programs that tests start stand beside them
             there = os.path.join(self.out, "bin", name)
             if os.path.lexists(there):
@@ -227,8 +233,12 @@ class Bench:
             linked = dict(zip(programs, pool.map(self.link, programs)))
         return [e for e in entries if linked[e.program]]
 
-    def run(self, entry, number, timeout):
-        """Runs an entry with a fault, or with none (0), which also finds what the entry comes by. Returns whether it passed."""
+    def run(self, entry, number):
+        """Runs an entry with a fault, or with none (0), which also finds what the entry comes by. Returns whether it passed.
+
+        A fault that never ends is noticed by the processor time that it takes: the clock goes on where others work too."""
+        processor_s = int(4 * entry.seconds * self.options.jobs + 10) if number else 600
+        timeout = 10 * entry.seconds + 60 if number else 600
         environment = dict(os.environ, **entry.environment)
         reached = os.path.join(self.out, f"reached_{re.sub(r'[^A-Za-z0-9_]', '_', entry.name)}")
         if number:
@@ -237,7 +247,8 @@ class Bench:
             environment["STRANDCAST_MUTANTS_REACHED"] = reached
         begun = time.monotonic()
         try:
-            done = subprocess.run([os.path.join(self.out, "bin", entry.program), *entry.arguments], cwd=entry.folder, env=environment,
+            limited = ["sh", "-c", f'ulimit -t {processor_s}; exec "$0" "$@"', os.path.join(self.out, "bin", entry.program)]
+            done = subprocess.run([*limited, *entry.arguments], cwd=entry.folder, env=environment,
                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=timeout)
             passed = done.returncode == 0
         except subprocess.TimeoutExpired:
@@ -257,9 +268,9 @@ class Bench:
             if spent > self.options.seconds:
                 break
             spent += entry.seconds
-            passed = self.run(entry, number, 4 * entry.seconds + 10)
+            passed = self.run(entry, number)
             if not passed and CLOSED_AT_TWICE in entry.labels:
-                passed = self.run(entry, number, 4 * entry.seconds + 10)
+                passed = self.run(entry, number)
             if not passed:
                 return entry.name, len(mine)
         return "", len(mine)
@@ -292,8 +303,10 @@ def main():
     parser.add_argument("--change", nargs="?", const="HEAD", metavar="REVISION")
     parser.add_argument("--random", type=int, metavar="N")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--under", default="", metavar="FOLDER")
+    parser.add_argument("--under", default="", metavar="FOLDER,FOLDER")
+    parser.add_argument("--files", type=int, metavar="N", help="from so many sources, drawn by chance: quicker to compile")
     parser.add_argument("--labels", metavar="L,L", help="entries with one of these labels alone")
+    parser.add_argument("--entries", default="", metavar="REGEX", help="entries whose names match alone")
     parser.add_argument("--seconds", type=float, default=60, help="of tests for each fault")
     parser.add_argument("--most", type=float, default=100, metavar="PERCENT")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
@@ -307,7 +320,7 @@ def main():
     entries = bench.entries()
     print(f"{len(bench.faults)} faults, {len(entries)} entries of tests: a first run without a fault", flush=True)
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        passed = list(pool.map(lambda e: bench.run(e, 0, 600), entries))
+        passed = list(pool.map(lambda e: bench.run(e, 0), entries))
         entries = [e for e, ok in zip(entries, passed) if ok]
         print(f"{len(entries)} of them pass", flush=True)
         numbers = sorted(bench.faults)
@@ -318,6 +331,7 @@ def main():
             if by:
                 print(f"noticed {path}:{fault.line}: {fault.sentence} by {by}", flush=True)
             else:
+                print(f"not noticed {path}:{fault.line}: {fault.sentence} ({seen} entries come by it)", flush=True)
                 survivors.append((path, fault, seen))
     show(survivors, len(numbers))
     return 1 if len(survivors) * 100 > options.most * len(numbers) else 0

@@ -55,6 +55,38 @@ TEST_F(PositionLaws, OneIterationMatchesTheEquationByHand) {
   }
 }
 
+// A stiffness is the share of an error that a substep takes back, whatever the number of iterations. A push
+// of 10 m/s^2 in 0.1 s is 0.1 m; one constraint alone resists it: the only segment, or the bend of a limp
+// one.
+TEST_F(PositionLaws, StiffnessIsTheShareThatASubstepTakesBack) {
+  const Groom segment = groom_from({{{0.f, 0.f, 0.f}, {1.f, 0.f, 0.f}}}, Pinning::Root);
+  const Groom bend = groom_from({{{0.f, 0.f, 0.f}, {1.f, 0.f, 0.f}, {2.f, 0.f, 0.f}}}, Pinning::Root);
+  StepInput input;
+  input.h_s = 0.1;
+  input.gravity_mps2 = {-10.0, 0.0, 0.0};
+  for (const SolverHost& host : {kReferenceHost, kLanesHost}) {
+    for (const double share : {0.0, 0.3, 0.75}) {
+      for (const double iterations : {1.0, 7.0}) {
+        for (const auto& [groom, stretch, bending] :
+             {std::tuple(&segment, share, 0.0), std::tuple(&bend, 0.0, share)}) {
+          auto solver = make({*find_solver("pbd"), host}, *groom,
+                             {{"iterations", iterations},
+                              {"air_drag_per_s", 0.0},
+                              {"style_stiffness_per_s2", 0.0},
+                              {"max_speed_mps", 1000.0},
+                              {"stretch_stiffness", stretch},
+                              {"bend_stiffness", bending}});
+          solver->substep(input);
+          const SolverState state = read(*solver);
+          const double tip_m = static_cast<double>(state.position_m.size() - 1) - 0.1 * (1.0 - share);
+          EXPECT_NEAR(state.position_m.back().x, tip_m, 1e-6)
+              << host.name() << " " << share << " " << iterations;
+        }
+      }
+    }
+  }
+}
+
 // Each segment carries the weight below it and gives way by compliance times that, whatever the substep: the
 // units are true. (Drag takes part of a step's gravity away while it lasts, so there is none here.)
 TEST_F(PositionLaws, ACompliantStrandHangsByHookesLaw) {

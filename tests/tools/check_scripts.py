@@ -9,7 +9,10 @@ import subprocess
 import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
+from types import SimpleNamespace
 
 source = Path(sys.argv[1]).resolve()
 work = Path(tempfile.mkdtemp()).resolve()
@@ -215,6 +218,48 @@ def check_fleet():
                        ("--max-sessions", "9")] and relay[3:] == plain[1:], relay)
 
 
+def loaded_fleet():
+    os.environ["STRANDCAST_FLEET"] = str(work / "tended")
+    loader = SourceFileLoader("strandcast_fleet", str(source / "deploy/fleet/strandcast-fleet"))
+    module = module_from_spec(spec_from_loader(loader.name, loader))
+    loader.exec_module(module)
+    return module
+
+
+def check_tender():
+    """How many relays a session gets and loses, and what HAProxy is told."""
+    fleet, ended = loaded_fleet(), []
+    job = lambda name, address="": SimpleNamespace(folder=work / name, state="RUNNING", address=address, end=lambda: ended.append(name))  # noqa: E731
+    config = {**fleet.SETTINGS, "quiet_s": 0.0}
+    # viewers, relays wished for, those that there are -> those that are begun; 64 viewers each, 16 relays at most
+    for viewers, least, there, expected in ((0, 0, 0, 0), (48, 0, 0, 0), (49, 0, 0, 1), (64, 0, 0, 1), (65, 0, 0, 2), (65, 0, 1, 1), (1024, 0, 0, 16),
+                                            (5000, 0, 0, 16), (0, 3, 1, 2), (0, 20, 0, 16), (0, 0, 1, 0)):
+        begun = []
+        fleet.add_relay = lambda _, session: begun.append(session)
+        one = SimpleNamespace(name="one", folder=work / "none", least_relays=least, relays=[job(f"relay{i}") for i in range(there)])
+        fleet.Tender().scale(config, one, viewers)
+        must(len(begun) == expected, f"{viewers} viewers, {least} relays wished for, {there} there: {len(begun)} begun, not {expected}")
+    quiet, patient = fleet.Tender(), fleet.Tender()
+    one = SimpleNamespace(name="one", folder=work / "none", least_relays=1, relays=[job("a"), job("b"), job("c")])
+    for turn in range(3):
+        quiet.scale(config, one, 0)
+        patient.scale({**config, "quiet_s": 60.0}, one, 0)
+        must(ended == ["c"] * turn, f"after {turn + 1} turns: {ended}")
+    # The server serves where no relay answers; who is no longer there is forgotten.
+    told, one.relays = [], [job("001", "host:2"), job("002")]
+    one.slot, one.root, one.is_draining = "slot1", job("server", "host:1"), False
+    proxy = fleet.Proxy.__new__(fleet.Proxy)
+    proxy.config, proxy.servers, proxy.viewers, proxy.map = config, {("slot1", "relay009"): "host:9"}, {}, {"gone": "slot2"}
+    proxy.tell = lambda *commands: told.extend(commands)
+    fleet.Proxy, fleet.sessions, fleet.jobs, fleet.trouble_of = lambda _: proxy, lambda _: [one], dict, lambda _: ""
+    fleet.haproxy = lambda _, command: told.append(command)
+    fleet.Tender().turn(config)
+    added = {words[2]: (words[3], words[-1]) for words in map(str.split, told) if words[0] == "add" and words[1] == "server"}
+    must(added == {"slot1/server": ("host:1", "backup"), "slot1/relay001": ("host:2", "1")}, added)
+    for said in ("del server slot1/relay009", "sessions.map gone", "sessions.map one slot1", f"sessions.map {fleet.FILLED} yes"):
+        must(any(command.endswith(said) for command in told), f"{said}: {told}")
+
+
 def grid(words, number=[0]):
     number[0] += 1
     out = work / f"grid{number[0]}"
@@ -240,6 +285,7 @@ def check_grid():
 try:
     check_run()
     check_fleet()
+    check_tender()
     check_grid()
     print("every option does what it says")
 finally:

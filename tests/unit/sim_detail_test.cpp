@@ -62,6 +62,7 @@ TEST(SimDetail, LargerHairNeverGetsLess) {
     levels.insert(before = level);
   }
   EXPECT_EQ(levels.size(), kDetailLevels) << "every level has its sizes";
+  EXPECT_THAT(kLevelShares, testing::ElementsAre(1.0, 0.5, 0.25, 0.125, 0.0625));
 }
 
 TEST(SimDetail, AZoomOutGoesThroughAllLevelsAndAZoomInComesBackAtOnce) {
@@ -90,17 +91,22 @@ TEST(SimDetail, GoesDownALevelAtATimeAndNoSoonerThanAfterAWhile) {
   }
 }
 
+/// How often hair changes its level that goes slowly from above a threshold to a fifth below and back, and
+/// stays for longer than it takes to fall.
+size_t changes_about(double share, const DetailDesc& desc) {
+  Watch watch(desc);
+  for (int i = 0; i < 10; ++i)
+    for (const double side : {1.05, 0.8})
+      watch.see(seen(side * share * desc.full_at_px), 1.5 * desc.settle_s);
+  return watch.changes();
+}
+
 TEST(SimDetail, HairAboutAThresholdDoesNotFlicker) {
-  const DetailDesc desc = by_size();
-  for (const double share : kLevelShares) {
-    Watch watch(desc);
-    std::mt19937 random(7);
-    std::uniform_real_distribution<double> jitter(1.0 - 0.9 * desc.hysteresis, 1.1);
-    for (int i = 0; i < 3600; ++i) watch.see(seen(share * desc.full_at_px * jitter(random)));
-    // From all of it down to where it stays, and never up again.
-    EXPECT_EQ(watch.changes(), watch.down_ns().size()) << share;
-    EXPECT_LT(watch.changes(), kDetailLevels);
-  }
+  DetailDesc desc = by_size();
+  for (size_t i = 0; i < std::size(kLevelShares); ++i)
+    EXPECT_EQ(changes_about(kLevelShares[i], desc), i) << "down to where it stays, and never up again";
+  desc.hysteresis = 0.0;
+  for (const double share : kLevelShares) EXPECT_GE(changes_about(share, desc), 18u) << "nothing holds it";
 }
 
 TEST(SimDetail, ALeapingReaderIsServedAtItsLargest) {
