@@ -9,7 +9,7 @@ usage: bash deploy/run.sh [options]
 
   --groom FILE         hair to simulate: TressFX .tfx, .hair, .ply, .usd, .abc (default: grown on the spot);
                        hair in several files: the option repeated, or FILE,FILE
-  --motion FILE        head motion to feed: BVH                                 (default: built in)
+  --motion FILE        head motion to feed: BVH, or .abc of --groom that moves  (default: built in)
   --motion-unit M      metres per unit of the BVH                               (default: from the body's height)
   --motion-fps N       frames per second of a BVH that states none
   --motion-up y|z      up axis of the BVH                                       (default: guessed from the rest pose)

@@ -18,10 +18,6 @@ constexpr const char* kStillAir = "none";
 constexpr const char* kSceneWind = "scene";
 constexpr double kLongestLeadS = 60.0;
 
-bool is_of_curves(const std::string& motion) {
-  return std::filesystem::path(motion).extension() == ".abc";
-}
-
 /// What is fed, in motion time, but for the motion of curves. Who names no motion holds the head still.
 Result<FeedPlan> bake_plan(const BakeCommand& command) {
   FeedOptions options = command.feed;

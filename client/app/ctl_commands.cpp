@@ -14,6 +14,7 @@
 #include <utility>
 #include <variant>
 
+#include "client/app/hair_origin.h"
 #include "client/app/ltc.h"
 #include "client/app/notice_list.h"
 #include "client/app/save_scene.h"
@@ -95,15 +96,26 @@ glm::dquat turned_ahead(MotionClip& clip) {
   return turn.rotation;
 }
 
-/// Adds motion; `turn` is what it was turned by.
-Status add_motion(const FeedOptions& options, FeedPlan& plan, double& length_s, glm::dquat& turn) {
-  if (options.motion == "none") return {};
-  if (options.motion == "builtin") {
-    plan.motion = [blend_s = options.blend_s](double t_s) {
-      return built_in_motion(time_from_rest_s(t_s, blend_s));
-    };
-    return {};
-  }
+/// The head under curves that move as one, with as many poses as they have samples.
+Result<MotionClip> clip_of_curves(const FeedOptions& options, const FindHair& find_hair) {
+  auto curves = load_abc_motion(options.motion);
+  if (!curves) return curves.error();
+  if (!find_hair)
+    return at(options.motion, make_error(ErrorCode::BadInput,
+                                         "curves move the hair of a server's file: only feed to a server, "
+                                         "and bake, know it"));
+  ASSIGN_OR_RETURN(const HairOrigin hair, find_hair());
+  const size_t count = curves->time_s.size();
+  MotionClip clip;
+  clip.frame_s = curves->duration_s() / static_cast<double>(count - 1);
+  const auto pose_at = head_motion(std::move(*curves), hair);
+  for (size_t i = 0; i < count; ++i)
+    clip.world_from_head.push_back(pose_at(clip.frame_s * static_cast<double>(i)));
+  return clip;
+}
+
+/// The motion of a BVH file; `turn` is what it was turned by.
+Result<MotionClip> clip_of_file(const FeedOptions& options, glm::dquat& turn) {
   MotionFileOptions file = options.motion_file;
   file.has_body = true;
   if (!options.fps.empty()) {
@@ -118,8 +130,23 @@ Status add_motion(const FeedOptions& options, FeedPlan& plan, double& length_s, 
         "{}: turned by {:.0f} degrees, and a file of wind with it: then the head looks ahead "
         "on the mean (--keep-facing leaves it)\n",
         options.motion, glm::degrees(2.0 * std::atan2(turn.y, turn.w)));
-  const auto path = std::make_shared<const ClipPath>(std::move(loaded.clip),
-                                                     ClipPathOptions{options.is_looped, options.blend_s});
+  return std::move(loaded.clip);
+}
+
+/// Adds motion; `turn` is what it was turned by.
+Status add_motion(const FeedOptions& options, const FindHair& find_hair, FeedPlan& plan, double& length_s,
+                  glm::dquat& turn) {
+  if (options.motion == "none") return {};
+  if (options.motion == "builtin") {
+    plan.motion = [blend_s = options.blend_s](double t_s) {
+      return built_in_motion(time_from_rest_s(t_s, blend_s));
+    };
+    return {};
+  }
+  ASSIGN_OR_RETURN(MotionClip clip, is_of_curves(options.motion) ? clip_of_curves(options, find_hair)
+                                                                 : clip_of_file(options, turn));
+  const auto path =
+      std::make_shared<const ClipPath>(std::move(clip), ClipPathOptions{options.is_looped, options.blend_s});
   length_s = path->duration_s();
   if (path->clip().world_from_head.size() == 1) {
     length_s = 0.0;
@@ -162,7 +189,11 @@ int ctl_failure(const Error& error, int exit_code) {
   return exit_code;
 }
 
-Result<FeedPlan> make_feed_plan(const FeedOptions& options) {
+bool is_of_curves(const std::string& motion) {
+  return std::filesystem::path(motion).extension() == ".abc";
+}
+
+Result<FeedPlan> make_feed_plan(const FeedOptions& options, const FindHair& find_hair) {
   FeedPlan plan;
   plan.rate_hz = options.rate_hz;
   plan.speed = options.speed;
@@ -177,7 +208,7 @@ Result<FeedPlan> make_feed_plan(const FeedOptions& options) {
   }
   double length_s = 0.0;  // of a motion file; 0 = without end
   glm::dquat turn(1, 0, 0, 0);
-  RETURN_IF_ERROR(add_motion(options, plan, length_s, turn));
+  RETURN_IF_ERROR(add_motion(options, find_hair, plan, length_s, turn));
   RETURN_IF_ERROR(add_wind(options, plan, turn));
   if (!plan.motion && !plan.wind && !plan.timecode)
     return make_error(ErrorCode::BadInput, "nothing to feed: both --motion and --wind are none");
@@ -304,6 +335,15 @@ Result<std::vector<std::unique_ptr<SteadyClient>>> connect_sources(const CtlTarg
   return heads;
 }
 
+/// The hair of the server's scene, which curves move.
+Result<HairOrigin> hair_of(const CtlTarget& target) {
+  ASSIGN_OR_RETURN(const SceneDesc scene, ask_scene(target));
+  const auto* const files = std::get_if<FileGroomDesc>(&scene.groom);
+  if (files == nullptr)
+    return make_error(ErrorCode::BadInput, "curves move the hair of a file, and the server's hair was grown");
+  return load_place(*files);
+}
+
 /// As a program of motion capture would.
 int run_mocap_feed(const FeedOptions& options, const FeedPlan& plan, const std::atomic<bool>& stop) {
   const auto encoding = find_mocap_encoding(options.as);
@@ -331,7 +371,7 @@ int run_mocap_feed(const FeedOptions& options, const FeedPlan& plan, const std::
 
 int run_feed(const CtlTarget& target, const FeedOptions& options, const std::atomic<bool>& stop) {
   // Files first: a typing error must not need a server to be found.
-  auto plan = make_feed_plan(options);
+  auto plan = make_feed_plan(options, options.as.empty() ? [&] { return hair_of(target); } : FindHair());
   if (!plan) return ctl_failure(plan.error());
   if (!options.as.empty()) return run_mocap_feed(options, *plan, stop);
   if (options.rate_hz > kMaxFeedRateHz)

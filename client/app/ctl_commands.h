@@ -35,7 +35,7 @@ struct CtlTarget {
 };
 
 struct FeedOptions {
-  std::string motion = "builtin";  // "builtin", "none" or a BVH file
+  std::string motion = "builtin";  // "builtin", "none", a BVH file, or an .abc of hair that moves as one
   std::string wind = "gusts";      // "gusts", "none" or a CSV file
   MotionFileOptions motion_file;   // how to read a BVH file
   bool is_looped = false;
@@ -55,8 +55,15 @@ struct FeedOptions {
   std::string to = "127.0.0.1";  // HOST or HOST:PORT that gets it
 };
 
-/// Loads the files of a feed and prints notes about them to standard error.
-Result<FeedPlan> make_feed_plan(const FeedOptions& options);
+/// Whether motion is that of curves: they move the head whose hair they are.
+bool is_of_curves(const std::string& motion);
+
+struct HairOrigin;
+using FindHair = std::function<Result<HairOrigin>()>;
+
+/// Loads the files of a feed and prints notes about them to standard error. BadInput for motion of curves
+/// where nobody finds the hair that they move.
+Result<FeedPlan> make_feed_plan(const FeedOptions& options, const FindHair& find_hair = {});
 /// Returns the settings for joining the server in this role, as a viewer of strands.
 Result<ClientConfig> client_config_for(const CtlTarget& target, Role role);
 

@@ -21,7 +21,8 @@ using Line = CtlCommandLine;
 void declare_feed(CLI::App& app, CtlCommandLine& line) {
   constexpr double kMaxSpeed = 100.0;
   FeedOptions& feed = line.feed;
-  app.add_option("--motion", feed.motion, "BVH file, builtin or none")->capture_default_str();
+  app.add_option("--motion", feed.motion, "BVH file, .abc of the hair that moves as one, builtin or none")
+      ->capture_default_str();
   app.add_option("--wind", feed.wind, "CSV file, gusts or none")->capture_default_str();
   declare_motion_file(app, feed.motion_file, "--");
   app.add_flag("--keep-facing", feed.is_keeping_facing,

@@ -48,6 +48,10 @@ std::vector<T> in_order(const std::vector<T>& values, const std::vector<uint32_t
   return ordered;
 }
 
+HairOrigin origin_of(const GroomPlacement& placement, std::shared_ptr<const ExportOrigin> strands) {
+  return {std::move(strands), as_written(placement.unit_m), placement.is_z_up, file_from_head_of(placement)};
+}
+
 Status check_same(const FileGroom& hair, const SceneAsset& asset) {
   const Groom& groom = hair.placed.groom;
   if (groom.strand_count() != asset.strand_count || groom.uniform_vertex_count() != asset.vertex_count)
@@ -81,9 +85,12 @@ Result<HairOrigin> load_origin(const FileGroomDesc& file, const SceneAsset& asse
     const auto first = labels.width.begin() + hair.placed.groom.offset[hair.order[i]];
     strands->width_m.insert(strands->width_m.end(), first, first + asset.vertex_count);
   }
-  const GroomPlacement& placement = hair.placed.placement;
-  return HairOrigin{std::move(strands), as_written(placement.unit_m), placement.is_z_up,
-                    file_from_head_of(placement)};
+  return origin_of(hair.placed.placement, std::move(strands));
+}
+
+Result<HairOrigin> load_place(const FileGroomDesc& file) {
+  ASSIGN_OR_RETURN(const FileGroom hair, load_file_groom(file));
+  return origin_of(hair.placed.placement, nullptr);
 }
 
 std::function<Pose(double t_s)> head_motion(CurveMotion motion, const HairOrigin& origin) {

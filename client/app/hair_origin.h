@@ -24,6 +24,9 @@ struct HairOrigin {
 /// Loads the files. Errors of load_file_groom(), and BadInput for other hair than the asset's.
 Result<HairOrigin> load_origin(const FileGroomDesc& file, const SceneAsset& asset);
 
+/// Loads where the files have their head, and nothing of the strands.
+Result<HairOrigin> load_place(const FileGroomDesc& file);
+
 /// Returns head motion from curves that lie where these files have their hair. The head is at the world's
 /// origin and unturned with the first sample.
 std::function<Pose(double t_s)> head_motion(CurveMotion motion, const HairOrigin& origin);

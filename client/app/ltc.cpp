@@ -105,7 +105,12 @@ void LtcDecoder::note_bit(bool bit, double at) {
   bits_.back() = bit;
   if (++bit_count_ < kWordBits) return;
   if (const auto timecode = timecode_of_word(bits_, fps_))
-    newest_ = LtcFrame{*timecode, at / sample_rate_hz_};
+    newest_ = LtcFrame{*timecode, at / sample_rate_hz_, false};
+  // An edge in the middle of a bit is so either way round, and no word holds the end of another backwards.
+  std::array<bool, kWordBits> turned;
+  std::reverse_copy(bits_.begin(), bits_.end(), turned.begin());
+  if (const auto timecode = timecode_of_word(turned, fps_))
+    newest_ = LtcFrame{*timecode, at / sample_rate_hz_, true};
 }
 
 Result<WavReader> WavReader::open(std::istream& in) {
@@ -198,16 +203,15 @@ Result<TimecodeAt> read_ltc_file(const std::string& path, const FrameRate& fps) 
     const auto later = std::upper_bound(frames->begin(), frames->end(), time_s,
                                         [](double t_s, const LtcFrame& frame) { return t_s < frame.end_s; });
     if (later == frames->begin()) return std::nullopt;
-    const LtcFrame& last = *std::prev(later);
-    return advanced(last.timecode, 1.0 + (time_s - last.end_s) * last.timecode.rate.hz());
+    return std::prev(later)->after(time_s - std::prev(later)->end_s);
   });
 }
 
 Result<TimecodeAt> read_live_ltc(const FrameRate& fps) {
   struct Live {
     std::mutex mutex;
-    std::optional<Timecode> timecode;  // of `time_ns`
-    int64_t time_ns = 0;
+    std::optional<LtcFrame> frame;
+    int64_t end_ns = 0;  // of its word
   };
   auto reader = WavReader::open(std::cin);
   if (!reader) return at("standard input", reader.error());
@@ -221,15 +225,15 @@ Result<TimecodeAt> read_live_ltc(const FrameRate& fps) {
       read_s += static_cast<double>(count) / reader.sample_rate_hz();
       if (!frame) continue;
       const std::lock_guard lock(live->mutex);
-      live->time_ns = now_ns();
-      live->timecode = advanced(frame->timecode, 1.0 + (read_s - frame->end_s) * fps.hz());
+      live->end_ns = now_ns() - static_cast<int64_t>((read_s - frame->end_s) * kNsPerS);
+      live->frame = frame;
     }
   }).detach();
   return TimecodeAt([live](double) -> std::optional<Timecode> {
     const std::lock_guard lock(live->mutex);
-    const int64_t passed_ns = now_ns() - live->time_ns;
-    if (!live->timecode || passed_ns > kLiveStaleNs) return std::nullopt;
-    return advanced(*live->timecode, static_cast<double>(passed_ns) * kSPerNs * live->timecode->rate.hz());
+    const int64_t passed_ns = now_ns() - live->end_ns;
+    if (!live->frame || passed_ns > kLiveStaleNs) return std::nullopt;
+    return live->frame->after(static_cast<double>(passed_ns) * kSPerNs);
   });
 }
 

@@ -1,5 +1,5 @@
 // LtcDecoder: reads linear timecode (SMPTE ST 12-1, biphase mark) from the samples of a sound. Pure logic;
-// one thread. Tape that runs backwards is not read.
+// one thread. Tape may run backwards.
 #pragma once
 
 #include <array>
@@ -17,7 +17,14 @@ namespace strandcast {
 /// A frame of linear timecode.
 struct LtcFrame {
   Timecode timecode;
-  double end_s = 0.0;  // of its word since the first sample: the next frame begins here
+  double end_s = 0.0;         // of its word since the first sample: the next frame begins here
+  bool is_backwards = false;  // the word ends with its own beginning, and the frame before follows
+
+  /// Returns the timecode so long after the word's end.
+  Timecode after(double passed_s) const {
+    const double frames = passed_s * timecode.rate.hz();
+    return advanced(timecode, is_backwards ? -frames : 1.0 + frames);
+  }
 };
 
 class LtcDecoder {

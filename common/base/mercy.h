@@ -4,7 +4,9 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "common/base/result.h"
 
@@ -35,6 +37,12 @@ class BadItems {
   std::string sentence(uint64_t total, const char* items, const char* what) const {
     return fmt::format("{} of {} {} cannot be used, {}; the first: {}", count_, total, items, what,
                        first_->to_string());
+  }
+  /// Judges, and adds the sentence to `notes` if there is anything to say.
+  Status settle(uint64_t total, const char* items, const char* what, std::vector<std::string>& notes) const {
+    RETURN_IF_ERROR(judge(total, items));
+    if (count_ > 0) notes.push_back(sentence(total, items, what));
+    return {};
   }
 
  private:

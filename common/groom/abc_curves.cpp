@@ -6,6 +6,7 @@
 
 #include "common/groom/stated_groom.h"
 #include "common/groom/text_scan.h"
+#include "common/groom/usable_strands.h"
 
 namespace strandcast {
 namespace {
@@ -49,7 +50,7 @@ Status read_kinds(const AbcSample& sample, AbcCurves& curves) {
   return {};
 }
 
-Status read_counts(const AbcSample& sample, size_t point_count, AbcCurves& curves) {
+Status read_counts(const AbcSample& sample, uint64_t vertex_limit, AbcCurves& curves) {
   uint64_t total = 0;
   for (size_t strand = 0; strand < sample.count(); ++strand) {
     const double count = sample.number(strand);
@@ -58,9 +59,10 @@ Status read_counts(const AbcSample& sample, size_t point_count, AbcCurves& curve
     curves.vertex_counts.push_back(static_cast<uint32_t>(count));
     total += curves.vertex_counts.back();
   }
-  if (total != point_count)
-    return make_error(ErrorCode::BadInput, "nVertices need {} points, there are {}", total, point_count);
-  return {};
+  RETURN_IF_ERROR(fit_points(curves.points, total, "nVertices", curves.notes));
+  if (total <= vertex_limit) return {};
+  return make_error(ErrorCode::LimitExceeded, "nVertices need {} points, {} are allowed", total,
+                    vertex_limit);
 }
 
 }  // namespace
@@ -117,7 +119,6 @@ Result<AbcCurves> AbcCurvesReader::read(uint64_t sample, uint64_t strand_limit, 
   RETURN_IF_ERROR(read_kinds(kinds, curves));
   ASSIGN_OR_RETURN(const AbcSample points, archive_->sample(points_, sample, vertex_limit));
   ASSIGN_OR_RETURN(const AbcSample counts, archive_->sample(counts_, sample, strand_limit));
-  RETURN_IF_ERROR(read_counts(counts, points.count(), curves));
   curves.is_double = points.pod == AbcPod::Double;
   curves.points.resize(points.count());
   if (!curves.is_double && !curves.points.empty())
@@ -126,6 +127,7 @@ Result<AbcCurves> AbcCurvesReader::read(uint64_t sample, uint64_t strand_limit, 
     for (uint32_t axis = 0; axis < 3; ++axis)
       curves.points[i][static_cast<int>(axis)] = static_cast<float>(points.number(i, axis));
   }
+  RETURN_IF_ERROR(read_counts(counts, vertex_limit, curves));
   return curves;
 }
 

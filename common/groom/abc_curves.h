@@ -37,6 +37,7 @@ struct AbcCurves {
   bool is_double = false;  // points were in double precision
   std::vector<uint32_t> vertex_counts;
   std::vector<glm::vec3> points;
+  std::vector<std::string> notes;  // of points too few or too many
 
   /// Finds what the values of a parameter belong to: what it states if their number fits, else what fits.
   /// Empty if nothing does.
@@ -52,8 +53,8 @@ class AbcCurvesReader {
 
   uint64_t sample_count() const { return points_.sample_count; }
   double time_s(uint64_t sample) const { return archive_->time_s(points_, sample); }
-  /// Reads strands; none if there is no sample. BadInput for counts that do not fit and unknown kinds; points
-  /// may be no numbers. LimitExceeded for more than these strands or vertices.
+  /// Reads strands; none if there is no sample. BadInput for counts that do not fit (as fit_points()) and
+  /// unknown kinds; points may be no numbers. LimitExceeded for more than these strands or vertices.
   Result<AbcCurves> read(uint64_t sample, uint64_t strand_limit, uint64_t vertex_limit) const;
   /// Reads a parameter of the schema ("width") or a free one ("groom_guide"); empty if there is none.
   Result<std::optional<AbcParam>> param(std::string_view name, uint64_t sample) const;

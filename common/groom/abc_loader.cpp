@@ -24,8 +24,11 @@ constexpr size_t kCubicOrder = 4;
 /// What notes say of all curves together.
 struct AbcTally {
   size_t objects = 0, double_objects = 0, instances = 0;
+  size_t moving_objects = 0;  // by a transform
   size_t hidden_objects = 0, closed_objects = 0, unknown_objects = 0, unfit_widths = 0, unfit_roots = 0;
-  size_t short_strands = 0, cubic_strands = 0, guides = 0;
+  BadItems empty_strands;
+  uint64_t read_strands = 0;
+  size_t cubic_strands = 0, guides = 0;
   std::string basis;
   double time_s = 0.0;
   uint64_t most_samples = 0;
@@ -103,6 +106,7 @@ class AbcLoading {
       if (tree.nodes()[node].kind != AbcKind::Curves) continue;
       if (const Status added = add_object(tree, node); !added) return at(tree.path(node), added.error());
     }
+    RETURN_IF_ERROR(settle_empty(tally_.empty_strands, tally_.read_strands, notes_));
     part_guides();
     // What strands say stays when all of them say it.
     const auto lacks_uv = [](const glm::vec2& uv) { return std::isnan(uv.x); };
@@ -142,6 +146,8 @@ class AbcLoading {
                      AbcCurvesReader::open(archive_, tree.nodes()[node].object));
     ASSIGN_OR_RETURN(const AbcCurves curves, reader.read(0, kMaxStrandCount - groom_.strand_count(),
                                                          kMaxGroomVertices - groom_.rest_position_m.size()));
+    for (const std::string& note : curves.notes)
+      notes_.push_back(fmt::format("{}: {}", tree.path(node), note));
     if (curves.points.empty()) return {};
     if (curves.is_periodic) {
       ++tally_.closed_objects;
@@ -154,6 +160,7 @@ class AbcLoading {
     }
     ++tally_.objects;
     if (curves.is_double) ++tally_.double_objects;
+    if (!tree.nodes()[node].world_from_node) ++tally_.moving_objects;
     if (reader.sample_count() > tally_.most_samples) {
       tally_.most_samples = reader.sample_count();
       tally_.time_s = reader.time_s(0);
@@ -180,6 +187,7 @@ class AbcLoading {
     // One large object is not grown step by step; many small ones are.
     const size_t known = groom_.rest_position_m.size();
     if (curves.points.size() > known) groom_.rest_position_m.reserve(known + curves.points.size());
+    tally_.read_strands += curves.vertex_counts.size();
     (id ? tally_.has_ids : lacks_ids_) = true;
     size_t first = 0;
     for (size_t strand = 0; strand < curves.vertex_counts.size(); ++strand) {
@@ -188,7 +196,7 @@ class AbcLoading {
       auto points = points_of(curves, splines, strand, begin);
       if (!points) return at(fmt::format("strand {}", strand), points.error());
       if (count < kMinVertexCount) {
-        ++tally_.short_strands;
+        tally_.empty_strands.add(at(own_name, empty_strand(strand)));
         continue;
       }
       if (count > kMaxSourceVertexCount)
@@ -328,7 +336,7 @@ class AbcLoading {
   }
 
   std::vector<std::string> notes() const {
-    std::vector<std::string> notes;
+    std::vector<std::string> notes = notes_;
     const auto note = [&](size_t count, const std::string& sentence) {
       if (count > 0) notes.push_back(sentence);
     };
@@ -340,6 +348,10 @@ class AbcLoading {
     note(t.most_samples > 1,
          fmt::format("strands as at {:.6g} s, the first of {} samples: motion of the file is not taken over",
                      t.time_s, t.most_samples));
+    note(
+        t.moving_objects,
+        fmt::format("{} curves objects stand as their first transform has them: its motion is not taken over",
+                    t.moving_objects));
     note(t.double_objects, fmt::format("points of {} curves objects were in double precision and are rounded",
                                        t.double_objects));
     note(t.cubic_strands,
@@ -359,8 +371,6 @@ class AbcLoading {
          fmt::format("{} curves objects are left out: cubic curves without a basis, Hermite and power curves "
                      "are not read",
                      t.unknown_objects));
-    note(t.short_strands,
-         fmt::format("{} strands of fewer than {} points are left out", t.short_strands, kMinVertexCount));
     note(t.guides,
          are_all_guides_ ? std::string("all strands are guides (groom_guide): they are taken as hair")
          : guide_use_ == GuideUse::Alone
@@ -376,7 +386,8 @@ class AbcLoading {
 
   const AbcArchive& archive_;
   Groom groom_;
-  StrandLabels labels_;  // of all strands; NaN for widths that are not there
+  std::vector<std::string> notes_;  // of single objects
+  StrandLabels labels_;             // of all strands; NaN for widths that are not there
   bool lacks_ids_ = false;
   std::vector<uint8_t> is_guide_;  // of each strand
   const GuideUse guide_use_;

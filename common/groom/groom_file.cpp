@@ -1,11 +1,13 @@
 #include "common/groom/groom_file.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <span>
 #include <string>
 
+#include "common/base/quantile.h"
 #include "common/base/text.h"
 #include "common/base/units.h"
 #include "common/groom/abc_loader.h"
@@ -155,6 +157,8 @@ Result<StatedGroom> load_parts(const GroomFileOptions& options) {
   return whole;
 }
 
+constexpr std::array kUsualUnitsM = {1.0f, 0.01f, 0.001f, 0.0254f};
+
 std::string unit_text(float unit_m) {
   return unit_m < 0.5f ? fmt::format("{:.4g} mm", unit_m * kMmPerM) : fmt::format("{:.4g} m", unit_m);
 }
@@ -189,11 +193,35 @@ std::string unlikely_unit(float unit_m, const glm::vec3& size) {
   if (is_likely(unit_m) || !(largest > 0.0f)) return {};
   std::string sentence =
       fmt::format("with its unit this hair is {} long, as on no head", unit_text(largest * unit_m));
-  for (const float other_m : {1.0f, 0.01f, 0.001f, 0.0254f})
+  for (const float other_m : kUsualUnitsM)
     if (is_likely(other_m))
       return sentence +
              fmt::format(": groom.file.unit_m={:g} makes it {}", other_m, unit_text(largest * other_m));
   return sentence;
+}
+
+/// What to say of a unit with which the roots reach further than those of a head and a mane down its back;
+/// empty where they may.
+std::string unlikely_roots(float unit_m, const Groom& groom) {
+  constexpr float kLeastRootsM = 0.03f, kMostRootsM = 0.5f;
+  constexpr double kFew = 0.05;  // stray ones say nothing
+  constexpr uint32_t kLeastRoots = 64;
+  if (groom.strand_count() < kLeastRoots || !is_hair_of_head(groom)) return {};
+  const std::vector<glm::vec3> roots = roots_of(groom);
+  float reach = 0.0f;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> places;
+    for (const glm::vec3& root : roots) places.push_back(static_cast<double>(root[axis]));
+    reach = std::max(reach, static_cast<float>(quantile(places, 1.0 - kFew) - quantile(places, kFew)));
+  }
+  if (!(reach * unit_m > kMostRootsM)) return {};
+  std::string sentence =
+      fmt::format("the roots reach over {} then, as on no head", unit_text(reach * unit_m));
+  for (const float other_m : kUsualUnitsM)
+    if (reach * other_m >= kLeastRootsM && reach * other_m <= kMostRootsM)
+      return sentence +
+             fmt::format(": groom.file.unit_m={:g} makes it {}", other_m, unit_text(reach * other_m));
+  return sentence + ": groom.file.unit_m states another unit";
 }
 
 /// Vertices that a strand holds in a row from its root on, and up to its tip.
@@ -350,7 +378,10 @@ PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
   GroomPlacement& placement = placed.placement;
   const auto judge_unit = [&](float unit_m) {
     std::string unlikely = unlikely_unit(unit_m, size_of(groom));
-    if (unlikely.empty()) unlikely = unlikely_head(unit_m, groom);
+    // What is guessed is so from that head.
+    const bool is_stated = options.unit_m > 0.0f || stated.unit_m;
+    if (unlikely.empty() && is_stated) unlikely = unlikely_head(unit_m, groom);
+    if (unlikely.empty()) unlikely = unlikely_roots(unit_m, groom);
     if (unlikely.empty()) return;
     placed.notes.push_back(unlikely);
     if (placed.unlikely.empty()) placed.unlikely = std::move(unlikely);
@@ -368,6 +399,7 @@ PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
     placement.unit_m = guess.value;
     note_guess(placed, fmt::format("1 unit = {}", unit_text(guess.value)),
                guess.reason.empty() ? "the roots say nothing of a head" : guess.reason, "unit_m");
+    judge_unit(guess.value);
   }
   placed.material = usable_material(stated.material.scaled(placement.unit_m), placed.notes);
   placed.is_of_head = is_hair_of_head(groom);

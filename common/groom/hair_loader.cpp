@@ -1,8 +1,11 @@
 #include "common/groom/hair_loader.h"
 
+#include <algorithm>
 #include <string>
 
 #include "common/base/file.h"
+#include "common/base/mercy.h"
+#include "common/groom/usable_strands.h"
 
 namespace strandcast {
 namespace {
@@ -57,16 +60,26 @@ Result<HairHeader> read_hair_header(const ByteView& file) {
   if (!header.has(kPointsBit)) {
     return make_error(ErrorCode::BadInput, "array bits {:#x} say that there are no points", header.arrays);
   }
-  if (expected_bytes(header) != file.size_bytes()) {
-    return make_error(ErrorCode::BadInput, "{} bytes, but {} strands, {} points and array bits {:#x} need {}",
-                      file.size_bytes(), header.strand_count, header.point_count, header.arrays,
-                      expected_bytes(header));
-  }
   return header;
 }
 
-/// First vertex of each strand, checked to add up to the header's point count.
+/// Judges a file that is cut off, or that goes on behind its arrays.
+Status check_size(const ByteView& file, const HairHeader& header, std::vector<std::string>& notes) {
+  const uint64_t expected = expected_bytes(header), size = file.size_bytes();
+  if (expected == size) return {};
+  BadItems wrong;
+  wrong.add(
+      make_error(ErrorCode::BadInput, "{} bytes, but {} strands, {} points and array bits {:#x} need {}",
+                 size, header.strand_count, header.point_count, header.arrays, expected),
+      std::max(expected, size) - std::min(expected, size));
+  return wrong.settle(std::max(expected, size), "bytes",
+                      size < expected ? "since the file is cut off" : "and are left out", notes);
+}
+
+/// First vertex of each strand.
 Result<std::vector<uint32_t>> read_offsets(const ByteView& file, const HairHeader& header) {
+  if (header.has(kSegmentsBit) && !file.has(kHeaderBytes, header.strand_count, sizeof(uint16_t)))
+    return make_error(ErrorCode::BadInput, "the file ends before its first point");
   std::vector<uint32_t> offset{0};
   offset.reserve(header.strand_count + size_t{1});
   uint64_t total = 0;
@@ -79,12 +92,7 @@ Result<std::vector<uint32_t>> read_offsets(const ByteView& file, const HairHeade
                         segments, kMaxSourceVertexCount - 1);
     }
     total += segments + 1;
-    if (total > header.point_count) break;
     offset.push_back(static_cast<uint32_t>(total));
-  }
-  if (total != header.point_count) {
-    return make_error(ErrorCode::BadInput, "the strands need {}{} points, the header says {}",
-                      total > header.point_count ? "at least " : "", total, header.point_count);
   }
   return offset;
 }
@@ -93,19 +101,22 @@ Result<std::vector<uint32_t>> read_offsets(const ByteView& file, const HairHeade
 
 Result<StatedGroom> read_hair(const ByteView& file) {
   ASSIGN_OR_RETURN(const HairHeader header, read_hair_header(file));
-  Groom groom;
+  StatedGroom stated;
+  RETURN_IF_ERROR(check_size(file, header, stated.notes));
+  Groom& groom = stated.groom;
   ASSIGN_OR_RETURN(groom.offset, read_offsets(file, header));
   const uint64_t segments_bytes = header.has(kSegmentsBit) ? header.strand_count * sizeof(uint16_t) : 0;
   const uint64_t points_at = kHeaderBytes + segments_bytes;
-  groom.rest_position_m.resize(header.point_count);
-  for (uint32_t i = 0; i < header.point_count; ++i) {
-    glm::vec3& point = groom.rest_position_m[i];
+  for (uint32_t i = 0; i < header.point_count && file.has(points_at, i + uint64_t{1}, kPointBytes); ++i) {
+    glm::vec3& point = groom.rest_position_m.emplace_back();
     for (int axis = 0; axis < 3; ++axis) {
       point[axis] =
           file.get<float>(points_at + i * kPointBytes + static_cast<uint64_t>(axis) * sizeof(float));
     }
   }
-  return StatedGroom{.groom = with_pinning(std::move(groom), Pinning::Root)};
+  RETURN_IF_ERROR(fit_points(groom.rest_position_m, groom.offset.back(), "the strands", stated.notes));
+  groom = with_pinning(std::move(groom), Pinning::Root);
+  return stated;
 }
 
 Result<StatedGroom> load_hair(const std::filesystem::path& path) {

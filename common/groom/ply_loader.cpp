@@ -34,9 +34,7 @@ Status take_rows(PlyRows& rows, const PlyElement& element, std::vector<std::stri
       if (!rows.has_ended()) return is_there;
       BadItems missing;
       missing.add(is_there.error(), element.row_count - row);
-      RETURN_IF_ERROR(missing.judge(element.row_count, "rows"));
-      notes.push_back(missing.sentence(element.row_count, "rows", "since the file is cut off"));
-      return {};
+      return missing.settle(element.row_count, "rows", "since the file is cut off", notes);
     }
     RETURN_IF_ERROR(take(row));
   }

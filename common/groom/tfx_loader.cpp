@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "common/base/file.h"
 #include "common/base/mercy.h"
 #include "common/groom/text_scan.h"
+#include "common/groom/usable_strands.h"
 
 namespace strandcast {
 namespace {
@@ -55,8 +57,10 @@ Status check_counts(uint32_t strand_count, uint32_t vertex_count) {
   return {};
 }
 
-/// Every array lies behind the header and inside the file, no two overlap, and nothing is left over.
-Status check_arrays(const ByteView& file, const TfxHeader& header) {
+/// Every array lies behind the header and inside the file, no two overlap, and nothing is left over: where a
+/// tenth of the bytes at most is missing or too many, a note counts them.
+Status check_arrays(const ByteView& file, const TfxHeader& header, std::vector<std::string>& notes) {
+  BadItems cut;
   std::vector<TfxArray> arrays;
   for (const TfxArray& array : header.arrays) {
     if (array.offset != 0) arrays.push_back(array);
@@ -68,17 +72,23 @@ Status check_arrays(const ByteView& file, const TfxHeader& header) {
       return make_error(ErrorCode::BadInput, "offset {} of the {} overlaps what ends at byte {}",
                         array.offset, array.name, end);
     }
-    if (!file.has(array.offset, array.count, array.item_bytes)) {
-      return make_error(ErrorCode::BadInput, "{} x {} bytes of {} at offset {} do not fit into {} bytes",
-                        array.count, array.item_bytes, array.name, array.offset, file.size_bytes());
+    if (array.end() > file.size_bytes()) {
+      Error unfit =
+          make_error(ErrorCode::BadInput, "{} x {} bytes of {} at offset {} do not fit into {} bytes",
+                     array.count, array.item_bytes, array.name, array.offset, file.size_bytes());
+      if (array.offset % kFloatBytes != 0) return unfit;  // a wrong offset, and no cut
+      cut.add(std::move(unfit), array.end() - std::max(end, file.size_bytes()));
+      RETURN_IF_ERROR(cut.judge(array.end(), "bytes"));
     }
     end = array.end();
   }
-  if (end != file.size_bytes()) {
-    return make_error(ErrorCode::BadInput, "{} bytes are left after the last array, which ends at byte {}",
-                      file.size_bytes() - end, end);
-  }
-  return {};
+  RETURN_IF_ERROR(cut.settle(end, "bytes", "since the file is cut off", notes));
+  if (end >= file.size_bytes()) return {};
+  BadItems left;
+  left.add(make_error(ErrorCode::BadInput, "{} bytes are left after the last array, which ends at byte {}",
+                      file.size_bytes() - end, end),
+           file.size_bytes() - end);
+  return left.settle(file.size_bytes(), "bytes", "and are left out", notes);
 }
 
 Result<TfxHeader> read_header_v4(const ByteView& file) {
@@ -142,10 +152,15 @@ Result<TfxHeader> read_tfx_header(const ByteView& file) {
       version);
 }
 
+/// Points as far as the file has them.
 void read_positions(const ByteView& file, const TfxHeader& header, Groom& groom) {
   groom.rest_position_m.resize(header.vertex_total());
   for (uint64_t i = 0; i < header.vertex_total(); ++i) {
     const uint64_t offset = header.positions().offset + i * header.position_bytes;
+    if (!file.has(offset, 1, header.position_bytes)) {
+      groom.rest_position_m.resize(i);
+      return;
+    }
     for (int axis = 0; axis < 3; ++axis) {
       groom.rest_position_m[i][axis] = file.get<float>(offset + static_cast<uint64_t>(axis) * kFloatBytes);
     }
@@ -153,13 +168,14 @@ void read_positions(const ByteView& file, const TfxHeader& header, Groom& groom)
 }
 
 /// Pin flags of version 4: the fourth float is an inverse mass, 0 = pinned. One that is no mass holds
-/// nothing, but for a root. Returns what to say of these.
-Result<std::string> read_pins(const ByteView& file, const TfxHeader& header, Groom& groom) {
+/// nothing, but for a root, and notes count these.
+Status read_pins(const ByteView& file, const TfxHeader& header, Groom& groom,
+                 std::vector<std::string>& notes) {
   BadItems broken;
   groom.pinned.resize(header.vertex_total());
   for (uint64_t i = 0; i < header.vertex_total(); ++i) {
     const uint64_t offset = header.positions().offset + i * header.position_bytes + 3 * kFloatBytes;
-    const auto inverse_mass = file.get<float>(offset);
+    const float inverse_mass = file.has(offset, 1, kFloatBytes) ? file.get<float>(offset) : 1.0f;
     const uint64_t strand = i / header.vertex_count, vertex = i % header.vertex_count;
     if (!std::isfinite(inverse_mass) || inverse_mass < 0.0f)
       broken.add(make_error(ErrorCode::BadInput,
@@ -167,16 +183,16 @@ Result<std::string> read_pins(const ByteView& file, const TfxHeader& header, Gro
                             strand, vertex, offset, inverse_mass));
     groom.pinned[i] = vertex == 0 || inverse_mass == 0.0f ? 1 : 0;
   }
-  RETURN_IF_ERROR(broken.judge(header.vertex_total(), "vertices"));
-  return broken.count() == 0 ? std::string()
-                             : broken.sentence(header.vertex_total(), "vertices", "so that these are free");
+  return broken.settle(header.vertex_total(), "vertices", "so that these are free", notes);
 }
 
 void read_root_uv(const ByteView& file, const TfxHeader& header, Groom& groom) {
   if (header.strand_uv().offset == 0) return;
-  groom.root_uv.resize(header.strand_count);
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();  // where the file is cut off
+  groom.root_uv.resize(header.strand_count, glm::vec2(kNone));
   for (uint64_t i = 0; i < header.strand_count; ++i) {
     const uint64_t offset = header.strand_uv().offset + i * header.strand_uv().item_bytes;
+    if (!file.has(offset, 1, header.strand_uv().item_bytes)) return;
     groom.root_uv[i] = {file.get<float>(offset), file.get<float>(offset + kFloatBytes)};
   }
 }
@@ -190,22 +206,22 @@ Result<StatedGroom> read_tfx_binary(const ByteView& file) {
                       "the offset of the vertex positions is 0, they start at {} or later",
                       header.header_bytes);
   }
-  RETURN_IF_ERROR(check_arrays(file, header));
-  Groom groom;
+  StatedGroom stated;
+  RETURN_IF_ERROR(check_arrays(file, header, stated.notes));
+  Groom& groom = stated.groom;
   groom.offset.resize(header.strand_count + size_t{1});
   for (uint32_t strand = 0; strand <= header.strand_count; ++strand) {
     groom.offset[strand] = strand * header.vertex_count;
   }
   read_positions(file, header, groom);
+  RETURN_IF_ERROR(fit_points(groom.rest_position_m, header.vertex_total(), "the strands", stated.notes));
   read_root_uv(file, header, groom);
   if (header.has_pin_flags) {
-    ASSIGN_OR_RETURN(std::string note, read_pins(file, header, groom));
-    StatedGroom stated{.groom = std::move(groom)};
-    if (!note.empty()) stated.notes.push_back(std::move(note));
+    RETURN_IF_ERROR(read_pins(file, header, groom, stated.notes));
     return stated;
   }
-  const Pinning pinning = header.has_both_ends ? Pinning::BothEnds : Pinning::RootPair;
-  return StatedGroom{.groom = with_pinning(std::move(groom), pinning)};
+  groom = with_pinning(std::move(groom), header.has_both_ends ? Pinning::BothEnds : Pinning::RootPair);
+  return stated;
 }
 
 Result<StatedGroom> load_tfx(const std::filesystem::path& path) {

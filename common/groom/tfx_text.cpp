@@ -158,14 +158,15 @@ class StrandLines {
   bool has_line_ = true;
 };
 
-/// Reads all strands, and leaves out those that cannot be used. Returns what to say of these.
-Result<std::string> read_strands(TextScan& scan, uint32_t strand_count, Groom& groom) {
+/// Reads all strands, also those beyond the announced number, and leaves out those that cannot be used. Notes
+/// count both.
+Status read_strands(TextScan& scan, uint32_t strand_count, Groom& groom, std::vector<std::string>& notes) {
   BadItems broken;
   StrandLines lines(scan);
   uint32_t seen = 0;
   for (; !lines.at_end(); ++seen) {
-    if (seen == strand_count)
-      return line_error(scan, ErrorCode::BadInput, "'strand' follows the last of {} strands", strand_count);
+    if (seen == kMaxStrandCount)
+      return line_error(scan, ErrorCode::LimitExceeded, "more than {} strands", kMaxStrandCount);
     const size_t first = groom.rest_position_m.size();
     if (const Status read = lines.read(groom); !read) {
       broken.add(read.error());
@@ -178,8 +179,9 @@ Result<std::string> read_strands(TextScan& scan, uint32_t strand_count, Groom& g
   for (uint32_t missing = seen; missing < strand_count; ++missing)
     broken.add(
         line_error(scan, ErrorCode::BadInput, "the file ends after {} of {} strands", seen, strand_count));
-  RETURN_IF_ERROR(broken.judge(strand_count, "strands"));
-  return broken.count() == 0 ? std::string() : broken.sentence(strand_count, "strands", "and are left out");
+  if (seen > strand_count)
+    notes.push_back(fmt::format("{} strands are announced, {} are there", strand_count, seen));
+  return broken.settle(std::max(seen, strand_count), "strands", "and are left out", notes);
 }
 
 /// Tells rows of three numbers with decimal commas from rows whose numbers are separated by commas.
@@ -213,11 +215,10 @@ Result<StatedGroom> read_tfx_text(std::string_view text) {
   ASSIGN_OR_RETURN(const TextHeader header, read_text_header(scan));
   Groom groom;
   groom.offset.push_back(0);
-  ASSIGN_OR_RETURN(std::string note, read_strands(scan, header.strand_count, groom));
   StatedGroom stated;
+  RETURN_IF_ERROR(read_strands(scan, header.strand_count, groom, stated.notes));
   stated.groom = with_pinning(std::move(groom), header.has_both_ends ? Pinning::BothEnds : Pinning::RootPair);
   if (!with_points.empty()) stated.notes.emplace_back("its numbers have decimal commas");
-  if (!note.empty()) stated.notes.push_back(std::move(note));
   return stated;
 }
 

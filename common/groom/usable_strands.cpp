@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
-#include "common/base/mercy.h"
 #include "common/base/quantile.h"
 #include "common/math/point_tree.h"
 
@@ -108,6 +108,31 @@ StrandNames::StrandNames(const std::vector<std::string>& texts, size_t strand_co
   }
 }
 
+Status fit_points(std::vector<glm::vec3>& points, uint64_t needed, const char* source,
+                  std::vector<std::string>& notes) {
+  const uint64_t there = points.size();
+  if (there == needed) return {};
+  BadItems wrong;
+  wrong.add(make_error(ErrorCode::BadInput, "{} need {} points, there are {}", source, needed, there),
+            std::max(there, needed) - std::min(there, needed));
+  RETURN_IF_ERROR(wrong.settle(std::max(there, needed), "points",
+                               there < needed ? "since they are not there" : "and are left out", notes));
+  points.resize(needed, glm::vec3(std::numeric_limits<float>::quiet_NaN()));
+  return {};
+}
+
+Error empty_strand(size_t strand) {
+  return make_error(ErrorCode::BadInput, "strand {} has fewer than {} points, or no length", strand,
+                    kMinVertexCount);
+}
+
+Status settle_empty(const BadItems& empty, uint64_t strand_count, std::vector<std::string>& notes) {
+  // One is no habit of a program, however few strands there are.
+  if (empty.count() > 1) RETURN_IF_ERROR(empty.judge(strand_count, "strands"));
+  if (empty.count() > 0) notes.push_back(empty.sentence(strand_count, "strands", "and are left out"));
+  return {};
+}
+
 void keep_strands(Groom& groom, StrandLabels& labels, std::span<const uint8_t> is_kept) {
   const auto keep = [&](auto& list, const auto& begin_of) {
     if (list.empty()) return;
@@ -141,8 +166,7 @@ Result<StatedGroom> with_usable_strands(StatedGroom stated) {
   Groom& groom = stated.groom;
   const uint32_t strand_count = groom.strand_count();
   std::vector<uint8_t> is_kept(strand_count, 1);
-  BadItems broken;
-  size_t empty_count = 0;
+  BadItems broken, empty;
   for (uint32_t strand = 0; strand < strand_count; ++strand) {
     const auto points =
         std::span(groom.rest_position_m).subspan(groom.offset[strand], groom.vertex_count(strand));
@@ -152,20 +176,16 @@ Result<StatedGroom> with_usable_strands(StatedGroom stated) {
       broken.add(make_error(ErrorCode::BadInput, "strand {} vertex {} has the coordinates {}, {} and {}",
                             strand, bad - points.begin(), bad->x, bad->y, bad->z));
     const bool is_empty = !is_broken && (points.size() < kMinVertexCount || !(groom.length_m(strand) > 0.0f));
-    if (is_empty) ++empty_count;
+    if (is_empty) empty.add(empty_strand(strand));
     if (is_broken || is_empty) is_kept[strand] = 0;
   }
   find_strays(groom, is_kept, broken);
-  RETURN_IF_ERROR(broken.judge(strand_count, "strands"));
-  if (broken.count() + empty_count == 0) return with_usable_uv(std::move(stated));
-  if (broken.count() + empty_count == strand_count)
+  RETURN_IF_ERROR(broken.settle(strand_count, "strands", "and are left out", stated.notes));
+  if (broken.count() + empty.count() == strand_count)
     return make_error(ErrorCode::BadInput, "no strand has {} points and a length", kMinVertexCount);
+  RETURN_IF_ERROR(settle_empty(empty, strand_count, stated.notes));
+  if (broken.count() + empty.count() == 0) return with_usable_uv(std::move(stated));
   keep_strands(groom, stated.labels, is_kept);
-  if (broken.count() > 0)
-    stated.notes.push_back(broken.sentence(strand_count, "strands", "and are left out"));
-  if (empty_count > 0)
-    stated.notes.push_back(fmt::format("{} strands of fewer than {} points or no length are left out",
-                                       empty_count, kMinVertexCount));
   return with_usable_uv(std::move(stated));
 }
 

@@ -2,8 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/glm.hpp>
 #include <span>
+#include <string>
+#include <vector>
 
+#include "common/base/mercy.h"
 #include "common/base/result.h"
 #include "common/groom/stated_groom.h"
 
@@ -11,8 +15,20 @@ namespace strandcast {
 
 /// Leaves out strands with a point that is not finite or far from all other hair, and those that show
 /// nothing: of fewer than two points or without length. Coordinates of roots that are not finite are bridged.
-/// Notes count them. BadInput when nothing is left, or when more than a tenth is broken.
+/// Notes count them. BadInput when nothing is left, or when more than a tenth is broken or shows
+/// nothing.
 Result<StatedGroom> with_usable_strands(StatedGroom stated);
+
+/// Makes points as many as strands need. Where a file has a tenth too few or too many at most, a note counts
+/// them: what is not there is not finite, so that with_usable_strands() leaves out its strands. `source` says
+/// who needs them. BadInput for more.
+Status fit_points(std::vector<glm::vec3>& points, uint64_t needed, const char* source,
+                  std::vector<std::string>& notes);
+
+/// Says of a strand that it shows nothing, and what becomes of such: noted, refused where more than one and a
+/// tenth are so.
+Error empty_strand(size_t strand);
+Status settle_empty(const BadItems& empty, uint64_t strand_count, std::vector<std::string>& notes);
 
 /// Removes the strands whose element is 0, with all that is said of them; takes no further memory.
 void keep_strands(Groom& groom, StrandLabels& labels, std::span<const uint8_t> is_kept);

@@ -21,6 +21,8 @@ struct Tally {
   size_t curves_prims = 0;
   size_t left_out_prims = 0;
   size_t cubic_strands = 0;
+  size_t unfit_widths = 0;                // BasisCurves
+  size_t moving_prims = 0;                // whose transform has time samples
   size_t rests = 0, rests_elsewhere = 0;  // BasisCurves with a rest shape
   std::string basis;
   std::optional<double> time_code;
@@ -58,7 +60,8 @@ Result<CurveKind> kind_of(const UsdCurves& curves) {
   return kind;
 }
 
-Status check_counts(const UsdCurves& curves) {
+/// Checks counts, and makes points as many as they need.
+Status check_counts(UsdCurves& curves, std::vector<std::string>& notes) {
   uint64_t total = 0;
   for (size_t curve = 0; curve < curves.vertex_counts.size(); ++curve) {
     const uint32_t count = curves.vertex_counts[curve];
@@ -67,10 +70,7 @@ Status check_counts(const UsdCurves& curves) {
                         count, kMaxSourceVertexCount);
     total += count;
   }
-  if (total != curves.points.size())
-    return make_error(ErrorCode::BadInput, "curveVertexCounts need {} points, there are {}", total,
-                      curves.points.size());
-  return {};
+  return fit_points(curves.points, total, "curveVertexCounts", notes);
 }
 
 constexpr double kMostLabel = std::numeric_limits<int32_t>::max();  // of an id or a group
@@ -168,9 +168,9 @@ HairMaterial material_of(const UsdStage& stage, std::vector<std::string>& notes)
   return material;
 }
 
-Status add_curves(const UsdStage& stage, size_t prim, Groom& groom, StrandLabels& labels, Tally& tally) {
-  const UsdCurves& curves = *stage.prim[prim].curves;
-  RETURN_IF_ERROR(check_counts(curves));
+Status add_curves(UsdStage& stage, size_t prim, Groom& groom, StrandLabels& labels, Tally& tally) {
+  UsdCurves& curves = *stage.prim[prim].curves;
+  RETURN_IF_ERROR(check_counts(curves, stage.notes));
   if (groom.strand_count() + curves.vertex_counts.size() > kMaxStrandCount ||
       groom.rest_position_m.size() + curves.points.size() > kMaxGroomVertices)
     return make_error(ErrorCode::LimitExceeded, "more than {} strands or {} vertices", kMaxStrandCount,
@@ -199,9 +199,10 @@ Status add_curves(const UsdStage& stage, size_t prim, Groom& groom, StrandLabels
     groom.offset.push_back(static_cast<uint32_t>(groom.rest_position_m.size()));
   }
   const size_t strands = curves.vertex_counts.size();
-  join_labels(
-      labels, groom.strand_count() - strands,
-      labels_of(curves, std::cbrt(std::abs(glm::determinant(glm::dmat3(world)))), stage.prim[prim].name));
+  const StrandLabels own =
+      labels_of(curves, std::cbrt(std::abs(glm::determinant(glm::dmat3(world)))), stage.prim[prim].name);
+  if (own.width.empty() && !curves.widths.empty()) ++tally.unfit_widths;
+  join_labels(labels, groom.strand_count() - strands, own);
   std::vector<glm::vec2> uv;
   const auto is_finite_number = [](auto value) { return std::isfinite(value); };
   const bool has_uv = curves.root_uv.size() == 2 * strands &&
@@ -212,12 +213,13 @@ Status add_curves(const UsdStage& stage, size_t prim, Groom& groom, StrandLabels
   const auto is_guide = [&](size_t strand) {
     const std::vector<double>& told = curves.guides;
     const bool fits = told.size() == strands || told.size() == 1;
-    return curves.purpose == "guide" || (fits && told[told.size() == 1 ? 0 : strand] > 0.0);
+    return purpose_of(stage, prim) == "guide" || (fits && told[told.size() == 1 ? 0 : strand] > 0.0);
   };
   for (size_t strand = 0; strand < strands; ++strand) tally.is_guide.push_back(is_guide(strand) ? 1 : 0);
   ++tally.curves_prims;
   if (curves.time_code) tally.time_code = curves.time_code;
-  for (const float width : curves.widths) {
+  if (is_moving(stage, prim)) ++tally.moving_prims;
+  for (const float width : own.width.empty() ? std::vector<float>() : curves.widths) {
     tally.least_width = tally.most_width == 0.0f ? width : std::min(tally.least_width, width);
     tally.most_width = std::max(tally.most_width, width);
   }
@@ -238,6 +240,12 @@ std::vector<std::string> notes_of(const UsdStage& stage, const Tally& tally) {
   if (tally.time_code)
     notes.push_back(
         fmt::format("strands as at time code {}, the first of their time samples", *tally.time_code));
+  if (tally.moving_prims > 0)
+    notes.push_back(
+        fmt::format("{} BasisCurves stand as their first transform has them: its motion is not taken over",
+                    tally.moving_prims));
+  if (tally.unfit_widths > 0)
+    notes.push_back(fmt::format("widths of {} BasisCurves are negative or fit nothing", tally.unfit_widths));
   if (tally.cubic_strands > 0)
     notes.push_back(
         fmt::format("{} cubic curves ({}) became as many points on each curve as it has control "
@@ -252,8 +260,9 @@ std::vector<std::string> notes_of(const UsdStage& stage, const Tally& tally) {
   if (tally.rests_elsewhere > 0)
     notes.emplace_back("rest shapes whose roots lie elsewhere are not read: points are the hair");
   if (tally.left_out_prims > 0)
-    notes.push_back(fmt::format("{} BasisCurves are left out: inactive, invisible, a class or an override",
-                                tally.left_out_prims));
+    notes.push_back(
+        fmt::format("{} BasisCurves are left out: inactive, invisible, a proxy, a class or an override",
+                    tally.left_out_prims));
   if (stage.reference_count > 0)
     notes.push_back(fmt::format("{} references, layers or variants are not followed", stage.reference_count));
   if (stage.other_curve_count > 0)
@@ -343,7 +352,7 @@ void part_guides(StatedGroom& stated, Tally& tally, GuideUse use) {
 }
 
 Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source, GuideUse guides) {
-  ASSIGN_OR_RETURN(const UsdStage stage, read_stage(source));
+  ASSIGN_OR_RETURN(UsdStage stage, read_stage(source));
   StatedGroom stated;
   stated.groom.offset.push_back(0);
   Tally tally;

@@ -25,11 +25,10 @@ void set_meters_per_unit(UsdStage& stage, double value) {
 }
 
 std::string* find_curves_word(UsdCurves& curves, std::string_view property) {
-  return property == "type"      ? &curves.type
-         : property == "basis"   ? &curves.basis
-         : property == "wrap"    ? &curves.wrap
-         : property == "purpose" ? &curves.purpose
-                                 : nullptr;
+  return property == "type"    ? &curves.type
+         : property == "basis" ? &curves.basis
+         : property == "wrap"  ? &curves.wrap
+                               : nullptr;
 }
 
 std::vector<double>* find_curves_numbers(UsdCurves& curves, std::string_view property) {
@@ -55,6 +54,7 @@ std::optional<double>* find_material_number(UsdPrim& prim, std::string_view prop
 }
 
 Status set_xform_op(UsdPrim& prim, std::string_view name, std::vector<double> value, bool is_sample) {
+  prim.is_moving = prim.is_moving || is_sample;
   const auto known =
       std::find_if(prim.op.begin(), prim.op.end(), [&](const UsdXformOp& op) { return op.name == name; });
   if (known != prim.op.end()) {
@@ -74,6 +74,18 @@ bool is_other_curves(std::string_view type) {
 bool is_left_out(const UsdStage& stage, size_t prim) {
   for (std::optional<size_t> i = prim; i; i = stage.prim[*i].parent)
     if (stage.prim[*i].is_left_out) return true;
+  return purpose_of(stage, prim) == "proxy";
+}
+
+std::string_view purpose_of(const UsdStage& stage, size_t prim) {
+  for (std::optional<size_t> i = prim; i; i = stage.prim[*i].parent)
+    if (!stage.prim[*i].purpose.empty()) return stage.prim[*i].purpose;
+  return "default";
+}
+
+bool is_moving(const UsdStage& stage, size_t prim) {
+  for (std::optional<size_t> i = prim; i; i = stage.prim[*i].parent)
+    if (stage.prim[*i].is_moving) return true;
   return false;
 }
 

@@ -38,7 +38,6 @@ struct UsdCurves {
   std::string type = "cubic";              // USD's own defaults
   std::string basis = "bezier";
   std::string wrap = "nonperiodic";
-  std::string purpose = "default";
   std::optional<double> time_code;  // of the points; empty: they have none
 };
 
@@ -51,8 +50,10 @@ struct UsdPrim {
   std::optional<size_t> parent;
   std::string name;
   bool is_left_out = false;  // a class, an override, not active or not visible
+  std::string purpose;       // empty: that of its parent
   std::vector<UsdXformOp> op;
   std::vector<std::string> op_order;
+  bool is_moving = false;  // an op has time samples
   bool is_material = false;
   HairMaterial matter;                 // of a material
   std::optional<double> bend_modulus;  // likewise, in place of Young's modulus
@@ -88,8 +89,13 @@ Status set_xform_op(UsdPrim& prim, std::string_view name, std::vector<double> va
 /// Whether a prim of this type is curves of another kind.
 bool is_other_curves(std::string_view type);
 
-/// Returns whether this prim or one of its ancestors is left out.
+/// Returns whether this prim or one of its ancestors is left out, or whether it stands for another as a
+/// proxy.
 bool is_left_out(const UsdStage& stage, size_t prim);
+/// Returns what a prim is for: by itself, else by the nearest prim around it that says it; else "default".
+std::string_view purpose_of(const UsdStage& stage, size_t prim);
+/// Returns whether the transform of this prim or of one around it has time samples.
+bool is_moving(const UsdStage& stage, size_t prim);
 
 /// Returns the transform from a prim's points to the file's space. BadInput for an unknown transform op.
 Result<glm::dmat4> world_from_prim(const UsdStage& stage, size_t prim);

@@ -82,12 +82,13 @@ Result<std::string_view> UsdaScan::string() {
     if (text_[i] == '\\') {
       ++i;
     } else if (!is_long && text_[i] == '\n') {
-      break;
+      return error(ErrorCode::BadInput, "a string without an end");
     } else if (text_[i] == quote && (!is_long || text_.substr(i, 3) == three)) {
       at_ = i + (is_long ? 3 : 1);
       return text_.substr(begin, i - begin);
     }
   }
+  at_ = text_.size();
   return error(ErrorCode::BadInput, "a string without an end");
 }
 
@@ -160,11 +161,14 @@ Result<std::vector<T>> UsdaScan::array(size_t limit, const ReadItem& read_item) 
   std::vector<T> items;
   if (take_none()) return items;
   RETURN_IF_ERROR(expect('['));
+  // Where the file is cut off, what came before counts: who reads on meets its end.
   while (!take(']')) {
     if (items.size() == limit)
       return error(ErrorCode::LimitExceeded, "an array of more than {} values", limit);
-    ASSIGN_OR_RETURN(const T item, read_item());
-    items.push_back(item);
+    const auto item = read_item();
+    if (is_at_end()) return items;
+    if (!item) return item.error();
+    items.push_back(*item);
     if (take(',')) continue;
     RETURN_IF_ERROR(expect(']'));
     break;
@@ -211,7 +215,10 @@ Status UsdaScan::skip_quoted_path(char quote) {
   const bool is_long = quote == '@' && text_.substr(at_, 3) == "@@@";
   const std::string_view end = quote == '<' ? ">" : is_long ? "@@@" : "@";
   const size_t found_at = text_.find(end, at_ + end.size());
-  if (found_at == std::string_view::npos) return error(ErrorCode::BadInput, "a path without an end");
+  if (found_at == std::string_view::npos) {
+    at_ = text_.size();
+    return error(ErrorCode::BadInput, "a path without an end");
+  }
   at_ = found_at + end.size();
   return {};
 }

@@ -16,7 +16,21 @@ class StageReader {
  public:
   explicit StageReader(std::string_view text) : scan_(text) {}
 
+  /// Of a file that is cut off, what stands before that.
   Result<UsdStage> read() {
+    const Status read = read_layer();
+    if (read) return std::move(stage_);
+    const bool has_strands = std::any_of(stage_.prim.begin(), stage_.prim.end(), [](const UsdPrim& prim) {
+      return prim.curves && !prim.curves->points.empty();
+    });
+    if (!scan_.is_at_end() || !has_strands) return read.error();
+    stage_.notes.push_back(
+        fmt::format("it is cut off, and what stands before counts; {}", read.error().to_string()));
+    return std::move(stage_);
+  }
+
+ private:
+  Status read_layer() {
     if (scan_.take('(')) RETURN_IF_ERROR(read_layer_metadata());
     while (!scan_.is_at_end()) {
       const std::string_view word = scan_.word();
@@ -26,10 +40,9 @@ class StageReader {
       }
       RETURN_IF_ERROR(read_prim(word, std::nullopt, 0));
     }
-    return std::move(stage_);
+    return {};
   }
 
- private:
   static bool begins_prim(std::string_view word) {
     return word == "def" || word == "over" || word == "class";
   }
@@ -174,6 +187,11 @@ class StageReader {
     if (name == "visibility") {
       ASSIGN_OR_RETURN(const std::string_view value, scan_.string());
       if (value == "invisible") prim.is_left_out = true;
+      return {};
+    }
+    if (name == "purpose") {
+      ASSIGN_OR_RETURN(const std::string_view value, scan_.string());
+      prim.purpose = one_line(value, kMaxUsdWordChars);
       return {};
     }
     if (name == "xformOpOrder") {

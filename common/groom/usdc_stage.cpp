@@ -147,7 +147,7 @@ class CrateReader {
   }
 
   static bool is_wanted(std::string_view name, UsdPrim& prim) {
-    if (name == "visibility" || name.starts_with("xformOp")) return true;
+    if (name == "visibility" || name == "purpose" || name.starts_with("xformOp")) return true;
     if (find_material_number(prim, name) != nullptr) return true;
     return prim.curves &&
            (name == "points" || name == kUsdRestPoints || name == "curveVertexCounts" || name == "widths" ||
@@ -175,6 +175,11 @@ class CrateReader {
     if (name == "visibility") {
       ASSIGN_OR_RETURN(const auto text, archive_.text(value));
       prim.is_left_out = prim.is_left_out || text == "invisible";
+      return {};
+    }
+    if (name == "purpose") {
+      ASSIGN_OR_RETURN(const auto text, archive_.text(value));
+      prim.purpose = one_line(text, kMaxUsdWordChars);
       return {};
     }
     if (name == "xformOpOrder") {

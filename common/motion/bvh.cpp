@@ -229,14 +229,15 @@ uint32_t root_of(const Skeleton& skeleton, uint32_t joint) {
   return joint;
 }
 
-/// Whose head is taken, where the file has several; empty for one performer.
-std::string other_heads(const Skeleton& skeleton, uint32_t head) {
+/// Which joint is taken as the head, and whose, where the file has several performers.
+std::string taken_head(const Skeleton& skeleton, uint32_t head) {
   std::string others;
   for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
     if (!is_head_name(skeleton.joints[i].name) || root_of(skeleton, i) == root_of(skeleton, head)) continue;
     others += fmt::format("{}{}", others.empty() ? "" : ", ", shown(label_of(skeleton, i)));
   }
-  if (others.empty()) return {};
+  if (others.empty())
+    return fmt::format("the head is {} (--joint takes another)", shown(label_of(skeleton, head)));
   return fmt::format("of several performers the one with {} is taken, others have {} (--joint takes another)",
                      shown(label_of(skeleton, head)), others);
 }
@@ -250,16 +251,31 @@ std::vector<const Joint*> path_to(const Skeleton& skeleton, uint32_t joint_index
   return path;
 }
 
-/// Whether the head is along +Z from the hips with all rotations zero. What is not clear counts as +Y up.
-bool guess_z_up(const std::vector<const Joint*>& path) {
+/// The axis of a file that is up, or down: Y or Z.
+struct Upward {
+  int axis = 1;
+  double sign = 1.0;
+  bool operator==(const Upward&) const = default;
+
+  double of(const glm::dvec3& v) const { return sign * v[axis]; }
+  /// Returns the farthest reach along the other axes.
+  double beside(const glm::dvec3& v) const { return std::max(std::abs(v.x), std::abs(v[3 - axis])); }
+  std::string name() const { return fmt::format("{}{}", sign > 0.0 ? '+' : '-', axis == 2 ? 'Z' : 'Y'); }
+};
+constexpr std::array<Upward, 4> kUpwards = {{{1, 1.0}, {2, 1.0}, {1, -1.0}, {2, -1.0}}};
+
+/// Where the head is from the hips with all rotations zero. What is not clear counts as +Y up.
+Upward guess_up(const std::vector<const Joint*>& path) {
   glm::dvec3 head(0.0);
   for (size_t i = 1; i < path.size(); ++i) head += path[i]->offset;
-  return head.z > kUpClearly * std::abs(head.y);
+  for (const Upward& up : kUpwards)
+    if (up.of(head) > kUpClearly * std::abs(head[3 - up.axis])) return up;
+  return {};
 }
 
 /// Axes of a file.
 struct FileUp {
-  bool is_z_at_rest = false, is_z_in_motion = false;
+  Upward at_rest, in_motion;
 };
 
 constexpr double kLeastLegShare = 0.1;  // of the height above the hips
@@ -301,17 +317,16 @@ BodyHeight body_height(const Skeleton& skeleton, uint32_t head, const FileUp& ax
     double height = 0.0;  // above the root with all rotations zero
     double bones = 0.0;   // length of the bones from the root
   };
-  const int up = axes.is_z_at_rest ? 2 : 1;
   const uint32_t root = root_of(skeleton, head);
   const auto grown = [&](const Reach& parent, const glm::dvec3& offset) {
-    return Reach{parent.height + offset[up], parent.bones + glm::length(offset)};
+    return Reach{parent.height + axes.at_rest.of(offset), parent.bones + glm::length(offset)};
   };
   std::vector<Reach> reach;
   double root_height = 0.0;
   for (const Joint& joint : skeleton.joints) {
     const glm::dvec3 place = place_of(joint, first_row);
     const bool is_own = root_of(skeleton, static_cast<uint32_t>(reach.size())) == root;
-    if (is_own && joint.parent == kNoJoint) root_height = place[axes.is_z_in_motion ? 2 : 1];
+    if (is_own && joint.parent == kNoJoint) root_height = axes.in_motion.of(place);
     reach.push_back(joint.parent == kNoJoint || !is_own ? Reach{} : grown(reach[joint.parent], place));
   }
   const size_t joint_count = reach.size();
@@ -537,24 +552,27 @@ bool begins_with_t_pose(const std::vector<Pose>& poses, double rest_share_first,
   return first > kTPoseStepRatio * median(std::move(steps));
 }
 
-/// Whether +Z is up in the motion, which need not be up at rest: who stands has the head above the hips, and
-/// these above the floor.
-bool moves_z_up(const Rows& rows, bool is_rest_z_up) {
-  const int rest = is_rest_z_up ? 2 : 1, other = is_rest_z_up ? 1 : 2;
-  const bool is_other = rows.lift[other] > kUpClearly * std::abs(rows.lift[rest]) &&
-                        rows.lift[other] > kUpClearly * std::abs(rows.lift.x) &&
-                        rows.root[other] > 0.5 * rows.lift[other];
-  return is_other != is_rest_z_up;
+/// What is up in the motion, which need not be up at rest: who stands has the head above the hips, and these
+/// above the floor.
+Upward guess_up_in_motion(const Rows& rows, const Upward& at_rest) {
+  for (const Upward& up : kUpwards)
+    if (up != at_rest && up.of(rows.lift) > kUpClearly * up.beside(rows.lift) &&
+        up.of(rows.root) > 0.5 * up.of(rows.lift))
+      return up;
+  return at_rest;
 }
 
-glm::dquat upright_from(bool is_z_up) {
-  return is_z_up ? glm::angleAxis(glm::radians(-90.0), kAxis[0]) : glm::dquat(1, 0, 0, 0);
+/// Turns that side up, and leaves the face ahead: +Z, or -Y where Z is the axis.
+glm::dquat upright_from(const Upward& up) {
+  const glm::dquat turn =
+      up.axis == 2 ? glm::angleAxis(glm::radians(-90.0), kAxis[0]) : glm::dquat(1, 0, 0, 0);
+  return up.sign > 0.0 ? turn : glm::dquat(0, 0, 0, 1) * turn;
 }
 
 /// From the file's axes and units to world axes and metres.
 void to_world(std::vector<Pose>& poses, double unit_m, const FileUp& up, bool recentre) {
-  const glm::dquat world_from_file = upright_from(up.is_z_in_motion);
-  const glm::dquat rest_from_upright = glm::conjugate(upright_from(up.is_z_at_rest));
+  const glm::dquat world_from_file = upright_from(up.in_motion);
+  const glm::dquat rest_from_upright = glm::conjugate(upright_from(up.at_rest));
   for (Pose& pose : poses) {
     pose.position_m = world_from_file * (pose.position_m * unit_m);
     // On both sides: the file's rest pose is turned upright too, so that it becomes the identity.
@@ -566,8 +584,8 @@ void to_world(std::vector<Pose>& poses, double unit_m, const FileUp& up, bool re
 }
 
 /// Likewise: seen from the head, whose rest pose is upright.
-void to_head_space(std::vector<glm::dvec3>& places, double unit_m, bool is_z_at_rest) {
-  const glm::dquat upright = upright_from(is_z_at_rest);
+void to_head_space(std::vector<glm::dvec3>& places, double unit_m, const Upward& up) {
+  const glm::dquat upright = upright_from(up);
   for (glm::dvec3& place : places) place = upright * (place * unit_m);
 }
 
@@ -640,18 +658,18 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   if (options.skip_first_frame_if_t_pose &&
       begins_with_t_pose(clip.world_from_head, rows.rest_share[0], rows.rest_share[1]))
     leave_out_first_frames(clip, 1);
-  if (std::string others = other_heads(skeleton, *head); !others.empty())
-    clip.repairs.push_back(std::move(others));
+  clip.head_reason = taken_head(skeleton, *head);
   FileUp up;
-  up.is_z_at_rest = options.is_z_up.value_or(guess_z_up(path));
-  up.is_z_in_motion = options.is_z_up.value_or(moves_z_up(rows, up.is_z_at_rest));
-  if (up.is_z_at_rest != up.is_z_in_motion)
+  const Upward stated{options.is_z_up.value_or(false) ? 2 : 1};
+  up.at_rest = options.is_z_up ? stated : guess_up(path);
+  up.in_motion = options.is_z_up ? stated : guess_up_in_motion(rows, up.at_rest);
+  if (up.at_rest != up.in_motion)
     clip.up_reason = fmt::format(
-        "+{} is taken as up: there the head is above the hips in the motion, though +{} "
-        "is up in the rest pose",
-        up.is_z_in_motion ? 'Z' : 'Y', up.is_z_at_rest ? 'Z' : 'Y');
-  else if (up.is_z_at_rest && !options.is_z_up)
-    clip.up_reason = "+Z is taken as up: there the head is above the hips in the rest pose";
+        "{} is taken as up: there the head is above the hips in the motion, though {} is up in the rest pose",
+        up.in_motion.name(), up.at_rest.name());
+  else if (up.at_rest != Upward{} && !options.is_z_up)
+    clip.up_reason = fmt::format("{} is taken as up: there the head is above the hips in the rest pose",
+                                 up.at_rest.name());
   const BodyHeight height = body_height(skeleton, *head, up, rows.first);
   const bool is_guessed = options.unit_m == 0.0;
   if (is_guessed && !(height.units > 0.0))
@@ -662,7 +680,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   else
     clip.file_unit_m = options.unit_m;
   to_world(clip.world_from_head, clip.file_unit_m, up, options.recentre);
-  to_head_space(clip.joint_m, clip.file_unit_m, up.is_z_at_rest);
+  to_head_space(clip.joint_m, clip.file_unit_m, up.at_rest);
   return clip;
 }
 

@@ -23,6 +23,7 @@ struct MotionClip {
   std::string unit_reason;           // why this unit, when nobody stated it; else empty
   std::vector<std::string> repairs;  // what a file needed to be read, a sentence for each kind
   std::string up_reason;             // likewise why not +Y, of a file with another up axis
+  std::string head_reason;           // which joint of a file is taken as the head
 
   /// Returns the time of the last pose, s; 0 for an empty clip.
   double duration_s() const;

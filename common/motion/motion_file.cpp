@@ -39,6 +39,7 @@ Result<MotionFile> load_motion_file(const std::filesystem::path& path, const Mot
   const auto note = [&](const std::string& sentence) {
     file.notes.push_back(fmt::format("{}: {}", path.string(), sentence));
   };
+  note(file.clip.head_reason);
   for (const std::string& repair : file.clip.repairs) note(repair);
   if (!file.clip.up_reason.empty()) note(file.clip.up_reason + " (--up states another)");
   if (!file.clip.unit_reason.empty()) note(file.clip.unit_reason + " (--unit states another)");

@@ -448,19 +448,20 @@ TEST(MotionFile, SaysWhatWasAssumedAndFound) {
   ASSERT_TRUE(save_file(path, std::as_bytes(std::span(text))));
   const auto plain = load_motion_file(path, {});
   ASSERT_TRUE(plain) << plain.error().to_string();
-  ASSERT_EQ(plain->notes.size(), 2u);
-  EXPECT_THAT(plain->notes[0],
+  ASSERT_EQ(plain->notes.size(), 3u);
+  EXPECT_EQ(plain->notes[0], path.string() + ": the head is Head (--joint takes another)");
+  EXPECT_THAT(plain->notes[1],
               StartsWith(path.string() + ": one unit is taken as 0.3048 m: 2.13 times the bones from hips to "
                                          "crown (there are no legs)"));
-  EXPECT_THAT(plain->notes[0], HasSubstr("--unit"));
-  EXPECT_THAT(plain->notes[1], HasSubstr("the head makes 2 steps faster than any head moves"));
-  EXPECT_THAT(plain->notes[1], HasSubstr("--filter-glitches"));
+  EXPECT_THAT(plain->notes[1], HasSubstr("--unit"));
+  EXPECT_THAT(plain->notes[2], HasSubstr("the head makes 2 steps faster than any head moves"));
+  EXPECT_THAT(plain->notes[2], HasSubstr("--filter-glitches"));
   EXPECT_NE(plain->clip.world_from_head[2], plain->clip.world_from_head[1]);
   const auto filtered =
       load_motion_file(path, {.unit_m = 1.0, .up = "y", .joint = "", .is_filtering_glitches = true});
   ASSERT_TRUE(filtered) << filtered.error().to_string();
-  ASSERT_EQ(filtered->notes.size(), 1u) << "the unit was stated";
-  EXPECT_THAT(filtered->notes[0], HasSubstr("1 frames replaced"));
+  ASSERT_EQ(filtered->notes.size(), 2u) << "the unit was stated";
+  EXPECT_THAT(filtered->notes[1], HasSubstr("1 frames replaced"));
   EXPECT_EQ(filtered->clip.world_from_head[2], filtered->clip.world_from_head[1]);
   const auto axis =
       load_motion_file(path, {.unit_m = 1.0, .up = "x", .joint = "", .is_filtering_glitches = false});
@@ -625,8 +626,7 @@ TEST(Bvh, PerformersMayBeNamedAlike) {
       "HIERARCHY\n" + performer + performer + "MOTION\nFrames: 1\nFrame Time: .01\n0 0 0 5 0 0\n";
   const MotionClip first = parsed(text);
   EXPECT_EQ(first.world_from_head[0].position_m.x, 0.0);
-  EXPECT_THAT(first.repairs,
-              testing::ElementsAre(HasSubstr("the one with Head is taken, others have Head#2")));
+  EXPECT_THAT(first.head_reason, HasSubstr("the one with Head is taken, others have Head#2"));
   BvhOptions options = kPlain;
   options.head_joint = "Head#2";
   EXPECT_EQ(parsed(text, options).world_from_head[0].position_m.x, 5.0);
@@ -652,14 +652,12 @@ TEST(Bvh, OfSeveralPerformersOneIsTakenAndNamed) {
   const MotionClip clip = parsed(text, options);
   EXPECT_EQ(clip.file_unit_m, 0.01) << "by ann's own bones";
   EXPECT_THAT(clip.joint_name, testing::IsEmpty()) << "the neck is the other's";
-  EXPECT_THAT(clip.repairs,
-              testing::ElementsAre(
-                  AllOf(HasSubstr("ann:Head"), HasSubstr("others have giant:Head"), HasSubstr("--joint"))));
+  EXPECT_THAT(clip.head_reason,
+              AllOf(HasSubstr("ann:Head"), HasSubstr("others have giant:Head"), HasSubstr("--joint")));
   options.head_joint = "giant:Head";
   const MotionClip other = parsed(text, options);
   EXPECT_THAT(other.joint_name, testing::ElementsAre("neck"));
-  EXPECT_THAT(other.repairs,
-              testing::ElementsAre(HasSubstr("the one with giant:Head is taken, others have ann:Head")));
+  EXPECT_THAT(other.head_reason, HasSubstr("the one with giant:Head is taken, others have ann:Head"));
 }
 
 TEST(BvhRealFiles, GuessedUpAxesAreTheKnownOnes) {

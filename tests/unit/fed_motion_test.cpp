@@ -14,6 +14,7 @@
 #include "common/base/file.h"
 #include "common/motion/clip_path.h"
 #include "common/motion/motion_glitches.h"
+#include "tests/support/made_abc.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/temporary_folder.h"
 
@@ -298,6 +299,18 @@ TEST(FirstFrames, AreNoneOfAMotionThatIsItself) {
   EXPECT_EQ(find_first_frames(clip).count, 4u) << "up to the last jump";
   clip.world_from_head.resize(20);
   EXPECT_EQ(find_first_frames(clip).count, 0u) << "too short to judge";
+}
+
+TEST_F(FedMotion, CurvesMoveNothingWhereNobodyKnowsTheirHair) {
+  FeedOptions options;
+  options.motion = (folder_.path() / "moving.abc").string();
+  EXPECT_EQ(make_feed_plan(options).error().code, ErrorCode::NotFound);
+  test::MadeCurves moving;
+  moving.shift = {0.0f, 1.0f};
+  test::MadeAbc made(options.motion);
+  made.finish({made.curves(moving)});
+  EXPECT_THAT(make_feed_plan(options).error().to_string(),
+              AllOf(HasSubstr("moving.abc"), HasSubstr("only feed to a server, and bake, know it")));
 }
 
 }  // namespace

@@ -308,9 +308,9 @@ TEST(AbcSamples, DamagedOnesEndInASentenceOrASoundGroom) {
   const auto files = files_in(samples() / "malformed");
   EXPECT_EQ(files.size(), 83u);
   const std::set<std::string> good = {
-      "concatenated.abc",       "deep_1400.abc",        "frames_4e9.abc",       "instance_no_source.abc",
-      "negative_width.abc",     "no_selfBnds.abc",      "sample_count_200.abc", "sample_count_unstored.abc",
-      "string_missing_nul.abc", "trailing_garbage.abc", "width_count.abc"};
+      "concatenated.abc",          "deep_1400.abc",          "frames_4e9.abc",       "instance_no_source.abc",
+      "negative_width.abc",        "no_selfBnds.abc",        "points_left_over.abc", "sample_count_200.abc",
+      "sample_count_unstored.abc", "string_missing_nul.abc", "trailing_garbage.abc", "width_count.abc"};
   for (const std::filesystem::path& path : files) {
     const std::string name = path.filename().string();
     SCOPED_TRACE(name);

@@ -344,6 +344,7 @@ TEST_F(AbcTest, TransformsAreTakenAtTheTimeOfTheCurves) {
   const auto tree = AbcTree::read(*archive);
   ASSERT_TRUE(tree) << tree.error().to_string();
   ASSERT_EQ(tree->nodes().size(), 3u);
+  EXPECT_THAT(read_abc(bytes)->notes, Contains(HasSubstr("1 curves objects stand as their first transform")));
   for (const auto& [time_s, x] :
        {std::pair(-3.0, 0.0), {0.5, 0.0}, {0.6, 0.0}, {0.65, 1.0}, {0.75, 1.0}, {0.9, 2.0}, {100.0, 2.0}}) {
     const auto world = tree->world_from_node(*archive, 2, time_s);
@@ -354,14 +355,20 @@ TEST_F(AbcTest, TransformsAreTakenAtTheTimeOfTheCurves) {
 
 TEST_F(AbcTest, ShortStrandsAreLeftOutAndOthersOfSeveralObjectsAreOneGroom) {
   MadeCurves few;
-  few.counts = {1, 0, 2, 2};
+  few.counts = {1, 2, 2};
   AbcItem second = file_.curves({});
   second.name = "more";
   const auto groom = read_abc(file_.finish({file_.curves(few), std::move(second)}));
   ASSERT_TRUE(groom) << groom.error().to_string();
   EXPECT_EQ(groom->groom.offset, (std::vector<uint32_t>{0, 2, 4, 7, 9}));
   EXPECT_EQ(groom->groom.rest_position_m[0], few.points[1]);
-  EXPECT_THAT(groom->notes, Contains(HasSubstr("2 strands of fewer than 2 points")));
+  EXPECT_THAT(
+      groom->notes,
+      Contains(HasSubstr("1 of 5 strands cannot be used, and are left out; the first: hair: strand 0")));
+  few.counts = {1, 0, 2, 2};
+  MadeAbc other(path());
+  EXPECT_THAT(refusal(read_abc(other.finish({other.curves(few)}))),
+              HasSubstr("2 of 4 strands cannot be used"));
   EXPECT_THAT(groom->notes, Contains(HasSubstr("strands of 2 curves objects")));
 }
 

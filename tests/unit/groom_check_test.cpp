@@ -16,6 +16,7 @@
 namespace strandcast::groom_check_test {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 SceneDesc small_scene() {
@@ -115,6 +116,34 @@ TEST(GroomCheck, FailsForAUnitThatFitsTheHairAndNotTheHead) {
   }
   options.unit_m = 1.2f;
   EXPECT_EQ(load_placed_groom(options).value().unlikely, "") << "a large one";
+}
+
+// Roots that say nothing of a head: a guess is told as what is stated is.
+TEST(GroomCheck, FailsForAUnitInWhichNoHeadHasTheseRoots) {
+  const TemporaryFolder folder;
+  // Strands on a disc of this radius, whose middle stands higher by `rise`.
+  const auto judged = [&](float radius, float rise, float unit_m) {
+    std::string text =
+        "ply\nformat ascii 1.0\ncomment strand_vertex_count 2\nelement vertex 400\nproperty float x\n"
+        "property float y\nproperty float z\nend_header\n";
+    for (int strand = 0; strand < 200; ++strand) {
+      const float share = std::sqrt((static_cast<float>(strand) + 0.5f) / 200.0f),
+                  around = 2.399963f * static_cast<float>(strand);
+      for (const float up : {0.0f, 0.1f * radius})
+        text += fmt::format("{} {} {}\n", radius * share * std::sin(around), up - rise * share * share,
+                            radius * share * std::cos(around));
+    }
+    EXPECT_TRUE(save_file(folder.path() / "disc.ply", std::as_bytes(std::span(text))));
+    GroomFileOptions options;
+    options.path = folder.path() / "disc.ply";
+    options.unit_m = unit_m;
+    options.is_z_up.reset();
+    return load_placed_groom(options).value().unlikely;
+  };
+  EXPECT_THAT(judged(0.655f, 0.02f, 1.0f),
+              AllOf(HasSubstr("the roots reach over 1."), HasSubstr("as on no head")));
+  EXPECT_THAT(judged(0.655f, 0.02f, 0.0f), HasSubstr("as on no head")) << "a sphere of 10 m, taken as a head";
+  EXPECT_EQ(judged(0.09f, 0.07f, 0.0f), "") << "a cap of hair";
 }
 
 TEST(GroomCheck, FailsForASideThatIsNotUp) {

@@ -191,7 +191,7 @@ TEST(Ply, AStrandOfOnePointIsLeftOutAndDecimalCommasAreRead) {
   EXPECT_EQ(groom->groom.offset, (std::vector<uint32_t>{0, 4}));
   EXPECT_EQ(groom->groom.rest_position_m[2], glm::vec3(0.0f, 0.25f, -1.5f));
   EXPECT_THAT(groom->notes, ::testing::ElementsAre(HasSubstr("2 numbers have a decimal comma"),
-                                                   HasSubstr("1 strands of fewer than 2 points")));
+                                                   HasSubstr("1 of 2 strands cannot be used")));
 }
 
 TEST(Ply, AByteOrderMarkIsNoPartOfTheFile) {

@@ -275,7 +275,7 @@ TEST(Usda, CurvesWithoutASegmentAreLeftOutAndCounted) {
             (std::vector<glm::vec3>{{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {1, 0, -1}}));
   EXPECT_EQ(hair->labels.id, (std::vector<int32_t>{1, 3}));
   EXPECT_EQ(hair->labels.width, (std::vector<float>{0.1f, 0.2f, 0.4f, 0.5f}));
-  EXPECT_THAT(hair->notes, Contains(HasSubstr("1 strands of fewer than 2 points")));
+  EXPECT_THAT(hair->notes, Contains(HasSubstr("1 of 3 strands cannot be used")));
 }
 
 TEST(Usda, GuidesAreNoHairUnlessAllAre) {
@@ -300,6 +300,48 @@ TEST(Usda, GuidesAreNoHairUnlessAllAre) {
     EXPECT_EQ(guides.groom.strand_count(), 2u) << all;
     EXPECT_THAT(guides.notes, Contains("all strands are guides: they are taken as hair")) << all;
   }
+}
+
+// What a prim is for goes on to what is in it, unless that says another thing.
+TEST(Usda, ProxiesAreLeftOutAndGuidesKnownByWhatIsAroundThem) {
+  const auto prim = [](const std::string& purpose, const std::string& inside) {
+    return "def Xform \"Group\"\n{\nuniform token purpose = \"" + purpose + "\"\n" + inside + "}\n";
+  };
+  const auto curves = [](const std::string& more) {
+    return "def BasisCurves \"Hair\"\n{\n" + more + kLines + "}\n";
+  };
+  const std::string plain = "#usda 1.0\n" + curves("");
+  const auto read_whole = [](const std::string& text) {
+    auto hair = read_usd(text);
+    EXPECT_TRUE(hair) << hair.error().to_string();
+    return std::move(hair).value();
+  };
+  const StatedGroom proxy = read_whole(plain + prim("proxy", curves("")));
+  EXPECT_EQ(proxy.groom.strand_count(), 2u);
+  EXPECT_THAT(proxy.notes, Contains(HasSubstr("1 BasisCurves are left out: inactive, invisible, a proxy")));
+  const StatedGroom own = read_whole(plain + prim("proxy", curves("uniform token purpose = \"render\"\n")));
+  EXPECT_EQ(own.groom.strand_count(), 4u) << "says another thing";
+  const StatedGroom guides = read_whole(plain + prim("guide", curves("")));
+  EXPECT_EQ(guides.groom.strand_count(), 2u);
+  EXPECT_THAT(guides.notes, Contains(HasSubstr("2 guides are left out")));
+}
+
+TEST(Usda, MotionOfATransformAndWidthsThatFitNothingAreNamed) {
+  const auto notes_of = [](const std::string& body, const std::string& around) {
+    const auto hair = read_usd(stage(kLines + body, around));
+    EXPECT_TRUE(hair) << hair.error().to_string();
+    return hair ? hair->notes : std::vector<std::string>();
+  };
+  const std::string moving =
+      "double3 xformOp:translate.timeSamples = { 0: (1, 2, 3), 1: (4, 2, 3) }\n"
+      "uniform token[] xformOpOrder = [\"xformOp:translate\"]\n";
+  const auto says_motion = Contains(HasSubstr("1 BasisCurves stand as their first transform has them"));
+  EXPECT_THAT(notes_of("", moving), says_motion);
+  EXPECT_THAT(notes_of("", "double3 xformOp:translate = (1, 2, 3)\n"), testing::Not(says_motion));
+  const auto says_widths = Contains(HasSubstr("widths of 1 BasisCurves are negative or fit nothing"));
+  EXPECT_THAT(notes_of("float[] widths = [1, 2, 3, 4]\n", ""), says_widths);
+  EXPECT_THAT(notes_of("float[] widths = [-1]\n", ""), says_widths);
+  EXPECT_THAT(notes_of("float[] widths = [1]\n", ""), testing::Not(says_widths));
 }
 
 // A hair of 0.08 mm in a file of centimetres and grams: 3e9 Pa are 3e10 g / (cm s^2), 1300 kg/m^3 1.3 g/cm^3.
@@ -433,11 +475,13 @@ TEST(Usda, WhatIsWrongIsNamedWithItsLine) {
               HasSubstr("too many brackets"));
 }
 
-TEST(Usda, EveryTruncationIsRefused) {
+TEST(Usda, ATruncationIsRefusedThatLeavesAPointOut) {
   const std::string whole =
       stage(kLines + "float[] widths = [1]\n", "double3 xformOp:translate = (1, 2, 3)\n");
+  const size_t points_end = whole.find("]\n", whole.find("points ="));
   for (size_t size = 0; size + 2 < whole.size(); ++size)
-    ASSERT_NE(refusal(whole.substr(0, size)), "accepted") << size << " bytes of " << whole.size();
+    ASSERT_EQ(refusal(whole.substr(0, size)) == "accepted", size > points_end)
+        << size << " bytes of " << whole.size();
   EXPECT_EQ(refusal(whole), "accepted");
 }
 

@@ -280,7 +280,7 @@ TEST(Usdc, CurvesWithoutASegmentAreLeftOutAndCounted) {
   EXPECT_EQ(hair->groom.offset, (std::vector<uint32_t>{0, 2, 4}));
   EXPECT_EQ(hair->labels.id, (std::vector<int32_t>{1, 3}));
   EXPECT_EQ(hair->is_z_up, true) << "written small";
-  EXPECT_THAT(hair->notes, Contains(HasSubstr("1 strands of fewer than 2 points")));
+  EXPECT_THAT(hair->notes, Contains(HasSubstr("1 of 3 strands cannot be used")));
 }
 
 TEST(Usdc, EveryVersionAndWayToPackNumbersReadsTheSame) {

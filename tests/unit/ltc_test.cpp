@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -105,6 +106,26 @@ TEST(Ltc, EveryFrameIsReadAtAnyRateLevelAndSpeed) {
         EXPECT_NEAR(frames[i].end_s, 0.01 + (i + 1) / fps.hz() / sound.speed, 2.0 / sound.sample_rate_hz);
       }
     }
+}
+
+TEST(Ltc, TapeMayRunBackwards) {
+  for (const auto& [text, fps] :
+       {std::pair("01:02:03:04", FrameRate{25, 1}), {"00:59:59;28", {30000, 1001}}}) {
+    const Timecode first = *parse_timecode(text, fps);
+    constexpr int kFrames = 40;
+    std::vector<float> sound = sound_of(first, kFrames, {});
+    const double length_s = static_cast<double>(sound.size()) / 48'000.0;
+    std::reverse(sound.begin(), sound.end());
+    const auto frames = frames_in(sound, 48'000.0, fps);
+    ASSERT_EQ(frames.size(), kFrames) << text;
+    for (int i = 0; i < kFrames; ++i) {
+      const int frame = kFrames - 1 - i;  // that ends where it began when it was recorded
+      EXPECT_EQ(frames[i].timecode, advanced(first, frame)) << text;
+      EXPECT_NEAR(frames[i].end_s, length_s - (0.01 + frame / fps.hz()), 2.0 / 48'000.0);
+      EXPECT_EQ(frames[i].after(0.0), advanced(first, frame));
+      EXPECT_EQ(frames[i].after(3.0 / fps.hz() - 1e-6).frame, advanced(first, frame - 3).frame);
+    }
+  }
 }
 
 TEST(Ltc, NoiseAndBrokenWordsAreNoTime) {

@@ -4,6 +4,7 @@
 #include <complex>
 #include <numbers>
 
+#include "common/motion/bvh.h"
 #include "common/motion/motion_glitches.h"
 #include "common/motion/wind_csv.h"
 
@@ -370,6 +371,36 @@ TEST(WindCsv, BridgesGapsAndCountsThem) {
   EXPECT_NEAR(series.sample(0.7).x, 7.0f, 1e-5f);
   EXPECT_THAT(series.repairs,
               ElementsAre("2 gaps, the longest of 1.1 s: the wind goes evenly from one end to the other"));
+}
+
+// As cameras have it: the same clip, turned over about +Z, is the same motion.
+TEST(MotionFileAxes, MayHaveYDown) {
+  constexpr std::string_view kHead =
+      "CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\nJOINT Head\n{\n";
+  const auto clip_of = [&](const std::string& offset, const std::string& row,
+                           std::optional<bool> is_z_up = {}) {
+    BvhOptions options;
+    options.unit_m = 1.0;
+    options.recentre = false;
+    options.is_z_up = is_z_up;
+    auto clip = parse_bvh(
+        "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\n" + std::string(kHead) + "OFFSET " + offset +
+            "\nCHANNELS 0\nEnd Site\n{\nOFFSET 0 0 0\n}\n}\n}\nMOTION\nFrames: 1\nFrame Time: .01\n" + row +
+            "\n",
+        "m.bvh", options);
+    EXPECT_TRUE(clip) << clip.error().to_string();
+    return clip ? *clip : MotionClip{};
+  };
+  const MotionClip up = clip_of(".05 .7 .1", "1 .9 2 20 30 10");
+  const MotionClip down = clip_of("-.05 -.7 .1", "-1 -.9 2 20 -30 -10");
+  EXPECT_EQ(up.up_reason, "");
+  EXPECT_THAT(down.up_reason, HasSubstr("-Y is taken as up"));
+  const Pose& first = up.world_from_head[0];
+  const Pose& other = down.world_from_head[0];
+  EXPECT_LT(glm::distance(first.position_m, other.position_m), 1e-12);
+  EXPECT_LT(angle_between_rad(first.rotation, other.rotation), 1e-7);
+  EXPECT_LT(clip_of("-.05 -.7 .1", "-1 -.9 2 20 -30 -10", false).world_from_head[0].position_m.y, -1.0)
+      << "stated";
 }
 
 }  // namespace
