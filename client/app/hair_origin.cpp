@@ -10,6 +10,7 @@
 #include "common/base/profile.h"
 #include "common/client/attempts.h"
 #include "common/scene/file_groom.h"
+#include "common/strands/asset/lattice.h"
 
 namespace strandcast {
 namespace {
@@ -67,6 +68,20 @@ Status check_same(const FileGroom& hair, const SceneAsset& asset) {
   return {};
 }
 
+/// The rest points of the files, where what is simulated are these, rounded as by load_scene_content(): hair
+/// of another length or curl has none there.
+std::vector<glm::vec3> own_rest_points(const FileGroom& hair, const SceneAsset& asset) {
+  const Groom& groom = hair.placed.groom;
+  std::vector<glm::vec3> points;
+  points.reserve(asset.rest_position_m.size());
+  for (uint32_t vertex = 0; vertex < asset.vertex_count; ++vertex)
+    for (const uint32_t strand : hair.order)
+      points.push_back(groom.rest_position_m[groom.offset[strand] + vertex]);
+  std::vector<glm::vec3> rounded = points;
+  round_to_lattice(rounded, kRestStepBits);
+  return rounded == asset.rest_position_m ? points : std::vector<glm::vec3>();
+}
+
 }  // namespace
 
 Result<HairOrigin> load_origin(const FileGroomDesc& file, const SceneAsset& asset) {
@@ -85,6 +100,7 @@ Result<HairOrigin> load_origin(const FileGroomDesc& file, const SceneAsset& asse
     const auto first = labels.width.begin() + hair.placed.groom.offset[hair.order[i]];
     strands->width_m.insert(strands->width_m.end(), first, first + asset.vertex_count);
   }
+  strands->rest_position_m = own_rest_points(hair, asset);
   return origin_of(hair.placed.placement, std::move(strands));
 }
 

@@ -19,13 +19,14 @@ namespace strandcast {
 /// What the hair's own files say of it, so that an export carries it on. A list is empty where they say
 /// nothing.
 struct ExportOrigin {
-  std::vector<uint32_t> place;           // (strand_count) of each strand in the files
-  std::vector<int32_t> id, group;        // (strand_count)
-  std::vector<uint32_t> object;          // (strand_count) the curves that it belongs to, in object_name
-  std::vector<std::string> object_name;  // of them
-  std::vector<glm::vec2> root_uv;        // (strand_count)
-  std::vector<float> width_m;            // (strand_count x vertex_count) strand after strand
-  HairMaterial material;                 // in metres
+  std::vector<uint32_t> place;             // (strand_count) of each strand in the files
+  std::vector<int32_t> id, group;          // (strand_count)
+  std::vector<uint32_t> object;            // (strand_count) the curves that it belongs to, in object_name
+  std::vector<std::string> object_name;    // of them
+  std::vector<glm::vec2> root_uv;          // (strand_count)
+  std::vector<float> width_m;              // (strand_count x vertex_count) strand after strand
+  std::vector<glm::vec3> rest_position_m;  // as SceneAsset::rest_position_m, not rounded
+  HairMaterial material;                   // in metres
 };
 
 /// Data that is the same for all states.

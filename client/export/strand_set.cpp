@@ -77,6 +77,11 @@ StrandSet::StrandSet(const ExportScene& scene, const ExportOptions& options, con
   }
 }
 
+const std::vector<glm::vec3>& StrandSet::rest_position_m(const ExportScene& scene) {
+  const bool is_known = scene.origin && !scene.origin->rest_position_m.empty();
+  return is_known ? scene.origin->rest_position_m : scene.asset->rest_position_m;
+}
+
 /// Simulated strands in the order of their files; drawn ones go with the simulated strand whose root is
 /// nearest.
 std::vector<StrandSet::Member> StrandSet::members_of_all(std::span<const glm::vec3> rest_m) const {

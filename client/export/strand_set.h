@@ -34,8 +34,9 @@ class StrandSet {
 
   /// Returns the points of a frame in the file's units and axes, strand after strand, root first.
   std::vector<glm::dvec3> points(const PosedStrands& strands) const;
-  /// Returns the rest shape as points() does, placed in the world on the head of the first frame.
-  std::vector<glm::dvec3> rest_points() const { return points({first_pose_, scene_.asset->rest_position_m}); }
+  /// Returns the rest shape as points() does, placed in the world on the head of the first frame: the file's
+  /// own where it is known, else as simulated.
+  std::vector<glm::dvec3> rest_points() const { return points({first_pose_, rest_position_m(scene_)}); }
   /// Returns the diameters of all points, in file units.
   const std::vector<float>& widths() const { return width_; }
   /// Returns the coordinates of each root: the file's own, else longitude and latitude about the centre of
@@ -75,6 +76,7 @@ class StrandSet {
     bool is_key = true;
   };
 
+  static const std::vector<glm::vec3>& rest_position_m(const ExportScene& scene);
   std::vector<Member> members_of_all(std::span<const glm::vec3> rest_m) const;
   std::vector<glm::vec3> in_head(const std::vector<glm::vec3>& position_m) const;
   glm::dvec3 in_file(const glm::vec3& point_in_head, const Pose& world_from_head) const;

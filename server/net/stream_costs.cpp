@@ -6,8 +6,8 @@
 namespace strandcast {
 namespace {
 
-/// Weight of the newest frame in what a strand class costs: a change shows within half a second.
-constexpr double kStrandSmoothing = 0.05;
+/// The newest frame weighs a twentieth in what a strand class costs: a change shows within half a second.
+constexpr uint32_t kAlikeFrames = 20;
 /// What a class cost longer ago than this is estimated from another one instead.
 constexpr int64_t kStrandAgeNs = 5'000'000'000;
 
@@ -30,7 +30,9 @@ void StrandCosts::note_frame(const FrameHeader& header, size_t bytes, int64_t ti
   if (header.opcode != Opcode::StrandDelta || !is_known) return;
   Load& load = loads_[stream.codec][stream.strand_class];
   const auto measured = static_cast<double>(bytes);
-  const double weight = load.time_ns == 0 ? 1.0 : kStrandSmoothing;
+  // At first all count alike: the first one of a chain has no past to be foretold from.
+  load.frame_count += load.frame_count < kAlikeFrames ? 1 : 0;
+  const double weight = 1.0 / load.frame_count;
   load.delta_bytes += weight * (measured - load.delta_bytes);
   load.time_ns = time_ns;
 }

@@ -31,6 +31,7 @@ class StrandCosts {
  private:
   struct Load {
     double delta_bytes = 0.0;  // smoothed
+    uint32_t frame_count = 0;
     int64_t time_ns = 0;       // of the newest delta; 0 = none yet
   };
   std::vector<StrandClass> classes_;

@@ -41,6 +41,16 @@ TEST(StrandCosts, UnmeasuredClassesFollowFromTheOneThatWas) {
         << i;
 }
 
+TEST(StrandCosts, TheFirstFrameOfAChainCountsLikeOthers) {
+  StrandCosts costs = costs_of_built_in();
+  const double rate_hz = costs.classes()[0].frame_rate_hz;
+  costs.note_frame(frame_of(0), 20'000, kSInNs);
+  for (int i = 1; i < 10; ++i) costs.note_frame(frame_of(0), 5'000, kSInNs + i * kStepNs);
+  EXPECT_NEAR(costs.bytes_per_s(0)[0], 6'500 * rate_hz, 1e-6 * rate_hz);
+  for (int i = 10; i < 110; ++i) costs.note_frame(frame_of(0), 10'000, kSInNs + i * kStepNs);
+  EXPECT_NEAR(costs.bytes_per_s(0)[0], 10'000 * rate_hz, 0.01 * 10'000 * rate_hz) << "and what changes shows";
+}
+
 // Laws of the estimate, for every codec and any frame.
 TEST(StrandBytes, EstimatesAgreeWithEachOther) {
   const std::vector<StrandClass> classes = make_strand_classes({60.0, 0.0, 1e-4f, 2'000});
