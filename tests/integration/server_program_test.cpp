@@ -286,6 +286,28 @@ TEST_F(ServerProgram, AReloadIsNoEnd) {
   EXPECT_EQ(wait(process_), 0) << err();
 }
 
+// Tokens that nobody saw are not made for a file that is gone: those of before go on.
+TEST_F(ServerProgram, AReloadWithoutItsTokenFileChangesNothing) {
+  const std::filesystem::path tokens = folder_.path() / "tokens";
+  std::ofstream(tokens) << "viewer 0123456789abcdef\n";
+  std::filesystem::permissions(tokens, std::filesystem::perms::owner_read);
+  const uint16_t port = serve({"--token-file", tokens.string(), "--sim-device", "lanes"});
+  ASSERT_NE(port, 0) << err();
+  std::filesystem::remove(tokens);
+  ASSERT_EQ(kill(process_, SIGHUP), 0);
+  EXPECT_TRUE(eventually([&] { return err().find("the old tokens stay") != std::string::npos; })) << err();
+  EXPECT_FALSE(std::filesystem::exists(tokens));
+  EXPECT_THAT(out(), Not(HasSubstr("New tokens")));
+  test::RawClient client(port);
+  ASSERT_TRUE(client.handshake());
+  Hello hello;
+  hello.token = "0123456789abcdef";
+  client.send(hello);
+  EXPECT_TRUE(client.read_control<Welcome>());
+  ASSERT_EQ(kill(process_, SIGTERM), 0);
+  EXPECT_EQ(wait(process_), 0) << err();
+}
+
 /// So many sessions, one after the other; each leaves two lines in the log.
 void join_and_leave(uint16_t port, int count) {
   for (int i = 0; i < count; ++i) {
