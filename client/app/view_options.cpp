@@ -217,6 +217,8 @@ Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
   if (!options.is_headless && !(options.screenshot.empty() && options.clip.empty()))
     return make_error(ErrorCode::BadInput,
                       "--screenshot and --clip need --headless (in the window, S takes a picture)");
+  for (const auto* file : {&options.screenshot, &options.clip, &options.report, &options.trace})
+    RETURN_IF_ERROR(check_folder_of(*file));
   const auto is_named = [](const std::filesystem::path& file, const char* ending) {
     return file.empty() || file.extension() == ending;
   };
@@ -224,8 +226,6 @@ Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
     return make_error(ErrorCode::BadInput, "--screenshot {}: it writes a .png", options.screenshot.string());
   if (!is_named(options.clip, ".webp"))
     return make_error(ErrorCode::BadInput, "--clip {}: it writes a .webp", options.clip.string());
-  for (const auto* file : {&options.screenshot, &options.clip, &options.report, &options.trace})
-    RETURN_IF_ERROR(check_folder_of(*file));
   return options;
 }
 

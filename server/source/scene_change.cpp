@@ -168,7 +168,8 @@ Result<SceneDesc> change_scene(const SceneDesc& scene, const std::string& assign
   });
   if (!is_live) {
     // A field that no scene has is said to be unknown.
-    if (const auto known = with_overrides(scene, {assignment}); !known && !path.empty())
+    if (const auto known = with_overrides(scene, {assignment});
+        !known && assignment.find('=') != std::string::npos)
       return without_option(known.error());
     return make_error(ErrorCode::BadInput, "'{}' cannot change while running (known: {})", path,
                       fmt::join(fields, ", "));

@@ -155,7 +155,7 @@ TEST_F(Lockstep, AnyPausedServerCountsSteps) {
   ASSERT_NE(client, nullptr);
   const Notice refused = ask(*client, steps(5));
   EXPECT_TRUE(refused.is_error);
-  EXPECT_THAT(refused.text, HasSubstr("Pause first"));
+  EXPECT_THAT(refused.text, HasSubstr("strandcast-ctl pause"));
   ASSERT_FALSE(ask(*client, ControlCommand{Command::Pause}).is_error);
   const uint64_t before = server_->counters().sim.tick;
   const Notice done = ask(*client, steps(5));

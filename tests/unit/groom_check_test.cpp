@@ -89,7 +89,7 @@ TEST(GroomCheck, FailsForAUnitInWhichNoHeadHasThisHair) {
   ASSERT_TRUE(save_file(folder.path() / "hair.ply", std::as_bytes(std::span(text))));
   SceneDesc scene = scene_of_file(folder.path() / "hair.ply");
   EXPECT_EQ(load_scene_content(scene).value().unlikely, "");
-  const char* const part = "m long then, as on no head: groom.file.unit_m=1";
+  const char* const part = "m long, as on no head: groom.file.unit_m=1";
   for (const float unit_m : {100.0f, 0.01f}) {
     std::get<FileGroomDesc>(scene.groom).unit_m = unit_m;
     EXPECT_THAT(load_scene_content(scene).value().unlikely, HasSubstr(part)) << unit_m;
