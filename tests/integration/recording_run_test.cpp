@@ -129,7 +129,9 @@ TEST_F(RecordedRun, IsSimulatedAgainBitForBit) {
 /// Strands go on from those of viewers where a keyframe tells them: frames are exact, and the run can be
 /// simulated again for all that.
 TEST_F(RecordedRun, GoesOnFromWhatKeyframesTell) {
-  constexpr int64_t kSecondNs = 1'000'000'000;
+  // Without the early keyframe the first one to share comes after two seconds and more.
+  constexpr uint64_t kAloneSteps = 110;
+  constexpr int64_t kAloneNs = 1'800'000'000;
   for (const std::string quality : {"fast", "full"}) {
     ServerConfig recorded = config();
     recorded.scene = test::bald_scene(40, 8);
@@ -145,7 +147,7 @@ TEST_F(RecordedRun, GoesOnFromWhatKeyframesTell) {
       ASSERT_NE(viewer, nullptr);
       EXPECT_TRUE(pump_until({viewer.get()}, [&] { return viewer->replay().stats().keyframes > 0; }));
     };
-    run_steps(60);
+    run_steps(kAloneSteps);
     for (int i = 0; i < 3; ++i) {
       join();
       run_steps(15);
@@ -163,13 +165,13 @@ TEST_F(RecordedRun, GoesOnFromWhatKeyframesTell) {
     for (auto item = (*reader)->next(); item && *item; item = (*reader)->next()) {
       if (const auto* frame = std::get_if<RecordedFrame>(&(*item)->what)) {
         exact_frames += is_exact(*frame->frame) ? 1 : 0;
-        exact_alone += is_exact(*frame->frame) && frame->frame->header.sim_time_ns < kSecondNs ? 1 : 0;
+        exact_alone += is_exact(*frame->frame) && frame->frame->header.sim_time_ns < kAloneNs ? 1 : 0;
       } else
         hand_overs += std::holds_alternative<RecordedHandOver>(std::get<RecordedMessage>((*item)->what));
     }
     EXPECT_GE(hand_overs, 3) << quality;
     EXPECT_GE(exact_frames, 20) << quality;
-    EXPECT_GE(exact_alone, 5) << quality << ": in its first second, before somebody joins";
+    EXPECT_GE(exact_alone, 1) << quality << ": before somebody joins";
     const ReplayResult result = replay(recorded.record->path);
     EXPECT_TRUE(result.is_equal()) << quality << ": " << to_sentence(result);
 
