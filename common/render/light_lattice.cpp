@@ -86,12 +86,8 @@ LatticeFrame turned_frame(const LightLatticeDesc& desc, const LightDirections& l
 constexpr float kNoSolid = -4.0f;
 
 // Share of a cell that is head, from how far below the skin it lies.
-float near_share(float below) {
-  return std::clamp(0.5f + (0.5f / kSolidRamp) * (below - kSolidInset), 0.0f, 1.0f);
-}
-// The same for what lies far behind it.
-float far_share(float below) {
-  return std::clamp(0.5f + (0.5f / kSolidFarRamp) * (below - kSolidFarInset), 0.0f, 1.0f);
+float solid_share(float below, float inset, float ramp) {
+  return std::clamp(0.5f + (0.5f / ramp) * (below - inset), 0.0f, 1.0f);
 }
 
 // The lattice is as large as the hair and stands on whole cells, so that a shadow does not shimmer when the
@@ -312,9 +308,11 @@ void LightLattice::sweep_key(WorkerPool& workers) {
         for (int x = 0; x < size.x; ++x) here[x] = static_cast<float>(sum[x]) * kLightSumUnit;
         if (has_solid()) {
           std::vector<float>& here_below = below[static_cast<size_t>(z) % far];
-          for (int x = 0; x < size.x; ++x) most_solid[x] = std::max(most_solid[x], far_share(here_below[x]));
+          for (int x = 0; x < size.x; ++x)
+            most_solid[x] =
+                std::max(most_solid[x], solid_share(here_below[x], kSolidFarInset, kSolidFarRamp));
           find_solid(static_cast<int>(y), z, here_below);
-          for (int x = 0; x < size.x; ++x) solid[x] = near_share(here_below[x]);
+          for (int x = 0; x < size.x; ++x) solid[x] = solid_share(here_below[x], kSolidInset, kSolidRamp);
         }
         uint16_t* const key = key_.data() + row;
         constexpr float kStored = 1.0f / kLightDepthUnit;

@@ -32,7 +32,7 @@ class StrandCosts {
   struct Load {
     double delta_bytes = 0.0;  // smoothed
     uint32_t frame_count = 0;
-    int64_t time_ns = 0;       // of the newest delta; 0 = none yet
+    int64_t time_ns = 0;  // of the newest delta; 0 = none yet
   };
   std::vector<StrandClass> classes_;
   std::vector<StrandByteModel> codecs_;

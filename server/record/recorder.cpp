@@ -229,6 +229,10 @@ void Recorder::write_frame(int64_t time_ns, const EncodedFramePtr& frame) {
     early_frame_ = Item{time_ns, frame};
     return;
   }
+  if (early_frame_) {  // that it builds on, and whose state is not known yet
+    early_frame_.reset();
+    hub_->request_keyframe(stream_id_);
+  }
   const auto* held = held_frame_ ? &std::get<EncodedFramePtr>(held_frame_->what) : nullptr;
   if (is_keyframe && held != nullptr && (*held)->header.sequence == header.sequence) held_frame_.reset();
   write_held_frame();
