@@ -83,7 +83,7 @@ void SimLoop::wake() {
 /// watches.
 bool SimLoop::shares() const {
   return config_.shared != nullptr && config_.script == nullptr && !config_.is_lockstep &&
-         !config_.on_publish && !solver_features_.is_carried && executor_->info().device == SimDevice::Lanes;
+         !solver_features_.is_carried && executor_->info().device == SimDevice::Lanes;
 }
 
 /// Before a step: takes over the viewers' strands if the encoder has handed them over.
