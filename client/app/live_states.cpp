@@ -21,7 +21,9 @@ double seconds_since(int64_t then_ns) {
 
 Result<std::unique_ptr<LiveStates>> LiveStates::open(const ClientConfig& config,
                                                      const std::atomic<bool>& stop) {
-  ASSIGN_OR_RETURN(auto live, LiveConnection::open(config));
+  ClientConfig whole = config;
+  whole.keeps_all_strands = true;  // a file has rather fewer states than filled strands
+  ASSIGN_OR_RETURN(auto live, LiveConnection::open(whole));
   std::unique_ptr<LiveStates> states(new LiveStates(std::move(live), stop));
   const int64_t begin_ns = now_ns();
   std::optional<int64_t> first_ns;

@@ -108,9 +108,22 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
   Admission admission;
   admission.welcome = make_welcome(*place, codec);
   if (visitor.subscription.gets(StreamMode::Strands)) admission.asset = asset();
+  if (!is_relay && hello.codec_wish.empty()) admission.preview = preview(codec);
   if (const auto pictures = viewers_.pictures(visitor.session))
     tell_quality(visitor.session, *pictures, "to begin with");
   return admission;
+}
+
+/// The fewest strands by the codec that the predicting one falls back to.
+std::optional<Admission::Preview> SessionDesk::preview(const ViewerCodec& codec) const {
+  const size_t fallback = codec.codec + 1;
+  if (!parts_.codecs[codec.codec].predicts || fallback >= parts_.codecs.size()) return std::nullopt;
+  const std::vector<StrandClass> classes = parts_.hub.strand_classes();
+  const auto fewest = std::min_element(classes.begin(), classes.end(), [](const auto& a, const auto& b) {
+    return a.strand_share < b.strand_share;
+  });
+  return Admission::Preview{{fallback, static_cast<size_t>(fewest - classes.begin())},
+                            parts_.codecs[fallback].name};
 }
 
 Welcome SessionDesk::make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const {

@@ -70,6 +70,8 @@ class FlowControl {
   /// Returns LinkEstimate::base_ns().
   int64_t base_ns() const { return link_.base_ns(); }
   double capacity_bytes_per_s(int64_t time_ns) const { return link_.capacity_bytes_per_s(time_ns); }
+  /// Returns LinkEstimate::transfer_ns().
+  int64_t transfer_ns(size_t bytes, int64_t time_ns) const { return link_.transfer_ns(bytes, time_ns); }
   size_t in_flight_bytes() const { return gate_.in_flight_bytes(); }
   /// Returns SendGate::oldest_due_ns().
   int64_t oldest_due_ns(int64_t time_ns) const { return gate_.oldest_due_ns(time_ns); }

@@ -35,6 +35,12 @@ struct Visitor {
 struct Admission {
   Welcome welcome;
   EncodedFramePtr asset;
+  /// A few strands by a codec of small keyframes, for the first picture over a thin link.
+  struct Preview {
+    StrandStream stream;
+    std::string codec;
+  };
+  std::optional<Preview> preview = {};
 };
 
 /// Measurements of one session's link, for choosing between strands and pictures; 0 = unknown.

@@ -243,9 +243,10 @@ void Session::on_written(const beast::error_code& error, size_t byte_count) {
   if (!unwritten_.empty()) return write_chunk();
   is_writing_ = false;
   if (media_ != nullptr) {
-    media_ = nullptr;
+    const bool is_keyframe = std::exchange(media_, nullptr)->header.opcode == Opcode::StrandKeyframe;
     queue_.written();
     context_.count(&NetCounters::frames_sent);
+    if (is_keyframe && after_preview_) end_preview();
   }
   ask_for_keyframe(now_ns());
   if (is_reading_held_) read_on();

@@ -9,9 +9,19 @@
 #include "server/net/session_private.h"
 
 namespace strandcast::net {
+namespace {
+
+/// A link that carried the asset for so long carries the keyframe of all strands about as long.
+constexpr int64_t kThinAssetNs = 500 * kMsInNs;
+constexpr int64_t kPreviewPatienceNs = 1'000 * kMsInNs;
+
+}  // namespace
+
 void Session::begin_media(const Hello& hello, const EncodedFramePtr& asset) {
-  queue_.set_asset(head().assets.fit(asset, hello.asset_layout));
+  const EncodedFramePtr fitting = head().assets.fit(asset, hello.asset_layout);
+  queue_.set_asset(fitting);
   has_asset_ = asset != nullptr;
+  asset_bytes_ = has_asset_ ? fitting->message.size() : 0;
   if (is_relay()) queue_.take_all();
   if (subscription_.mode() == StreamMode::Strands) queue_.start_strands();
   if (subscription_.mode() == StreamMode::Frames) {
@@ -125,7 +135,9 @@ void Session::ask_for_keyframe(int64_t time_ns) {
   if (!(needs_picture || queue_.needs_keyframe())) return;
   if (!is_changing && !flow_.may_start(time_ns)) return;
   const int64_t interval_ns = context_.config.limits.keyframe_interval_ms * kMsInNs;
+  if (after_preview_ && time_ns - keyframe_asked_ns_ > kPreviewPatienceNs) return end_preview();
   if (keyframe_asked_ns_ != 0 && time_ns - keyframe_asked_ns_ < interval_ns) return;
+  if (!needs_picture) begin_strands(time_ns);
   keyframe_asked_ns_ = time_ns;
   context_.count(&NetCounters::keyframe_requests);
   if (needs_picture)
@@ -172,7 +184,7 @@ void Session::adapt_pictures(int64_t time_ns) {
 
 /// Moves to another strand class when the link says so. A relay has asked for the one that it needs.
 void Session::adapt(int64_t time_ns) {
-  if (is_relay() || subscription_.is_hidden()) return;
+  if (is_relay() || subscription_.is_hidden() || after_preview_) return;
   if (subscription_.mode() == StreamMode::Frames) return adapt_pictures(time_ns);
   if (state_ != State::Joined || subscription_.mode() != StreamMode::Strands || !flow_.expects_acks()) return;
   const std::vector<double> costs = head().strands.bytes_per_s(subscription_.strands.codec);
@@ -195,9 +207,26 @@ void Session::change_strand_class(size_t chosen) {
   head().handler.on_change(id_, SubscriptionChange::Strands);
 }
 
+/// Over a thin link a few strands make the first picture: the keyframe of all is larger by twenty times.
+void Session::begin_strands(int64_t time_ns) {
+  const std::optional<Admission::Preview> preview = std::exchange(preview_, std::nullopt);
+  if (!preview || flow_.transfer_ns(asset_bytes_, time_ns) < kThinAssetNs) return;
+  after_preview_ = {subscription_.strands.codec, codec_, "all strands, after the first picture of a few"};
+  subscription_.strands = preview->stream;
+  codec_ = preview->codec;
+  head().handler.on_change(id_, SubscriptionChange::Strands);
+  announce_quality("a few strands first, since the link is thin");
+}
+
+void Session::end_preview() {
+  keyframe_asked_ns_ = 0;
+  change_codec(*std::exchange(after_preview_, std::nullopt));
+}
+
 /// Strands go on by another codec, beginning with a keyframe.
 void Session::change_codec(const CodecAnswer& answer) {
   if (state_ != State::Joined) return;
+  after_preview_.reset();
   subscription_.strands.codec = answer.codec;
   codec_ = answer.name;
   context_.count(&NetCounters::codec_changes);

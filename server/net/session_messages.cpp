@@ -99,6 +99,7 @@ void Session::join(const Hello& hello) {
   hello_ = hello;
   token_expires_unix_s_ = expiry_of(context_.tokens, hello.token);
   codec_ = admission->welcome.codec;
+  preview_ = std::move(admission->preview);
   admission->welcome.role = hello.role;
   admission->welcome.mode = subscription_.mode();
   has_joined_ = true;

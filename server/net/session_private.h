@@ -92,6 +92,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void adapt(int64_t time_ns);
   void change_strand_class(size_t chosen);
   void change_codec(const CodecAnswer& answer);
+  void begin_strands(int64_t time_ns);
+  void end_preview();
   void announce_quality(const std::string& reason);
   void follow_picture_class(PictureClass before);
   void answer_mode(const ModeAnswer& answer);
@@ -122,8 +124,11 @@ class Session : public std::enable_shared_from_this<Session> {
   std::string codec_;                        // name of that of its strands
   std::optional<ModeChange> untold_change_;  // goes right before the first frame of the next mode
   bool is_mode_request_waiting_ = false;
-  int64_t status_sent_ns_ = 0;  // the newest one
-  bool has_asset_ = false;      // sent, or next in line
+  int64_t status_sent_ns_ = 0;                 // the newest one
+  bool has_asset_ = false;                     // sent, or next in line
+  size_t asset_bytes_ = 0;                     // of the first one
+  std::optional<Admission::Preview> preview_;  // until the first strands are asked for
+  std::optional<CodecAnswer> after_preview_;   // while its keyframe is on its way to the socket
   bool has_joined_ = false;
 
   beast::flat_buffer read_buffer_{kMaxSessionReadBytes};

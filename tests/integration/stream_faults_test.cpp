@@ -10,6 +10,7 @@
 #include "client/app/live_connection.h"
 #include "common/chaos/chaos_relay.h"
 #include "common/strands/strand_prefix.h"
+#include "server/net/strand_class.h"
 #include "tests/support/server_fixture.h"
 #include "tests/tools/load/load_viewers.h"
 
@@ -220,6 +221,35 @@ TEST_F(StreamFaults, SlowLinkGetsFewerStrandsFirst) {
     return whole >= 60;
   }));
   EXPECT_EQ(thin, 0u);
+}
+
+// The keyframe of all strands would keep whoever joins over a thin link waiting.
+TEST_F(StreamFaults, AThinLinkShowsAFewStrandsFirst) {
+  constexpr uint32_t kStrands = 1'000;
+  if (!start({}, test::bald_scene(kStrands, 12))) return;
+  for (const uint64_t bytes_per_s : {uint64_t{50'000}, uint64_t{0}}) {
+    LinkPlan plan;
+    plan.bytes_per_s = bytes_per_s;
+    const auto link = relay({}, plan);
+    ClientConfig config;
+    config.address.port = link->port();
+    config.hello.step_ns = 1.0;
+    auto viewer = ViewerSession::open(config);
+    ASSERT_TRUE(viewer) << viewer.error().to_string();
+    std::vector<std::pair<size_t, bool>> seen;  // codec, and whether all strands came
+    (*viewer)->set_snapshot_listener([&](const auto& snapshot) {
+      seen.emplace_back(strand_stream_of((*viewer)->replay().stream_id()).codec,
+                        snapshot->strand_count == kStrands);
+    });
+    const std::pair<size_t, bool> whole{0, true}, few{1, false};
+    EXPECT_TRUE(eventually([&] {
+      EXPECT_TRUE((*viewer)->pump(std::chrono::milliseconds(5)));
+      return std::count(seen.begin(), seen.end(), whole) >= 10;
+    })) << bytes_per_s;
+    EXPECT_EQ(seen.front(), bytes_per_s > 0 ? few : whole);
+    EXPECT_EQ(seen.back(), whole) << "and then it stays";
+    EXPECT_EQ((*viewer)->replay().stats().rejected_frames, 0u) << (*viewer)->replay().stats().last_error;
+  }
 }
 
 TEST_F(StreamFaults, OneEncodeServesEveryViewer) {

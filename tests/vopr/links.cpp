@@ -276,7 +276,7 @@ int walk(const std::vector<TestedLink>& links) {
 int walk_links(LinkGrid grid) {
   std::vector<links::TestedLink> all;
   const bool is_whole = grid == LinkGrid::Whole;
-  for (const double mbit_per_s : is_whole ? std::vector{1.0, 2.0, 5.0, 20.0} : std::vector{2.0})
+  for (const double mbit_per_s : is_whole ? std::vector{1.0, 2.0, 5.0, 20.0} : std::vector{1.0})
     for (const int64_t round_trip_ms :
          is_whole ? std::vector<int64_t>{20, 80, 200} : std::vector<int64_t>{80})
       for (const double stalled_share : is_whole ? std::vector{0.0, 0.01, 0.03} : std::vector{0.03})

@@ -13,8 +13,8 @@
 
 namespace strandcast {
 
-inline constexpr uint32_t kRestStepBits = 20;  // rest positions: 2^-20 m, about a micrometre
-inline constexpr uint32_t kHeadStepBits = 16;  // the head's vertices: 2^-16 m, about 15 micrometres
+inline constexpr uint32_t kRestStepBits = 17;  // rest positions: 2^-17 m, 8 micrometres, a tenth of a hair
+inline constexpr uint32_t kHeadStepBits = 14;  // the head's vertices: 2^-14 m, 61 micrometres
 
 namespace asset {
 
