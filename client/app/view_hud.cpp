@@ -146,6 +146,7 @@ std::vector<HudRow> HudWriter::rows(const ViewerState& now, const ViewFacts& fac
   if (!reason.empty()) add("because", reason);
   if (!is_frames) {
     add("strands by", codec_text(now.welcome));
+    if (now.exact_share > 0.0) add("exact", fmt::format("{:.1f} % of the frames", 1e2 * now.exact_share));
     add("shows", facts.playout == Playout::Smooth ? "smooth playout" : "the newest state");
     if (facts.playout == Playout::Smooth) add("interpolation", to_string(facts.interpolation));
     add("drawn", fmt::format("{} ({:.0f} ms)", how_drawn(facts.draw_step), facts.draw_ms));

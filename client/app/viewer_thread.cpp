@@ -104,6 +104,10 @@ void ViewerThread::describe(ViewerState& state) {
   state.has_status = session.has_status();
   state.net = session.client().counters();
   state.decoded_frames = session.decoded_frames();
+  const ReplayStats& strands = session.replay().stats();
+  state.exact_share = strands.decoded_frames == 0 ? 0.0
+                                                  : static_cast<double>(strands.exact_frames) /
+                                                        static_cast<double>(strands.decoded_frames);
   state.missed_frames = session.replay().stats().missed_frames + session.picture_stats().missed_frames;
   state.strand_decode_ms = session.replay().decode_timer().median_ms();
   state.picture_decode_ms = session.picture_decode_timer().median_ms();

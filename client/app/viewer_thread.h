@@ -43,6 +43,7 @@ struct ViewerState {
   bool has_status = false;
   ConnectionCounters net;
   uint64_t decoded_frames = 0;
+  double exact_share = 0.0;  // of the strand frames: without corrections
   uint64_t missed_frames = 0;
   double strand_decode_ms = 0.0;  // medians
   double picture_decode_ms = 0.0;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/strands/shared_strands.h"
+
 namespace strandcast {
 
 Result<std::unique_ptr<StrandReplay>> StrandReplay::make(const std::string& codec,
@@ -78,6 +80,7 @@ std::shared_ptr<const Snapshot> StrandReplay::receive(std::span<const std::byte>
   ++stats_.decoded_frames;
   stream_id_ = header->stream_id;
   if (header->opcode == Opcode::StrandKeyframe) ++stats_.keyframes;
+  if (is_exact(message)) ++stats_.exact_frames;
   newest_send_time_ns_ = header->send_time_ns;
 
   // Only the first state with a new motion sample counts: the same sample in later states is not late, it is

@@ -86,6 +86,7 @@ class TimelinePlayer {
 struct ReplayStats {
   uint64_t decoded_frames = 0;
   uint64_t keyframes = 0;
+  uint64_t exact_frames = 0;  // without corrections
   uint64_t received_frames = 0;
   uint64_t received_bytes = 0;
   uint64_t rejected_frames = 0;  // malformed, or their base was missing

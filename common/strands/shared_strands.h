@@ -39,7 +39,10 @@ class SharedStrands {
 
 /// Returns whether this is an exact frame: it carries only what a step cannot predict (WIRE.md, exact
 /// frames).
-bool is_exact(const EncodedFrame& frame);
+bool is_exact(std::span<const std::byte> message);
+inline bool is_exact(const EncodedFrame& frame) {
+  return is_exact(frame.message);
+}
 
 /// What an encoder tells the simulation.
 struct SharedUpdate {

@@ -297,6 +297,7 @@ void ServedHead::count_strands(ServerCounters& counters) const {
     first.too_large += of_stream.too_large;
     first.delta_bytes += of_stream.delta_bytes;
     first.keyframe_bytes += of_stream.keyframe_bytes;
+    first.exact += of_stream.exact;
     first.encode_median_ms = std::max(first.encode_median_ms, of_stream.encode_median_ms);
     first.keyframe_median_ms = std::max(first.keyframe_median_ms, of_stream.keyframe_median_ms);
   }

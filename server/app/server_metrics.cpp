@@ -67,6 +67,8 @@ constexpr Row kRows[] = {
      [](const ServerCounters& all) { return static_cast<double>(all.encode.keyframes); }},
     {"encode_delta_bytes_total", "Bytes of the deltas of the first class.",
      [](const ServerCounters& all) { return static_cast<double>(all.encode.delta_bytes); }},
+    {"encode_exact_frames_total", "Strand frames of the first class that carry no corrections.",
+     [](const ServerCounters& all) { return static_cast<double>(all.encode.exact); }},
     {"encode_median_ms", "Time to encode a frame of the first class, median.",
      [](const ServerCounters& all) { return all.encode.encode_median_ms; }},
     {"render_frames_total", "Pictures encoded.",

@@ -8,6 +8,7 @@
 #include "common/base/thread_name.h"
 #include "common/base/units.h"
 #include "common/log/log.h"
+#include "common/strands/shared_strands.h"
 #include "common/strands/strand_prefix.h"
 
 namespace strandcast {
@@ -211,8 +212,10 @@ void StrandEncodeWorker::count(const JoinFrames& frames, double encode_ms, Audie
     ++counters_.encodes;
     (audience == Audience::Joiners ? keyframe_timer_ : encode_timer_).add_ms(encode_ms);
     if (frames.frame == nullptr) is_first_too_large = counters_.too_large++ == 0;
-    if (frames.frame != nullptr && frames.frame != frames.keyframe)
+    if (frames.frame != nullptr && frames.frame != frames.keyframe) {
       counters_.delta_bytes += frames.frame->message.size();
+      counters_.exact += is_exact(*frames.frame) ? 1 : 0;
+    }
     if (frames.keyframe != nullptr) {
       ++counters_.keyframes;
       counters_.keyframe_bytes += frames.keyframe->message.size();

@@ -26,6 +26,7 @@ struct StrandEncodeCounters {
   uint64_t too_large = 0;    // snapshots that did not fit into one message
   uint64_t delta_bytes = 0;  // header and payload
   uint64_t keyframe_bytes = 0;
+  uint64_t exact = 0;  // deltas without corrections
   double encode_median_ms = 0.0;
   double keyframe_median_ms = 0.0;
 };

@@ -244,8 +244,10 @@ TEST_F(StreamFaults, AThinLinkShowsAFewStrandsFirst) {
     const std::pair<size_t, bool> whole{0, true}, few{1, false};
     EXPECT_TRUE(eventually([&] {
       EXPECT_TRUE((*viewer)->pump(std::chrono::milliseconds(5)));
-      return std::count(seen.begin(), seen.end(), whole) >= 10;
+      return std::count(seen.begin(), seen.end(), whole) >= 10 &&
+             (*viewer)->replay().stats().exact_frames >= 5;
     })) << bytes_per_s;
+    EXPECT_GE(server_->counters().encode.exact, 5u) << "as the server counts them";
     EXPECT_EQ(seen.front(), bytes_per_s > 0 ? few : whole);
     EXPECT_EQ(seen.back(), whole) << "and then it stays";
     EXPECT_EQ((*viewer)->replay().stats().rejected_frames, 0u) << (*viewer)->replay().stats().last_error;

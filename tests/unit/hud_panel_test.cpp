@@ -230,14 +230,18 @@ TEST(ViewHud, SaysWhichCodecStrandsComeByAndWhy) {
   state.is_connected = true;
   state.session_number = 1;
   state.welcome.codec = "tangent";
-  const auto codec = [&] {
+  const auto value_of = [&](const std::string& label) {
     for (const HudRow& row : writer.write(state, facts_of("127.0.0.1"), kSInNs).rows)
-      if (row.label == "strands by") return row.value;
+      if (row.label == label) return row.value;
     return std::string("no row");
   };
+  const auto codec = [&] { return value_of("strands by"); };
   EXPECT_EQ(codec(), "tangent") << "an older server gives no reason";
   state.welcome.codec_reason = "tangent: asked for";
   EXPECT_EQ(codec(), "tangent: asked for");
+  EXPECT_EQ(value_of("exact"), "no row");
+  state.exact_share = 0.983;
+  EXPECT_EQ(value_of("exact"), "98.3 % of the frames");
   state.mode.shown = StreamMode::Frames;
   EXPECT_EQ(codec(), "no row");
 }

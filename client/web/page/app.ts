@@ -655,6 +655,7 @@ class Viewer {
     } else {
       const why = figures.codecReason.replace(new RegExp(`^${figures.codec}: `), '');
       add('strands by', figures.codec + (why && `: ${why}`));
+      if (figures.exactShare) add('exact', `${(figures.exactShare * 100).toFixed(1)} % of the frames`);
       if (this.quality)
         add('stream of', `${this.quality.strand_share < 1 ? `${(this.quality.strand_share * 100).toFixed(0)} % of the` : 'all'} strands every ${this.quality.rate_divisor > 1 ? `${this.quality.rate_divisor} steps` : 'step'} within ${(this.quality.bound_m * 1000).toPrecision(2)} mm: ${this.quality.reason}`);
     }

@@ -50,6 +50,7 @@ export interface NetFigures {
   decodeMs: number; // median
   receivedBytes: number;
   decodedFrames: number;
+  exactShare: number; // of the strand frames: without corrections
   rejectedFrames: number;
   missedFrames: number;
   replacedStates: number; // decoded, and never drawn: a newer one was there first

@@ -32,6 +32,7 @@ const PICTURE_NAMES: { [codec: number]: string } = {
 /** Clocks of browsers are coarse: what is quicker than they can tell is still something. */
 const LEAST_STEP_NS = 5;
 const NEWEST_ASSET_LAYOUT = 2; // that the cores decode
+const EXACT_BIT = 128; // of a strand frame's first byte: it carries no corrections
 
 /** Where a session runs: whom it tells, what its socket is, and where modules of the core come from. */
 export interface Surroundings {
@@ -337,6 +338,8 @@ class Connection {
   private reason = '';
   private camera?: Camera;
   private cameraTimer = 0;
+  private strandFrames = 0;
+  private exactFrames = 0;
   private figures = { receivedBytes: 0, decodedFrames: 0, rejectedFrames: 0, missedFrames: 0, replacedStates: 0, lastError: '' };
   private codec = '';
   private codecReason = '';
@@ -588,6 +591,8 @@ class Connection {
     if (isNext) this.beginNext();
     this.strandMs.add(performance.now() - begin);
     ++this.figures.decodedFrames;
+    ++this.strandFrames;
+    if (!isKeyframe && message[kFrameHeaderBytes]! & EXACT_BIT) ++this.exactFrames;
     this.strandStream = header.streamId;
     this.stateHash = readStateHash(message);
     this.noteMotion(this.now!.motionTimeNs(), header);
@@ -680,7 +685,7 @@ class Connection {
   report(): void {
     if (!this.welcome) return;
     const figures: NetFigures = {
-      ...this.figures, mode: this.shown,
+      ...this.figures, mode: this.shown, exactShare: this.exactFrames / Math.max(this.strandFrames, 1),
       decodeMs: this.shown === Mode.frames ? this.pictureMs.median : this.strandMs.median,
       ageMs: this.newestSentNs && this.clock.hasValue ? (this.clock.toServerNs(nowNs()) - this.newestSentNs) * 1e-6 : 0,
       motionMs: this.motionMs.median, roundTripMs: this.clock.roundTripMs, codec: this.codec,

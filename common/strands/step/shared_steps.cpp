@@ -108,9 +108,9 @@ void SharedSteps::read(StrandBlocks& position_m, StrandBlocks& velocity_mps) con
 
 namespace strandcast {
 
-bool is_exact(const EncodedFrame& frame) {
-  return frame.header.opcode == Opcode::StrandDelta && frame.message.size() > kFrameHeaderBytes &&
-         (frame.message[kFrameHeaderBytes] & std::byte{step::kExactBit}) != std::byte{0};
+bool is_exact(std::span<const std::byte> message) {
+  return message.size() > kFrameHeaderBytes && message[0] == std::byte{uint8_t(Opcode::StrandDelta)} &&
+         (message[kFrameHeaderBytes] & std::byte{step::kExactBit}) != std::byte{0};
 }
 
 }  // namespace strandcast
