@@ -18,16 +18,19 @@ translate() {
 for file in "$folder"/shaders/sim/*.glsl; do
   translate "$(basename "$file")"
 done
+# What every kernel begins with is parsed once.
+options=(-std=c++20 -Wno-psabi "-I$folder/lanes" "-I$source_folder/shaders" "-I$source_folder")
+printf '%s\n' '#define STRANDCAST_LANE_COUNT 4' '#include "common/kernels/lane_kernel_headers_private.h"' >"$folder/head.h"
+"$compiler" "${options[@]}" -x c++-header "$folder/head.h"
 
 # try STATEMENTS: the compiler's message for a kernel with them, on its third line.
 try() {
   printf '#include "sim/follow.glsl"\nvoid main() {\n  %s\n}\n' "$1" >"$folder/shaders/sim/bad.comp"
   translate bad.comp
-  printf '%s\n' '#define STRANDCAST_LANE_COUNT 4' '#define HAS_PINNED_TAIL 0' '#define KERNEL_FILE "sim/bad.comp"' \
+  printf '%s\n' '#include "head.h"' '#define HAS_PINNED_TAIL 0' '#define KERNEL_FILE "sim/bad.comp"' \
     '#define KERNEL_NAME bad' '#define KERNEL_VARIANT ""' '#define KERNEL_SET 0' '#define KERNEL_PARTS 1' \
     '#include "common/kernels/lane_kernel_private.h"' >"$folder/bad.cpp"
-  "$compiler" -std=c++20 -Wno-psabi -fsyntax-only -I"$folder/lanes" -I"$source_folder/shaders" -I"$source_folder" \
-    "$folder/bad.cpp" 2>&1 || true
+  "$compiler" "${options[@]}" -fsyntax-only "$folder/bad.cpp" 2>&1 || true
 }
 # refused STATEMENTS WORDS: it does not compile, and the message has the line and the words.
 refused() {

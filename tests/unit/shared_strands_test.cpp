@@ -19,9 +19,13 @@ namespace {
 
 constexpr int kSettledFrames = 30;  // until the model is told and steps are under way
 
-SceneDesc scene_of(const std::string& quality) {
+/// Strands enough for more than one block of lanes; bytes are counted of more.
+constexpr uint32_t kFewStrands = 120;
+constexpr uint32_t kCountedStrands = 400;
+
+SceneDesc scene_of(const std::string& quality, uint32_t strand_count = kFewStrands) {
   SceneDesc scene = built_in_scene_with({"quality=" + quality}).value();
-  std::get<ProceduralGroomDesc>(scene.groom).strand_count = 400;
+  std::get<ProceduralGroomDesc>(scene.groom).strand_count = strand_count;
   return scene;
 }
 
@@ -185,7 +189,7 @@ TEST_P(SharedStrands, TakeLittleMoreThanTheHeadsPose) {
   constexpr size_t kWebSocketBytes = 2;
   constexpr size_t kMostBytes = 90;
   for (const bool shares : {true, false}) {
-    Stream stream(scene_of(GetParam()), shares);
+    Stream stream(scene_of(GetParam(), kCountedStrands), shares);
     stream.corrected(0, kSettledFrames);
     int exact = 0;
     for (int i = 0; i < 150; ++i) {
@@ -203,7 +207,7 @@ TEST_P(SharedStrands, TakeLittleMoreInGustsBesideABody) {
   constexpr double kWebSocketBytes = 2.0;
   constexpr double kMostBytes = 45'000.0 / 8.0 / 60.0;
   constexpr int kFrames = 150;
-  SceneDesc scene = scene_of(GetParam());
+  SceneDesc scene = scene_of(GetParam(), kCountedStrands);
   scene.body.capsules = {{kJoint, kJoint}, {"", "", {-0.2, -0.2, 0.0}, {0.1, -0.2, 0.0}, 0.06, 0.05}};
   const GustGenerator gusts({3.0f, 0.0f, 1.0f}, 0.3f, 20.0f, 7);
   const auto input_at = [&](int frame) {
@@ -335,7 +339,7 @@ TEST_P(SharedStrands, GoOnFromWhatAJoinerIsTold) {
 /// Besides the head's field, of which every keyframe tells. `TellsRodsBesideTheirWeight` has the rods.
 TEST(JoiningStrands, TakesFewBitsAVertexInFullQuality) {
   constexpr double kMostBits = 25.6;
-  SceneDesc scene = scene_of("full");
+  SceneDesc scene = scene_of("full", kCountedStrands);
   scene.head.collider = "spheres";
   Stream stream(scene, true);
   stream.corrected(0, 2 * kSettledFrames, 0.0);

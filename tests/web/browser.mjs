@@ -20,6 +20,8 @@ function findChromium() {
 export const whyNoBrowser = () => (findChromium() ? undefined : 'needs a browser (chromium)');
 const asRoot = () => (process.getuid?.() === 0 ? ['--no-sandbox'] : []);
 export const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
+/** What ends a wait for something else, and keeps no test from ending. */
+export const limit = (ms) => new Promise((done) => setTimeout(done, ms).unref());
 
 /** So many has the page shown. */
 export const picturesOf = (tab) => tab.evaluate('Number(document.body?.dataset.pictures ?? 0)');
@@ -66,7 +68,7 @@ export class Browser {
     const missing = whyNoBrowser();
     if (!missing) {
       const browser = await Browser.start(...wishes);
-      const tab = await Promise.race([browser.open('data:text/html,<p>here</p>').catch(() => undefined), sleep(2 * USUAL_MS)]);
+      const tab = await Promise.race([browser.open('data:text/html,<p>here</p>').catch(() => undefined), limit(2 * USUAL_MS)]);
       if (await tab?.until(() => tab.evaluate('document.body?.innerText === "here"').catch(() => false), 'a page').catch(() => false)) return tab.close().then(() => browser);
       console.log(`skipped: ${findChromium()} shows no page here: ${browser.said.trim().split('\n').pop()}`);
       await browser.end();
@@ -113,7 +115,7 @@ export class Browser {
     return tab;
   }
   async end() {
-    await Promise.race([this.send('Browser.close').catch(() => {}), sleep(2_000)]);
+    await Promise.race([this.send('Browser.close').catch(() => {}), limit(2_000)]);
     if (this.child.exitCode === null && this.child.signalCode === null) {
       this.child.kill('SIGKILL');
       await new Promise((done) => this.child.once('exit', done));

@@ -6,7 +6,7 @@ import fs from 'node:fs';
 import net from 'node:net';
 import os from 'node:os';
 import path from 'node:path';
-import { sleep } from './browser.mjs';
+import { limit, sleep } from './browser.mjs';
 
 const START_MS = 60_000;
 const USUAL_MS = 30_000;
@@ -135,7 +135,7 @@ export class Firefox {
     return bytes;
   }
   async end() {
-    await Promise.race([this.send('Marionette:Quit', { flags: ['eForceQuit'] }).catch(() => {}), sleep(3_000)]);
+    await Promise.race([this.send('Marionette:Quit', { flags: ['eForceQuit'] }).catch(() => {}), limit(3_000)]);
     if (this.child.exitCode === null && this.child.signalCode === null) {
       this.child.kill('SIGKILL');
       await new Promise((done) => this.child.once('exit', done));

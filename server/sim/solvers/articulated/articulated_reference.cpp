@@ -15,6 +15,16 @@ constexpr double kMinOpening = 0.1;
 
 const glm::dvec3 kAlongLink(0.0, 0.0, 1.0);  // of a frame: along the segment
 
+/// As four sums beside each other: in one, each addition waits for the one before.
+double dot(const double* a, const double* b, size_t count) {
+  double sums[4] = {};
+  size_t k = 0;
+  for (; k + 4 <= count; k += 4)
+    for (size_t lane = 0; lane < 4; ++lane) sums[lane] += a[k + lane] * b[k + lane];
+  for (; k < count; ++k) sums[0] += a[k] * b[k];
+  return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+}
+
 /// Symmetric positive matrix of 3 x 3 blocks, dense, solved by Cholesky's method.
 class DenseSystem {
  public:
@@ -34,13 +44,11 @@ class DenseSystem {
       double* row = &matrix_[i * size_];
       for (size_t j = 0; j <= i; ++j) {
         const double* other = &matrix_[j * size_];
-        double sum = row[j];
-        for (size_t k = 0; k < j; ++k) sum -= row[k] * other[k];
+        const double sum = row[j] - dot(row, other, j);
         if (i == j && !(sum > 0.0)) return {};
         row[j] = i == j ? std::sqrt(sum) : sum / other[j];
       }
-      for (size_t k = 0; k < i; ++k) right_side_[i] -= row[k] * right_side_[k];
-      right_side_[i] /= row[i];
+      right_side_[i] = (right_side_[i] - dot(row, right_side_.data(), i)) / row[i];
     }
     for (size_t i = size_; i-- > 0;) {
       right_side_[i] /= at(i, i);
