@@ -39,7 +39,7 @@ build() {
 run_part() {
   case "$1" in
     fuzz) build fuzz -DSTRANDCAST_FUZZ_SECONDS="$seconds" && bash tests/run_preset.sh nightly build/fuzz "$jobs" ;;
-    grids) build ci && STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci "$jobs" -L 'property|compare|gl|unit' ;;
+    grids) bash deploy/install_deps.sh libltc-dev; build ci && STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci "$jobs" -L 'property|compare|gl|unit' ;;
     dev) build dev && bash tests/run_preset.sh dev build/dev "$jobs" ;;
     # The laws of solvers take most of an hour here and have one thread of ours.
     tsan) build tsan && bash tests/run_preset.sh tsan build/tsan "$jobs" -LE 'property|compare' ;;

@@ -121,15 +121,35 @@ std::vector<std::byte> osc_bundle(const std::vector<std::vector<std::byte>>& mes
   return bundle.bytes();
 }
 
+/// A bone of an upright body, above the one before it. VRM asks for these of every avatar.
+struct UprightBone {
+  const char* name;
+  double above_m;
+};
+constexpr UprightBone kUpright[] = {
+    {"Hips", 0.95}, {"Spine", 0.10}, {"Chest", 0.12}, {"Neck", 0.26}, {"Head", 0.10}};
+
+/// The body stands below the head, and its neck takes all turns.
 std::vector<std::byte> encode_vmc(const MocapMoment& moment) {
-  constexpr double kHeadAboveRootM = 0.25;  // a bone at 0 would be one whose place is not told
-  constexpr double kRoundS = 4096.0;        // steps of a float are a quarter of a millisecond below it
+  constexpr double kRoundS = 4096.0;  // steps of a float are a quarter of a millisecond below it
+  constexpr uint32_t kIsLoaded = 1;
   const glm::dvec3& p = moment.world_from_head.position_m;
   const glm::dquat& r = moment.world_from_head.rotation;
+  double height_m = 0.0;
+  for (const UprightBone& bone : kUpright) height_m += bone.above_m;
+  Packet is_there;
+  is_there.put_text("/VMC/Ext/OK");
+  is_there.put_text(",i");
+  is_there.put(kIsLoaded, std::endian::big);
   std::vector<std::vector<std::byte>> messages = {
-      osc_message("/VMC/Ext/T", "", {std::fmod(moment.time_s, kRoundS)}),
-      osc_message("/VMC/Ext/Root/Pos", "root", {-p.x, p.y - kHeadAboveRootM, p.z, 0.0, 0.0, 0.0, 1.0}),
-      osc_message("/VMC/Ext/Bone/Pos", "Head", {0.0, kHeadAboveRootM, 0.0, r.x, -r.y, -r.z, r.w})};
+      is_there.bytes(), osc_message("/VMC/Ext/T", "", {std::fmod(moment.time_s, kRoundS)}),
+      osc_message("/VMC/Ext/Root/Pos", "root", {-p.x, p.y - height_m, p.z, 0.0, 0.0, 0.0, 1.0})};
+  for (const UprightBone& bone : kUpright) {
+    const bool is_head = &bone == &std::end(kUpright)[-1];
+    const glm::dquat turn = is_head ? r : glm::dquat(1.0, 0.0, 0.0, 0.0);
+    messages.push_back(osc_message("/VMC/Ext/Bone/Pos", bone.name,
+                                   {0.0, bone.above_m, 0.0, turn.x, -turn.y, -turn.z, turn.w}));
+  }
   if (moment.wind_mps)
     messages.push_back(
         osc_message("/strandcast/wind", "", {moment.wind_mps->x, moment.wind_mps->y, moment.wind_mps->z}));

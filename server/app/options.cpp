@@ -209,8 +209,10 @@ void add_mocap_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw
          "how its numbers are meant, where senders disagree; a wrong name is answered with those there are")
       ->needs(inputs)
       ->group(kGroup);
-  app.add_option("--mocap-timecode", options.mocap.timecode,
-                 "freed: its spare word counts frames of timecode, so many a second: 25, 29.97df")
+  app.add_option(
+         "--mocap-timecode", options.mocap.timecode,
+         "freed: its spare word counts frames of timecode, so many a second: 25, 29.97df; or bits of it "
+         "do: 25:12-15")
       ->needs(inputs)
       ->group(kGroup);
   app.add_option(

@@ -161,6 +161,13 @@ TEST(FreedParser, TheSpareWordCountsFramesWhereItIsSaid) {
   EXPECT_EQ(timecode_of(*parser, 65'534), at({0, 43, 41, 9})) << "one that was late";
   EXPECT_EQ(timecode_of(*live_parser_of("freed", "/29.97df"), 1800),
             make_timecode({0, 1, 0, 2}, {30'000, 1001}, true).value());
+  // Four bits beside an aperture of F2.8, as Z CAM documents it: 0x118 below a sequence number.
+  const auto beside_aperture = live_parser_of("freed", "/25:12-15");
+  for (const auto& [spare, frame] : {std::pair{0xE118, 14u}, {0xF118, 15u}, {0x0118, 16u}, {0x5FFF, 21u}})
+    EXPECT_EQ(timecode_of(*beside_aperture, static_cast<uint16_t>(spare)), at({0, 0, 0, frame})) << spare;
+  const auto low = live_parser_of("freed", "/25:0-7");
+  EXPECT_EQ(timecode_of(*low, 0x1200), at({0, 0, 0, 0}));
+  EXPECT_EQ(timecode_of(*low, 0x12FF), at({23, 59, 59, 24})) << "one that was late";
   // As it is sent, and back.
   MocapMoment moment;
   moment.timecode = at({0, 10, 0, 3});
@@ -174,6 +181,8 @@ TEST(FreedParser, TheSpareWordCountsFramesWhereItIsSaid) {
     return refused ? "it was made" : refused.error().to_string();
   };
   EXPECT_THAT(refusal("freed", "/26"), HasSubstr("frames of the spare word"));
+  for (const char* bits : {"/25:", "/25:12", "/25:15-12", "/25:3-3", "/25:0-16", "/25:-1-4", "/25:1-2x"})
+    EXPECT_THAT(refusal("freed", bits), HasSubstr("FIRST-LAST within 0-15")) << bits;
   EXPECT_THAT(refusal("freed", "roll/25"), HasSubstr("pan-tilt-roll"));
   EXPECT_THAT(refusal("opentrack", "xyz-ypr/25"), HasSubstr("xyz-ypr/25"));
 }

@@ -2,7 +2,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/motion/mocap_packet.h"
 #include "server/input/live/live_parser.h"
+#include "server/input/live/osc_reader.h"
 #include "tests/support/live_packets.h"
 #include "tests/support/live_poses.h"
 
@@ -293,6 +295,31 @@ TEST(VmcParser, DescribesWhatCame) {
   const auto lines = parser->describe();
   ASSERT_EQ(lines.size(), kMaxMonitorLines);
   EXPECT_EQ(lines.back(), "and 27 more");
+}
+
+// A receiver that knows the protocol's pages alone: it waits for OK, and hangs each bone on the one before.
+TEST(VmcPackets, HaveTheBonesThatPlaceAHead) {
+  const Pose head{{0.3, 1.6, -0.2}, glm::angleAxis(0.4, glm::dvec3(0, 1, 0))};
+  const auto bytes = find_mocap_encoding("vmc")->encode({1.0, head});
+  const auto osc = read_osc(bytes, kMaxDatagramBytes);
+  ASSERT_TRUE(osc && !osc->messages.empty());
+  OscArguments loaded(osc->messages.front());
+  EXPECT_EQ(osc->messages.front().address, "/VMC/Ext/OK");
+  EXPECT_EQ(loaded.take_int(), 1);
+  std::vector<std::string> bones;
+  glm::dvec3 place_m(0.0);  // in Unity's axes
+  for (const OscMessage& message : osc->messages) {
+    if (!message.address.ends_with("/Pos")) continue;
+    OscArguments arguments(message);
+    bones.emplace_back(arguments.take_string().value_or(""));
+    for (int axis = 0; axis < 3; ++axis) place_m[axis] += arguments.take_float().value_or(NAN);
+    const std::array<float, 3> turn{*arguments.take_float(), *arguments.take_float(),
+                                    *arguments.take_float()};
+    EXPECT_NEAR(turn[1], bones.back() == "Head" ? -std::sin(0.2) : 0.0, 1e-6) << bones.back();
+    EXPECT_NEAR(arguments.take_float().value_or(0.0f), bones.back() == "Head" ? std::cos(0.2) : 1.0, 1e-6);
+  }
+  EXPECT_THAT(bones, testing::ElementsAre("root", "Hips", "Spine", "Chest", "Neck", "Head"));
+  EXPECT_LT(glm::distance(place_m, glm::dvec3(-0.3, 1.6, -0.2)), 1e-6);
 }
 
 }  // namespace

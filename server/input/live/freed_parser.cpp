@@ -1,6 +1,6 @@
 // FreeD, message D1, of cameras and heads in virtual production: Vinten's manual, appendix A.3.2 and B. A
 // subject is a camera's number. Angles are `pan-tilt-roll` or `tilt-pan-roll`. The spare word is the sender's
-// own; where it counts frames of timecode, their number goes on beyond 16 bits.
+// own; where it, or some of its bits, counts frames of timecode, their number goes on beyond those bits.
 #include <array>
 
 #include "common/strands/byte_io.h"
@@ -14,6 +14,7 @@ constexpr size_t kFreedPacketBytes = 29;
 constexpr uint8_t kFreedPoseType = 0xD1;
 constexpr uint8_t kFamilyMask = 0xF0;  // all types of FreeD begin with D
 constexpr uint8_t kFamily = 0xD0;
+constexpr uint32_t kSpareBits = 16;
 constexpr uint8_t kChecksumBegin = 0x40;
 constexpr double kUnitsPerDegree = 32768.0;
 constexpr double kUnitsPerMm = 64.0;
@@ -59,8 +60,8 @@ FreedFields take_fields(ByteReader reader) {
 class FreedParser : public LiveParser {
  public:
   /// Which of the three angles pan and tilt are.
-  FreedParser(size_t pan_at, size_t tilt_at, const std::optional<Timecode>& count)
-      : pan_at_(pan_at), tilt_at_(tilt_at), count_(count) {}
+  FreedParser(size_t pan_at, size_t tilt_at, const std::optional<SpareCount>& count)
+      : pan_at_(pan_at), tilt_at_(tilt_at), count_(count), frames_(count ? count->bits : kSpareBits) {}
 
   Result<LivePacket> parse(std::span<const std::byte> bytes, int64_t) override {
     const uint8_t type = bytes.empty() ? uint8_t{0} : std::to_integer<uint8_t>(bytes.front());
@@ -85,7 +86,8 @@ class FreedParser : public LiveParser {
     pose.subject = fmt::format("{}", last_->camera);
     pose.world_from_subject = pose_from_freed(last_pose());
     if (count_) {
-      newest_ = advanced(*count_, frames_.unwrapped(last_->spare));
+      const uint32_t number = last_->spare >> count_->first_bit & ((1u << count_->bits) - 1);
+      newest_ = advanced(count_->begin, static_cast<int32_t>(frames_.unwrapped(number)));
       pose.timecode = newest_;
     }
     return packet;
@@ -115,7 +117,7 @@ class FreedParser : public LiveParser {
   }
 
   size_t pan_at_, tilt_at_;
-  std::optional<Timecode> count_;
+  std::optional<SpareCount> count_;
   WrappingCount frames_;
   std::optional<Timecode> newest_;
   std::optional<FreedFields> last_;
@@ -124,7 +126,7 @@ class FreedParser : public LiveParser {
 
 }  // namespace
 
-std::unique_ptr<LiveParser> make_freed_parser(size_t axis_order, const std::optional<Timecode>& count) {
+std::unique_ptr<LiveParser> make_freed_parser(size_t axis_order, const std::optional<SpareCount>& count) {
   return std::make_unique<FreedParser>(axis_order, 1 - axis_order, count);
 }
 

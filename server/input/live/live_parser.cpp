@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <limits>
 
@@ -54,14 +55,35 @@ Result<Timecode> parse_timecode_count(std::string_view text) {
   return make_timecode({}, rate, is_drop);
 }
 
+Result<SpareCount> parse_spare_count(std::string_view text) {
+  constexpr uint32_t kTopBit = 15;
+  SpareCount count;
+  const size_t colon = text.find(':');
+  ASSIGN_OR_RETURN(count.begin, parse_timecode_count(text.substr(0, colon)));
+  if (colon == std::string_view::npos) return count;
+  const std::string_view bits = text.substr(colon + 1);
+  uint32_t last = 0;
+  const char* const end = bits.data() + bits.size();
+  const auto first = std::from_chars(bits.data(), end, count.first_bit);
+  const bool has_two = first.ec == std::errc() && first.ptr != end && *first.ptr == '-';
+  const auto second = has_two ? std::from_chars(first.ptr + 1, end, last) : first;
+  if (!has_two || second.ec != std::errc() || second.ptr != end || last <= count.first_bit || last > kTopBit)
+    return make_error(ErrorCode::BadInput,
+                      "bits of the spare word are FIRST-LAST within 0-{}, for example 12-15; "
+                      "this is \"{}\"",
+                      kTopBit, excerpt(bits, kMaxQuotedBytes));
+  count.bits = last - count.first_bit + 1;
+  return count;
+}
+
 Result<std::unique_ptr<LiveParser>> make_live_parser(const LiveParserConfig& config) {
   std::vector<const char*> names;
   for (const LiveProtocol& protocol : live_protocols()) names.push_back(protocol.name);
   ASSIGN_OR_RETURN(const size_t index, find_name("live protocol", config.protocol, names));
   std::string axis_order = config.axis_order;
-  std::optional<Timecode> count;
+  std::optional<SpareCount> count;
   if (const size_t slash = axis_order.find('/'); slash != std::string::npos && config.protocol == "freed") {
-    const auto parsed = parse_timecode_count(axis_order.substr(slash + 1));
+    const auto parsed = parse_spare_count(std::string_view(axis_order).substr(slash + 1));
     if (!parsed) return at("frames of the spare word", parsed.error());
     count = *parsed;
     axis_order.resize(slash);

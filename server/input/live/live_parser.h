@@ -25,7 +25,7 @@ constexpr size_t kMaxMonitorLines = 64;
 struct LiveParserConfig {
   std::string protocol;    // a name of live_protocols()
   std::string axis_order;  // one of LiveProtocol::axis_orders; empty = the first; freed: "ORDER/25" where its
-                           // spare word counts frames of timecode, as parse_timecode_count() reads it
+                           // spare word counts frames of timecode, as parse_spare_count() reads it
   std::string
       protocol_version;  // natnet: 2.5 to 2.11, 3.0 to 4.1; empty = what the server says, or what fits
   bool ignores_zero_positions = true;  // vmc: bones whose position is zero keep the bind offset
@@ -74,6 +74,15 @@ class LiveParser {
 /// Parses how timecode counts: a rate, with "df" behind it for drop-frame. Returns its first frame; BadInput
 /// says which rates there are.
 Result<Timecode> parse_timecode_count(std::string_view text);
+
+/// How the spare word of FreeD counts frames; vendors differ, and some have the aperture in most of its bits.
+struct SpareCount {
+  Timecode begin;
+  uint32_t first_bit = 0;  // from the lowest
+  uint32_t bits = 16;
+};
+/// Parses "25", where the whole word counts, or "25:12-15" for some bits of it. BadInput says what is wrong.
+Result<SpareCount> parse_spare_count(std::string_view text);
 
 /// Makes a parser. NotFound lists the known protocols, axis orders or versions.
 Result<std::unique_ptr<LiveParser>> make_live_parser(const LiveParserConfig& config);

@@ -16,7 +16,7 @@ namespace strandcast {
 std::unique_ptr<LiveParser> make_vmc_parser(const LiveParserConfig& config);
 std::unique_ptr<LiveParser> make_opentrack_parser(size_t axis_order);
 /// `count`: how the spare word counts frames; empty: it does not.
-std::unique_ptr<LiveParser> make_freed_parser(size_t axis_order, const std::optional<Timecode>& count);
+std::unique_ptr<LiveParser> make_freed_parser(size_t axis_order, const std::optional<SpareCount>& count);
 Result<std::unique_ptr<LiveParser>> make_natnet_parser(size_t axis_order, const std::string& version);
 std::unique_ptr<LiveParser> make_vrpn_parser(size_t axis_order);
 std::unique_ptr<LiveParser> make_opentrackio_parser(size_t axis_order);
@@ -38,17 +38,20 @@ inline glm::dquat quaternion_of(const glm::dvec4& xyzw) {
 /// Converts seconds to whole nanoseconds; empty if they are not finite or do not fit.
 std::optional<int64_t> nanoseconds_of(double seconds);
 
-/// Goes on where a number of 16 bits begins anew.
+/// Goes on where a number of 16 bits, or fewer, begins anew.
 class WrappingCount {
  public:
+  explicit WrappingCount(uint32_t bits = 16) : spare_bits_(16 - bits) {}
   uint32_t unwrapped(uint32_t number) {
-    const auto passed = static_cast<int16_t>(static_cast<uint16_t>(number - count_));
+    const auto high = static_cast<int16_t>(static_cast<uint16_t>((number - count_) << spare_bits_));
+    const int passed = high >> spare_bits_;
     count_ = has_begun_ && number < 0x10000 ? count_ + static_cast<uint32_t>(passed) : number;
     has_begun_ = true;
     return count_;
   }
 
  private:
+  uint32_t spare_bits_;
   uint32_t count_ = 0;
   bool has_begun_ = false;
 };
