@@ -24,6 +24,13 @@ struct UsdcItem {
   UsdcKind kind = UsdcKind::Attribute;
   std::vector<std::pair<std::string, UsdcValue>> fields;
   std::vector<UsdcItem> items;
+
+  /// Returns how many items these are, with this one.
+  uint32_t count() const {
+    uint32_t all = 1;
+    for (const UsdcItem& item : items) all += item.count();
+    return all;
+  }
 };
 
 class UsdcFile {

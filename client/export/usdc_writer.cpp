@@ -42,6 +42,7 @@ class UsdcWriter : public StrandWriter {
     UsdcItem hair = prim("Hair", "Xform");
     hair.fields.emplace_back("kind", file_.token("component"));
     if (is_of_matter()) {
+      matter_item_ = root.count() + hair.count();  // what is before it
       hair.items.push_back(prim("Matter", "Material"));
       RETURN_IF_ERROR(describe_material(hair.items.back()));
     }
@@ -167,8 +168,7 @@ class UsdcWriter : public StrandWriter {
 
   /// Adds what binds curves to their material, and their rest shape.
   Status describe_matter(UsdcItem& curves) {
-    constexpr uint32_t kMaterialPath = 2;  // behind the root and "Hair"
-    ASSIGN_OR_RETURN(const UsdcValue target, file_.target(kMaterialPath));
+    ASSIGN_OR_RETURN(const UsdcValue target, file_.target(matter_item_));
     curves.items.push_back({std::string(kUsdBinding), UsdcKind::Relationship, {{"targetPaths", target}}, {}});
     if (const auto diameter = strands_.material().diameter) {
       const auto narrow = static_cast<float>(*diameter);
@@ -218,6 +218,7 @@ class UsdcWriter : public StrandWriter {
   double half_width_ = 0.0;
   std::vector<double> times_;  // of all frames
   Series points_, extent_, head_;
+  uint32_t matter_item_ = 0;
 };
 
 }  // namespace

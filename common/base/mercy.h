@@ -15,6 +15,11 @@ namespace strandcast {
 /// A file is refused when more than one in this number of its items is bad.
 inline constexpr uint64_t kMostBadShare = 10;
 
+/// Returns "1 guide is" or "3 guides are", of which the two are given.
+inline std::string counted(uint64_t count, const char* one, const char* many) {
+  return fmt::format("{} {}", count, count == 1 ? one : many);
+}
+
 class BadItems {
  public:
   /// Counts `count` items, 1 or more, of which `problem` says what is wrong with the first.

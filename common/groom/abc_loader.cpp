@@ -28,7 +28,7 @@ struct AbcTally {
   size_t hidden_objects = 0, closed_objects = 0, unknown_objects = 0, unfit_widths = 0, unfit_roots = 0;
   BadItems empty_strands;
   uint64_t read_strands = 0;
-  size_t cubic_strands = 0, guides = 0;
+  size_t cubic_strands = 0;
   std::string basis;
   double time_s = 0.0;
   uint64_t most_samples = 0;
@@ -107,7 +107,7 @@ class AbcLoading {
       if (const Status added = add_object(tree, node); !added) return at(tree.path(node), added.error());
     }
     RETURN_IF_ERROR(settle_empty(tally_.empty_strands, tally_.read_strands, notes_));
-    part_guides();
+    guide_note_ = part_guides(groom_, labels_, std::move(is_guide_), guide_use_, " (groom_guide)");
     // What strands say stays when all of them say it.
     const auto lacks_uv = [](const glm::vec2& uv) { return std::isnan(uv.x); };
     const auto lacks = [](float value) { return std::isnan(value); };
@@ -325,58 +325,43 @@ class AbcLoading {
         KnotCurve{control, weights, has_knots ? knots : std::span<const double>(even), order});
   }
 
-  /// Guides that drive other strands are no hair, unless that is asked for; alone they are.
-  void part_guides() {
-    tally_.guides = static_cast<size_t>(std::count(is_guide_.begin(), is_guide_.end(), uint8_t{1}));
-    are_all_guides_ = tally_.guides == is_guide_.size();
-    if (tally_.guides == 0 || are_all_guides_) return;
-    if (guide_use_ == GuideUse::LeaveOut)
-      for (uint8_t& flag : is_guide_) flag = 1 - flag;
-    keep_strands(groom_, labels_, is_guide_);
-  }
-
   std::vector<std::string> notes() const {
     std::vector<std::string> notes = notes_;
     const auto note = [&](size_t count, const std::string& sentence) {
       if (count > 0) notes.push_back(sentence);
     };
+    const auto left_out = [](size_t count, const char* why) {
+      return counted(count, "curves object is", "curves objects are") + " left out: " + why;
+    };
     const AbcTally& t = tally_;
     note(t.objects > 1, fmt::format("strands of {} curves objects", t.objects));
-    note(t.instances, fmt::format("{} instances are strands of their own", t.instances));
-    note(lost_instances_,
-         fmt::format("{} instances are left out: what they stand for is not there", lost_instances_));
+    note(t.instances,
+         counted(t.instances, "instance is hair of its", "instances are hair of their") + " own");
+    note(lost_instances_, counted(lost_instances_, "instance is", "instances are") +
+                              " left out: what they stand for is not there");
     note(t.most_samples > 1,
          fmt::format("strands as at {:.6g} s, the first of {} samples: motion of the file is not taken over",
                      t.time_s, t.most_samples));
-    note(
-        t.moving_objects,
-        fmt::format("{} curves objects stand as their first transform has them: its motion is not taken over",
-                    t.moving_objects));
-    note(t.double_objects, fmt::format("points of {} curves objects were in double precision and are rounded",
-                                       t.double_objects));
-    note(t.cubic_strands,
-         fmt::format("{} cubic curves ({}) became as many points on each curve as it has control points; "
-                     "groom.file.vertex_count asks for others",
-                     t.cubic_strands, t.basis));
+    note(t.moving_objects,
+         counted(t.moving_objects, "curves object stands as its", "curves objects stand as their") +
+             " first transform has it: that motion is not taken over");
+    note(t.double_objects, fmt::format("points of {} were in double precision and are rounded",
+                                       counted(t.double_objects, "curves object", "curves objects")));
+    note(t.cubic_strands, fmt::format("{} ({}) became as many points on each curve as it has control points; "
+                                      "groom.file.vertex_count asks for others",
+                                      counted(t.cubic_strands, "cubic curve", "cubic curves"), t.basis));
     note(t.most_width > 0.0, fmt::format("widths of {:.4g} to {:.4g} units are kept for exports: "
                                          "look.strand_radius_m says how thick hair is drawn",
                                          t.least_width, t.most_width));
-    note(t.unfit_widths,
-         fmt::format("widths of {} curves objects are negative or fit nothing", t.unfit_widths));
-    note(t.unfit_roots, fmt::format("root coordinates of {} curves objects are not finite", t.unfit_roots));
-    note(t.hidden_objects, fmt::format("{} curves objects are left out: they are hidden", t.hidden_objects));
-    note(t.closed_objects,
-         fmt::format("{} curves objects are left out: closed curves are no strands", t.closed_objects));
+    note(t.unfit_widths, fmt::format("widths of {} are negative or fit nothing",
+                                     counted(t.unfit_widths, "curves object", "curves objects")));
+    note(t.unfit_roots, fmt::format("root coordinates of {} are not finite",
+                                    counted(t.unfit_roots, "curves object", "curves objects")));
+    note(t.hidden_objects, left_out(t.hidden_objects, "what is hidden is no hair"));
+    note(t.closed_objects, left_out(t.closed_objects, "closed curves are no strands"));
     note(t.unknown_objects,
-         fmt::format("{} curves objects are left out: cubic curves without a basis, Hermite and power curves "
-                     "are not read",
-                     t.unknown_objects));
-    note(t.guides,
-         are_all_guides_ ? std::string("all strands are guides (groom_guide): they are taken as hair")
-         : guide_use_ == GuideUse::Alone
-             ? fmt::format("{} guides (groom_guide) are the hair, other strands are left out", t.guides)
-             : fmt::format("{} guides (groom_guide) are left out (groom.file.guides takes them alone)",
-                           t.guides));
+         left_out(t.unknown_objects, "cubic curves without a basis, Hermite and power curves are not read"));
+    add_note(notes, guide_note_);
     note(t.groups.size() > 1,
          fmt::format("{} groups (groom_group_id) are one head of hair", t.groups.size()));
     note(t.has_ids,
@@ -391,7 +376,7 @@ class AbcLoading {
   bool lacks_ids_ = false;
   std::vector<uint8_t> is_guide_;  // of each strand
   const GuideUse guide_use_;
-  bool are_all_guides_ = false;
+  std::string guide_note_;
   size_t lost_instances_ = 0;
   AbcTally tally_;
 };

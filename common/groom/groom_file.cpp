@@ -81,7 +81,7 @@ Result<StatedGroom> load_by_extension(const std::filesystem::path& path, const G
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (extension == ".tfx") return usable(path, load_tfx(path));
+  if (extension == ".tfx") return usable(path, load_tfx(path, options.guides));
   if (extension == ".hair") return usable(path, load_hair(path));
   if (extension == ".abc") return load_abc(path, options.guides);
   if (extension == ".ply") return load_ply(path, options.strand_vertex_count);

@@ -43,6 +43,36 @@ float extent_m(const std::vector<glm::vec3>& points_m) {
   return glm::length(high - low);
 }
 
+/// Whether all around the sphere no place is further than this from a root: hair leaves 55 degrees and more
+/// about face or neck, fur of a ball 6.
+bool is_covered(const FittedSphere& sphere, const std::vector<glm::vec3>& roots) {
+  const double kNear = std::cos(glm::radians(35.0));
+  constexpr int kPlaces = 128;
+  constexpr double kGoldenAngleRad = 2.399963;
+  for (int i = 0; i < kPlaces; ++i) {
+    const double up = 1.0 - (2.0 * i + 1.0) / kPlaces, level = std::sqrt(1.0 - up * up);
+    const double around = kGoldenAngleRad * i;
+    const glm::vec3 place(glm::dvec3(level * std::sin(around), up, level * std::cos(around)));
+    const bool has_root = std::any_of(roots.begin(), roots.end(), [&](const glm::vec3& root) {
+      const glm::vec3 out = root - sphere.center_m;
+      return static_cast<double>(glm::dot(place, out)) > kNear * static_cast<double>(glm::length(out));
+    });
+    if (!has_root) return false;
+  }
+  return true;
+}
+
+/// Heads have 93 % and more of their roots there, bodies with limbs 50 to 70 %, discs 66.
+bool are_near(const FittedSphere& sphere, const std::vector<glm::vec3>& roots) {
+  constexpr float kNearest = 0.7f, kFurthest = 1.35f;
+  constexpr size_t kOfTen = 8;
+  const auto near_count = std::count_if(roots.begin(), roots.end(), [&](const glm::vec3& root) {
+    const float radii = glm::distance(root, sphere.center_m) / sphere.radius_m;
+    return radii > kNearest && radii < kFurthest;
+  });
+  return 10 * static_cast<size_t>(near_count) >= kOfTen * roots.size();
+}
+
 }  // namespace
 
 std::vector<glm::vec3> roots_of(const Groom& groom) {
@@ -66,24 +96,30 @@ FittedSphere fit_head_sphere(const Groom& groom) {
   return of_all;
 }
 
+bool are_on_a_disc(const std::vector<glm::vec3>& roots) {
+  constexpr double kFlat = 0.05;  // 1 for what is as wide on all sides; a disc a tenth as thick has 0.03
+  if (roots.size() < kMinFittedRoots) return false;
+  glm::dvec3 middle(0.0);
+  for (const glm::vec3& root : roots) middle += glm::dvec3(root) / static_cast<double>(roots.size());
+  glm::dmat3 spread(0.0);
+  for (const glm::vec3& root : roots)
+    spread += glm::outerProduct(glm::dvec3(root) - middle, glm::dvec3(root) - middle);
+  const double mean = (spread[0][0] + spread[1][1] + spread[2][2]) / 3.0;
+  const bool is_flat = !(glm::determinant(spread) > kFlat * mean * mean * mean);
+  return is_flat && !are_near(fit_sphere(roots), roots);
+}
+
 bool is_hair_of_head(const Groom& groom) {
-  // Heads have 93 % and more of their roots there, bodies with limbs 50 to 70 %.
-  constexpr float kNearest = 0.7f, kFurthest = 1.35f;
-  constexpr size_t kOfTen = 8;
   const std::vector<glm::vec3> roots = roots_of(groom);
   const FittedSphere fitted = fit_sphere(roots);
   if (roots.size() < kMinFittedRoots || !(extent_m(roots) >= 2.0f * fitted.radius_m)) return true;
-  const auto near_count = std::count_if(roots.begin(), roots.end(), [&](const glm::vec3& root) {
-    const float radii = glm::distance(root, fitted.center_m) / fitted.radius_m;
-    return radii > kNearest && radii < kFurthest;
-  });
-  return 10 * static_cast<size_t>(near_count) >= kOfTen * roots.size();
+  return are_on_a_disc(roots) || (are_near(fitted, roots) && !is_covered(fitted, roots));
 }
 
 float covered_head_radius(const Groom& groom) {
   constexpr size_t kMinCoveredRoots = 64;
   const std::vector<glm::vec3> roots = roots_of(groom);
-  if (roots.size() < kMinCoveredRoots || !is_hair_of_head(groom)) return 0.0f;
+  if (roots.size() < kMinCoveredRoots || are_on_a_disc(roots) || !is_hair_of_head(groom)) return 0.0f;
   const FittedSphere fitted = fit_sphere(roots);
   return std::isfinite(fitted.radius_m) && extent_m(roots) >= 2.0f * fitted.radius_m ? fitted.radius_m : 0.0f;
 }

@@ -16,12 +16,16 @@ std::vector<glm::vec3> roots_of(const Groom& groom);
 /// sphere, only the upper roots count. Falls back to all roots.
 FittedSphere fit_head_sphere(const Groom& groom);
 
-/// Tells hair of a head from fur: roots of fur go all around, and many lie far from the sphere that fits
-/// them best.
+/// Returns whether roots fill a part of a plane, so that the sphere through them says nothing. A line over a
+/// head lies on its sphere.
+bool are_on_a_disc(const std::vector<glm::vec3>& roots);
+
+/// Tells hair of a head from fur: roots of a body lie far from the sphere that fits them best, and those of a
+/// ball leave no room for a face and a neck.
 bool is_hair_of_head(const Groom& groom);
 
-/// Returns the radius of the head under the roots, in the groom's units; 0 where these are few, fur, or on
-/// too little of a head to say it.
+/// Returns the radius of the head under the roots, in the groom's units; 0 where these are few, on a disc,
+/// fur, or on too little of a head to say it.
 float covered_head_radius(const Groom& groom);
 
 /// Finds the head of a groom in metres. Uses the sphere through the roots if it has the size of a person's

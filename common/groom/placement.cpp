@@ -234,7 +234,34 @@ Guess<float> guess_yaw_deg(const Groom& groom) {
           fmt::format("the hairline is highest at {}", kNames[quarters])};
 }
 
+namespace {
+
+/// The first common unit in which hair is as long as on a head; no reason where there is none.
+Guess<float> unit_by_length(const Groom& groom) {
+  constexpr double kShortestM = 0.03, kLongestM = 1.2, kLongHair = 0.95;  // of strands
+  std::vector<double> lengths;
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
+    double length = 0.0;
+    for (uint32_t v = groom.offset[strand] + 1; v < groom.offset[strand + 1]; ++v)
+      length += static_cast<double>(glm::distance(groom.rest_position_m[v], groom.rest_position_m[v - 1]));
+    lengths.push_back(length);
+  }
+  const double length = lengths.empty() ? 0.0 : quantile(lengths, kLongHair);
+  for (const CommonUnit& unit : kCommonUnits) {
+    const double length_m = length * static_cast<double>(unit.unit_m);
+    if (length_m >= kShortestM && length_m <= kLongestM)
+      return {unit.unit_m, fmt::format("in {} its hair is {:.2g} m long, and its roots lie in a plane",
+                                       unit.name, length_m)};
+  }
+  return {};
+}
+
+}  // namespace
+
 Guess<float> guess_unit(const Groom& groom) {
+  if (are_on_a_disc(roots_of(groom))) {
+    if (Guess<float> by_length = unit_by_length(groom); !by_length.reason.empty()) return by_length;
+  }
   const float radius = fit_head_sphere(groom).radius_m;
   if (!std::isfinite(radius) || radius <= 0.0f) return {1.0f, {}};
   for (const CommonUnit& unit : kCommonUnits) {

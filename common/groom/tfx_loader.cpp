@@ -37,6 +37,7 @@ struct TfxHeader {
   uint64_t vertex_total() const { return uint64_t{strand_count} * vertex_count; }
   const TfxArray& positions() const { return arrays[0]; }
   const TfxArray& strand_uv() const { return arrays[1]; }
+  size_t guide_flags = 0;  // in `arrays`; 0: there are none
 };
 
 Status check_counts(uint32_t strand_count, uint32_t vertex_count) {
@@ -135,6 +136,8 @@ Result<TfxHeader> read_header_v3(const ByteView& file) {
                    {"vertex colours", file.get<uint32_t>(156), vertices, 4 * kFloatBytes},
                    {"guide flags", file.get<uint32_t>(160), strands, sizeof(uint32_t)},
                    {"vertex coordinates", file.get<uint32_t>(164), vertices, 2 * kFloatBytes}};
+  constexpr size_t kGuideFlags = 4;
+  if (header.arrays[kGuideFlags].offset != 0) header.guide_flags = kGuideFlags;
   return header;
 }
 
@@ -197,9 +200,21 @@ void read_root_uv(const ByteView& file, const TfxHeader& header, Groom& groom) {
   }
 }
 
+/// Which strands are guides, none where the file does not say it.
+std::vector<uint8_t> read_guides(const ByteView& file, const TfxHeader& header) {
+  std::vector<uint8_t> is_guide;
+  if (header.guide_flags == 0) return is_guide;
+  const TfxArray& flags = header.arrays[header.guide_flags];
+  for (uint64_t i = 0; i < flags.count && file.has(flags.offset + i * flags.item_bytes, 1, flags.item_bytes);
+       ++i)
+    is_guide.push_back(file.get<uint32_t>(flags.offset + i * flags.item_bytes) != 0 ? 1 : 0);
+  is_guide.resize(flags.count, 0);
+  return is_guide;
+}
+
 }  // namespace
 
-Result<StatedGroom> read_tfx_binary(const ByteView& file) {
+Result<StatedGroom> read_tfx_binary(const ByteView& file, GuideUse guides) {
   ASSIGN_OR_RETURN(const TfxHeader header, read_tfx_header(file));
   if (header.positions().offset == 0) {
     return make_error(ErrorCode::BadInput,
@@ -220,15 +235,17 @@ Result<StatedGroom> read_tfx_binary(const ByteView& file) {
     RETURN_IF_ERROR(read_pins(file, header, groom, stated.notes));
     return stated;
   }
+  add_note(stated.notes, part_guides(groom, stated.labels, read_guides(file, header), guides));
   groom = with_pinning(std::move(groom), header.has_both_ends ? Pinning::BothEnds : Pinning::RootPair);
   return stated;
 }
 
-Result<StatedGroom> load_tfx(const std::filesystem::path& path) {
+Result<StatedGroom> load_tfx(const std::filesystem::path& path, GuideUse guides) {
   ASSIGN_OR_RETURN(const std::string bytes, load_text(path, kMaxGroomFileBytes));
   const std::string_view text = without_byte_order_mark(bytes);
-  auto stated = text.starts_with(kTextMark) ? read_tfx_text(text)
-                                            : read_tfx_binary(ByteView(std::as_bytes(std::span(bytes))));
+  auto stated = text.starts_with(kTextMark)
+                    ? read_tfx_text(text)
+                    : read_tfx_binary(ByteView(std::as_bytes(std::span(bytes))), guides);
   if (!stated) return at(path.string(), stated.error());
   stated->groom.name = path.stem().string();
   return stated;

@@ -133,6 +133,19 @@ Status settle_empty(const BadItems& empty, uint64_t strand_count, std::vector<st
   return {};
 }
 
+std::string part_guides(Groom& groom, StrandLabels& labels, std::vector<uint8_t> is_guide, GuideUse use,
+                        const char* by) {
+  const auto guides = static_cast<uint64_t>(std::count(is_guide.begin(), is_guide.end(), uint8_t{1}));
+  if (guides == 0) return {};
+  if (guides == is_guide.size()) return fmt::format("all strands are guides{}: they are taken as hair", by);
+  if (use == GuideUse::LeaveOut)
+    for (uint8_t& flag : is_guide) flag = 1 - flag;
+  keep_strands(groom, labels, is_guide);
+  const std::string count = counted(guides, "guide", "guides") + by + (guides == 1 ? " is" : " are");
+  return use == GuideUse::Alone ? count + " the hair, other strands are left out"
+                                : count + " left out (groom.file.guides takes guides alone)";
+}
+
 void keep_strands(Groom& groom, StrandLabels& labels, std::span<const uint8_t> is_kept) {
   const auto keep = [&](auto& list, const auto& begin_of) {
     if (list.empty()) return;

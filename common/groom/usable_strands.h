@@ -30,6 +30,15 @@ Status fit_points(std::vector<glm::vec3>& points, uint64_t needed, const char* s
 Error empty_strand(size_t strand);
 Status settle_empty(const BadItems& empty, uint64_t strand_count, std::vector<std::string>& notes);
 
+/// Leaves guides out of the hair, or takes them alone; where there is nothing but guides, they are the hair.
+/// Returns what to say of it. `by` names what flags them: " (groom_guide)".
+std::string part_guides(Groom& groom, StrandLabels& labels, std::vector<uint8_t> is_guide, GuideUse use,
+                        const char* by = "");
+/// Adds what there is to say.
+inline void add_note(std::vector<std::string>& notes, std::string note) {
+  if (!note.empty()) notes.push_back(std::move(note));
+}
+
 /// Removes the strands whose element is 0, with all that is said of them; takes no further memory.
 void keep_strands(Groom& groom, StrandLabels& labels, std::span<const uint8_t> is_kept);
 

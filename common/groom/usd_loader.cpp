@@ -241,16 +241,15 @@ std::vector<std::string> notes_of(const UsdStage& stage, const Tally& tally) {
     notes.push_back(
         fmt::format("strands as at time code {}, the first of their time samples", *tally.time_code));
   if (tally.moving_prims > 0)
-    notes.push_back(
-        fmt::format("{} BasisCurves stand as their first transform has them: its motion is not taken over",
-                    tally.moving_prims));
+    notes.push_back(counted(tally.moving_prims, "BasisCurves stands as its", "BasisCurves stand as their") +
+                    " first transform has it: that motion is not taken over");
   if (tally.unfit_widths > 0)
     notes.push_back(fmt::format("widths of {} BasisCurves are negative or fit nothing", tally.unfit_widths));
   if (tally.cubic_strands > 0)
     notes.push_back(
-        fmt::format("{} cubic curves ({}) became as many points on each curve as it has control "
-                    "points; groom.file.vertex_count asks for others",
-                    tally.cubic_strands, tally.basis));
+        fmt::format("{} ({}) became as many points on each curve as it has control points; "
+                    "groom.file.vertex_count asks for others",
+                    counted(tally.cubic_strands, "cubic curve", "cubic curves"), tally.basis));
   if (tally.most_width > 0.0f)
     notes.push_back(
         fmt::format("widths of {:.4g} to {:.4g} units are kept for exports: look.strand_radius_m says "
@@ -260,13 +259,16 @@ std::vector<std::string> notes_of(const UsdStage& stage, const Tally& tally) {
   if (tally.rests_elsewhere > 0)
     notes.emplace_back("rest shapes whose roots lie elsewhere are not read: points are the hair");
   if (tally.left_out_prims > 0)
-    notes.push_back(
-        fmt::format("{} BasisCurves are left out: inactive, invisible, a proxy, a class or an override",
-                    tally.left_out_prims));
+    notes.push_back(counted(tally.left_out_prims, "BasisCurves is", "BasisCurves are") +
+                    " left out: inactive, invisible, a proxy, a class or an override");
   if (stage.reference_count > 0)
-    notes.push_back(fmt::format("{} references, layers or variants are not followed", stage.reference_count));
+    notes.push_back(counted(stage.reference_count, "reference, layer or variant is",
+                            "references, layers or variants are") +
+                    " not followed");
   if (stage.other_curve_count > 0)
-    notes.push_back(fmt::format("{} NurbsCurves or HermiteCurves are not read", stage.other_curve_count));
+    notes.push_back(counted(stage.other_curve_count, "NurbsCurves or HermiteCurves is",
+                            "NurbsCurves or HermiteCurves are") +
+                    " not read");
   return notes;
 }
 
@@ -334,23 +336,6 @@ Result<UsdStage> read_stage(const std::shared_ptr<GroomSource>& source) {
   return read_usda_stage({text.data(), text.size()});
 }
 
-/// Guides that drive other strands are no hair, unless that is asked for; alone they are.
-void part_guides(StatedGroom& stated, Tally& tally, GuideUse use) {
-  const auto guides = std::count(tally.is_guide.begin(), tally.is_guide.end(), uint8_t{1});
-  if (guides == 0) return;
-  if (static_cast<size_t>(guides) == tally.is_guide.size()) {
-    stated.notes.emplace_back("all strands are guides: they are taken as hair");
-    return;
-  }
-  if (use == GuideUse::LeaveOut)
-    for (uint8_t& flag : tally.is_guide) flag = 1 - flag;
-  keep_strands(stated.groom, stated.labels, tally.is_guide);
-  stated.notes.push_back(
-      use == GuideUse::Alone
-          ? fmt::format("{} guides are the hair, other strands are left out", guides)
-          : fmt::format("{} guides are left out (groom.file.guides takes them alone)", guides));
-}
-
 Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source, GuideUse guides) {
   ASSIGN_OR_RETURN(UsdStage stage, read_stage(source));
   StatedGroom stated;
@@ -373,7 +358,7 @@ Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source, GuideUse gu
   stated.up_axis_reason = "its upAxis says so";
   stated.notes = notes_of(stage, tally);
   stated.material = material_of(stage, stated.notes);
-  part_guides(stated, tally, guides);
+  add_note(stated.notes, part_guides(stated.groom, stated.labels, std::move(tally.is_guide), guides));
   stated.groom = with_pinning(std::move(stated.groom), Pinning::Root);
   return with_usable_strands(std::move(stated));
 }

@@ -126,8 +126,8 @@ TEST_F(AbcTest, InstancesStandWhereTheyAre) {
     EXPECT_EQ(groom->groom.rest_position_m[i], MadeCurves().points[i] + glm::vec3(1, 0, 0));
     EXPECT_EQ(groom->groom.rest_position_m[5 + i], MadeCurves().points[i] + glm::vec3(1, 0, 9));
   }
-  EXPECT_THAT(groom->notes, Contains(HasSubstr("1 instances are strands of their own")));
-  EXPECT_THAT(groom->notes, Contains(HasSubstr("1 instances are left out")));
+  EXPECT_THAT(groom->notes, Contains(HasSubstr("1 instance is hair of its own")));
+  EXPECT_THAT(groom->notes, Contains(HasSubstr("1 instance is left out")));
   // One that stands for what holds it would never end.
   MadeAbc endless(path());
   auto outer = endless.xform({}, {}, true, {endless.instance("again", "/xform")});
@@ -180,7 +180,7 @@ TEST_F(AbcTest, CubicCurvesBecomePointsOnThem) {
   const auto clamped = with(kCubic, kBSpline, {0, 0, 0, 0, 1, 2, 2, 2, 2});
   EXPECT_EQ(clamped->groom.rest_position_m.front(), cubic.points.front());
   EXPECT_EQ(clamped->groom.rest_position_m.back(), cubic.points.back());
-  EXPECT_THAT(clamped->notes, Contains(HasSubstr("1 cubic curves (bspline) became as many points")));
+  EXPECT_THAT(clamped->notes, Contains(HasSubstr("1 cubic curve (bspline) became as many points")));
   EXPECT_LT(glm::distance(with(kCubic, kCatmullRom, {})->groom.rest_position_m[0], cubic.points[1]), 1e-6f);
   // Blender's hair: points on the strand, whatever the basis.
   expect_near(with(kLinear, kCatmullRom, {}), cubic.points);
@@ -277,11 +277,11 @@ TEST_F(AbcTest, GuidesAreHairOnlyWhereTheyAreAlone) {
   };
   const auto asked_for = with_guides({0, 1}, GuideUse::Alone);
   expect_near(asked_for, {{1, 0, 0}, {1, 0, -1}});
-  EXPECT_THAT(asked_for->notes, Contains(HasSubstr("1 guides (groom_guide) are the hair")));
+  EXPECT_THAT(asked_for->notes, Contains(HasSubstr("1 guide (groom_guide) is the hair")));
   const auto mixed = with_guides({1, 0});
   expect_near(mixed, {{1, 0, 0}, {1, 0, -1}});
   EXPECT_EQ(mixed->groom.root_uv, (std::vector<glm::vec2>{{0.75f, 1.0f}}));
-  EXPECT_THAT(mixed->notes, Contains(HasSubstr("1 guides (groom_guide) are left out")));
+  EXPECT_THAT(mixed->notes, Contains(HasSubstr("1 guide (groom_guide) is left out")));
   EXPECT_THAT(mixed->notes, Contains(HasSubstr("2 groups (groom_group_id)")));
   const auto alone = with_guides({1, 1});
   expect_near(alone, MadeCurves().points);
@@ -344,7 +344,7 @@ TEST_F(AbcTest, TransformsAreTakenAtTheTimeOfTheCurves) {
   const auto tree = AbcTree::read(*archive);
   ASSERT_TRUE(tree) << tree.error().to_string();
   ASSERT_EQ(tree->nodes().size(), 3u);
-  EXPECT_THAT(read_abc(bytes)->notes, Contains(HasSubstr("1 curves objects stand as their first transform")));
+  EXPECT_THAT(read_abc(bytes)->notes, Contains(HasSubstr("1 curves object stands as its first transform")));
   for (const auto& [time_s, x] :
        {std::pair(-3.0, 0.0), {0.5, 0.0}, {0.6, 0.0}, {0.65, 1.0}, {0.75, 1.0}, {0.9, 2.0}, {100.0, 2.0}}) {
     const auto world = tree->world_from_node(*archive, 2, time_s);

@@ -263,6 +263,21 @@ TEST(BrokenTfx, PartsThatAreHeldOtherwiseStartAllTheSame) {
   EXPECT_EQ(load_groom(options)->pinned[6 * 3 + 5], 1) << "stated";
 }
 
+TEST(BrokenTfx, GuidesOfVersionThreeAreNoHair) {
+  ByteFile file = small_v3(6, 1);
+  const auto flags_at = static_cast<uint32_t>(file.bytes.size());
+  file.add(1u).add(0u);
+  file = file.patch(160, flags_at);
+  const auto hair = read_tfx_binary(ByteView(file.bytes));
+  ASSERT_TRUE(hair) << hair.error().to_string();
+  EXPECT_EQ(hair->groom.strand_count(), 1u);
+  EXPECT_EQ(hair->groom.rest_position_m[0], glm::vec3(0.0f, 6.0f, 0.25f));
+  EXPECT_EQ(hair->groom.pinned, (std::vector<uint8_t>{1, 1, 0, 0, 1, 1}));
+  EXPECT_THAT(hair->notes, Contains("1 guide is left out (groom.file.guides takes guides alone)"));
+  const auto guides = read_tfx_binary(ByteView(file.bytes), GuideUse::Alone);
+  EXPECT_EQ(guides->groom.rest_position_m[0], glm::vec3(0.0f, 0.0f, 0.25f));
+}
+
 TEST(BrokenTfx, ARootIsPinnedWhateverItsFlagSays) {
   const ByteFile file = small_v4().patch(160 + 12, 1.0f);
   const auto groom = read_tfx_binary(ByteView(file.bytes));

@@ -204,7 +204,7 @@ TEST(Usda, CubicCurvesAreSaidToHaveBecomePoints) {
   ASSERT_TRUE(groom) << groom.error().to_string();
   EXPECT_EQ(groom->groom.uniform_vertex_count(), 4u);
   EXPECT_THAT(groom->notes,
-              Contains(HasSubstr("1 cubic curves (bspline) became as many points on each curve")));
+              Contains(HasSubstr("1 cubic curve (bspline) became as many points on each curve")));
 }
 
 TEST(Usda, SeveralPrimsAreOneGroomAndWhatDoesNotCountIsLeftOut) {
@@ -229,7 +229,7 @@ TEST(Usda, SeveralPrimsAreOneGroomAndWhatDoesNotCountIsLeftOut) {
   EXPECT_THAT(groom->notes, Contains(HasSubstr("strands of 2 BasisCurves")));
   EXPECT_THAT(groom->notes, Contains(HasSubstr("4 BasisCurves are left out")));
   EXPECT_THAT(groom->notes, Contains(HasSubstr("2 references, layers or variants are not followed")));
-  EXPECT_THAT(groom->notes, Contains(HasSubstr("1 NurbsCurves or HermiteCurves are not read")));
+  EXPECT_THAT(groom->notes, Contains(HasSubstr("1 NurbsCurves or HermiteCurves is not read")));
   EXPECT_THAT(groom->notes, Contains(HasSubstr("widths of 0.02 to 0.1 units are kept for exports")));
 }
 
@@ -288,12 +288,12 @@ TEST(Usda, GuidesAreNoHairUnlessAllAre) {
       read_with("int[] primvars:groom_guide = [0, 1]\nint[] primvars:groom_id = [7, 8]\n");
   EXPECT_EQ(mixed.groom.offset, (std::vector<uint32_t>{0, 3}));
   EXPECT_EQ(mixed.labels.id, std::vector<int32_t>{7});
-  EXPECT_THAT(mixed.notes, Contains(HasSubstr("1 guides are left out")));
+  EXPECT_THAT(mixed.notes, Contains(HasSubstr("1 guide is left out")));
   const auto alone = read_usd(stage(kLines + "int[] primvars:groom_guide = [0, 1]\n"), GuideUse::Alone);
   ASSERT_TRUE(alone) << alone.error().to_string();
   EXPECT_EQ(alone->groom.strand_count(), 1u);
   EXPECT_NE(alone->groom.rest_position_m, mixed.groom.rest_position_m);
-  EXPECT_THAT(alone->notes, Contains(HasSubstr("1 guides are the hair")));
+  EXPECT_THAT(alone->notes, Contains(HasSubstr("1 guide is the hair")));
   for (const char* const all : {"int[] primvars:groom_guide = [1, 1]\n", "int primvars:groom_guide = 1\n",
                                 "uniform token purpose = \"guide\"\n"}) {
     const StatedGroom guides = read_with(all);
@@ -318,7 +318,7 @@ TEST(Usda, ProxiesAreLeftOutAndGuidesKnownByWhatIsAroundThem) {
   };
   const StatedGroom proxy = read_whole(plain + prim("proxy", curves("")));
   EXPECT_EQ(proxy.groom.strand_count(), 2u);
-  EXPECT_THAT(proxy.notes, Contains(HasSubstr("1 BasisCurves are left out: inactive, invisible, a proxy")));
+  EXPECT_THAT(proxy.notes, Contains(HasSubstr("1 BasisCurves is left out: inactive, invisible, a proxy")));
   const StatedGroom own = read_whole(plain + prim("proxy", curves("uniform token purpose = \"render\"\n")));
   EXPECT_EQ(own.groom.strand_count(), 4u) << "says another thing";
   const StatedGroom guides = read_whole(plain + prim("guide", curves("")));
@@ -335,7 +335,7 @@ TEST(Usda, MotionOfATransformAndWidthsThatFitNothingAreNamed) {
   const std::string moving =
       "double3 xformOp:translate.timeSamples = { 0: (1, 2, 3), 1: (4, 2, 3) }\n"
       "uniform token[] xformOpOrder = [\"xformOp:translate\"]\n";
-  const auto says_motion = Contains(HasSubstr("1 BasisCurves stand as their first transform has them"));
+  const auto says_motion = Contains(HasSubstr("1 BasisCurves stands as its first transform has it"));
   EXPECT_THAT(notes_of("", moving), says_motion);
   EXPECT_THAT(notes_of("", "double3 xformOp:translate = (1, 2, 3)\n"), testing::Not(says_motion));
   const auto says_widths = Contains(HasSubstr("widths of 1 BasisCurves are negative or fit nothing"));

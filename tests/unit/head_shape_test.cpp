@@ -343,6 +343,48 @@ TEST(Placement, FurOfABodyIsNoHeadOfHair) {
   EXPECT_FALSE(is_hair_of_head(body));
 }
 
+/// Fibonacci's sphere: roots of fur all around.
+Groom ball_of_fur(int strands, float radius) {
+  Groom fur;
+  fur.offset = {0};
+  for (int i = 0; i < strands; ++i) {
+    const double y = 1.0 - (2.0 * i + 1.0) / strands, around = 2.399963 * i, across = std::sqrt(1.0 - y * y);
+    const glm::vec3 out(glm::dvec3(across * std::sin(around), y, across * std::cos(around)));
+    fur.rest_position_m.insert(fur.rest_position_m.end(), {radius * out, 1.1f * radius * out});
+    fur.pinned.insert(fur.pinned.end(), {1, 0});
+    fur.offset.push_back(static_cast<uint32_t>(fur.rest_position_m.size()));
+  }
+  return fur;
+}
+
+TEST(Placement, FurOfABallLeavesNoRoomForAFace) {
+  const Groom ball = ball_of_fur(400, 0.1f);
+  EXPECT_FALSE(is_hair_of_head(ball));
+  // Without what lies within 45 degrees of straight ahead, or below, it may be a head's.
+  EXPECT_TRUE(is_hair_of_head(picked(ball, [](const glm::vec3& p) { return p.z < 0.07f; })));
+  EXPECT_TRUE(is_hair_of_head(picked(ball, [](const glm::vec3& p) { return p.y > -0.07f; })));
+}
+
+/// The sphere through a disc may be any.
+TEST(Placement, RootsInAPlaneTakeTheUnitThatTheirHairFits) {
+  for (const auto& [unit_m, hair_m] :
+       {std::pair{1.0f, 0.25f}, {0.01f, 0.25f}, {0.001f, 0.4f}, {0.01f, 1.0f}}) {
+    Groom tail;
+    tail.offset = {0};
+    for (int i = 0; i < 200; ++i) {
+      const double out_m = 0.02 * std::sqrt((i + 0.5) / 200.0), around = 2.399963 * i;
+      const glm::dvec3 root_m(out_m * std::cos(around), 0.1, out_m * std::sin(around));
+      const glm::dvec3 tip_m = root_m + glm::dvec3(0.0, 0.6, -0.8) * static_cast<double>(hair_m);
+      tail.rest_position_m.push_back(glm::vec3(root_m) / unit_m);
+      tail.rest_position_m.push_back(glm::vec3(tip_m) / unit_m);
+      tail.offset.push_back(static_cast<uint32_t>(tail.rest_position_m.size()));
+    }
+    EXPECT_EQ(guess_unit(tail).value, unit_m) << guess_unit(tail).reason;
+    EXPECT_TRUE(is_hair_of_head(tail)) << "nothing speaks against it";
+    EXPECT_EQ(covered_head_radius(tail), 0.0f);
+  }
+}
+
 TEST(Placement, QuarterTurnsAgreeWithAnyOtherAngle) {
   GroomPlacement quarter, nearly;
   for (const float yaw_deg : {90.0f, 180.0f, -180.0f, -90.0f}) {
@@ -355,15 +397,7 @@ TEST(Placement, QuarterTurnsAgreeWithAnyOtherAngle) {
 }
 
 TEST(Placement, HairAllAroundHasNoFace) {
-  Groom fur;
-  fur.offset = {0};
-  for (int i = 0; i < 400; ++i) {
-    // Fibonacci's sphere.
-    const double y = 1.0 - (2.0 * i + 1.0) / 400.0, around = 2.399963 * i, across = std::sqrt(1.0 - y * y);
-    const glm::vec3 out(glm::dvec3(across * std::sin(around), y, across * std::cos(around)));
-    fur.rest_position_m.insert(fur.rest_position_m.end(), {out, 1.1f * out});
-    fur.offset.push_back(static_cast<uint32_t>(fur.rest_position_m.size()));
-  }
+  const Groom fur = ball_of_fur(400, 1.0f);
   EXPECT_TRUE(guess_yaw_deg(fur).reason.empty());
   EXPECT_EQ(guess_yaw_deg(fur).value, 0.0f);
   EXPECT_TRUE(guess_up(fur).reason.empty());
