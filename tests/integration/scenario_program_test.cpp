@@ -172,9 +172,10 @@ TEST_F(ScenarioProgram, OrderCoherenceAndProcessorShareAreMeasured) {
   const std::string said = text_of("said");
   EXPECT_THAT(said, AllOf(HasSubstr("3 of 6"), Not(HasSubstr("FAIL  line 6")))) << said;
   for (const char* what :
-       {"order of hair seen by a: measured 0.[0-9]+ .hair moves at [0-9.]+ m/s., wanted above 1",
-        "incoherent motion of hair seen by a: measured 0.[0-9]+ .hair moves at [0-9.]+ m/s., wanted "
-        "below 1e-06",
+       {"order of hair seen by a: measured 0.[0-9]+ over 20 moments, 0.[0-9]+ at [0-2].[0-9]+ s the worst "
+        ".hair moves at [0-9.]+ m/s., wanted above 1",
+        "incoherent motion of hair seen by a: measured 0.[0-9]+ over 20 moments, [01].[0-9]+ at "
+        "[0-2].[0-9]+ s the worst .hair moves at [0-9.]+ m/s., wanted below 1e-06",
         "processor share of the server: measured [0-9.]+, wanted below 1e-06 of one processor"})
     EXPECT_THAT(said, testing::ContainsRegex(std::string("FAIL  line 7    ") + what));
 }

@@ -5,6 +5,7 @@
 #include "client/app/clip_store.h"
 #include "client/app/mode_control.h"
 #include "client/app/notice_list.h"
+#include "client/app/scenario/scenario_run.h"
 #include "client/app/stop_signal.h"
 #include "client/app/stream_check.h"
 #include "common/base/units.h"
@@ -160,6 +161,18 @@ TEST(ModeControl, TellsWhatWasAskedWhatWasGivenAndWhatIsShownApart) {
   std::raise(SIGTERM);
   if (!stop) std::_Exit(1);
   for (std::atomic<uint64_t> turns{0};;) turns.fetch_add(1);
+}
+
+TEST(FindMetric, OfSeveralHeadsIsThatOfEach) {
+  const std::string text =
+      "# HELP a_total what it is\na_total{head=\"main\"} 0\na_total{head=\"my \\\"ben\\\"\"} 3\n"
+      "a_total_b 7\nb{head=\"main\",kind=\"k\"} 1\n";
+  using Values = std::vector<double>;
+  EXPECT_EQ(find_metric(text, "a_total"), (Values{0.0, 3.0}));
+  EXPECT_EQ(find_metric(text, "a_total{head=\"main\"}"), Values{0.0});
+  EXPECT_EQ(find_metric(text, "a_total_b"), Values{7.0});
+  EXPECT_EQ(find_metric(text, "b"), Values{}) << "its labels are part of its name";
+  EXPECT_EQ(find_metric(text, "b{head=\"main\",kind=\"k\"}"), Values{1.0});
 }
 
 TEST(StopSignal, EndsAProgramThatDoesNotLookInTime) {

@@ -445,15 +445,19 @@ Status ScenarioRun::carry_out(const ScenarioView& view) {
   ASSIGN_OR_RETURN(ClientConfig config, config_for(Role::Viewer));
   // Each of these stands alone: what was sent before does not show in it.
   if (is_lockstep_) config.hello.picture_codecs = codec_bit(PictureCodec::Jpeg);
-  const bool changes = any_work(
+  ViewerTask task;
+  task.has_changing_link = any_work(
       scenario_, [](const ScenarioWork& work) { return std::holds_alternative<ScenarioLink>(work); });
-  const LinkUse use = changes ? LinkUse::Changes : LinkUse::Stays;
-  auto viewer = ScenarioViewer::join(view, config, use);
+  task.measures_coherence = any_work(scenario_, [](const ScenarioWork& work) {
+    const auto* expect = std::get_if<ScenarioExpect>(&work);
+    return expect != nullptr && (expect->order_above || expect->incoherent_below);
+  });
+  auto viewer = ScenarioViewer::join(view, config, task);
   // A relay listens before it has found its server.
   const double end_s = elapsed_s() + (relay_ != nullptr ? kStartTimeoutS : 0.0);
   while (!viewer && elapsed_s() < end_s && go_on()) {
     std::this_thread::sleep_for(kRelayPoll);
-    viewer = ScenarioViewer::join(view, config, use);
+    viewer = ScenarioViewer::join(view, config, task);
   }
   ASSIGN_OR_RETURN(viewers_[view.name], std::move(viewer));
   viewer_order_.push_back(view.name);

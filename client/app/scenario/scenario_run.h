@@ -104,7 +104,7 @@ class ScenarioRun {
   void expect_metric(const ScenarioMetric& metric);
   void expect_back(const ScenarioExpect& expect);
   void expect_pace(const ScenarioExpect& expect);
-  void expect_coherence(const ScenarioExpect& expect);
+  void expect_coherence(const std::string& name, const SeenCoherence& seen, const ScenarioExpect& expect);
   void expect_slow_motion(const ScenarioExpect& expect);
   void expect_mode(const ScenarioExpect& expect);
   /// Waits until `condition` holds; returns false if it does not within `seconds`.
@@ -160,7 +160,7 @@ class ScenarioRun {
   std::set<std::filesystem::path> renewed_;  // goldens
 };
 
-/// Returns the value of a line of /metrics; none where there is no such line.
+/// Returns the value of a line of /metrics, of several heads that of each; none where there is no such line.
 std::vector<double> find_metric(const std::string& text, const std::string& name);
 
 /// Draws what a viewer has received, as the viewer's window would.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <future>
 #include <limits>
+#include <tuple>
 #include <utility>
 
 #include "client/app/view_options.h"
@@ -20,6 +21,7 @@ using std::chrono::milliseconds;
 constexpr milliseconds kScenarioPumpWait{5};
 constexpr int64_t kReportNs = 1'000'000'000;
 constexpr double kBytesPerMbit = 125e3;
+constexpr int64_t kMomentNs = 100'000'000;  // between two of coherence, as strandcast-report takes them
 
 chaos::LinkPlan plan_of(double loss, double delay_ms) {
   chaos::LinkPlan plan;
@@ -29,8 +31,8 @@ chaos::LinkPlan plan_of(double loss, double delay_ms) {
 }
 
 Result<std::unique_ptr<chaos::ChaosRelay>> make_link(const ScenarioView& view, const Address& server,
-                                                     LinkUse use) {
-  if (use == LinkUse::Stays && view.link_mbit <= 0.0 && view.delay_ms <= 0.0)
+                                                     ViewerTask task) {
+  if (!task.has_changing_link && view.link_mbit <= 0.0 && view.delay_ms <= 0.0)
     return std::unique_ptr<chaos::ChaosRelay>();
   chaos::RelayConfig config;
   config.to_host = server.host;
@@ -49,8 +51,8 @@ DrawingDevice device_of(const std::string& draws) {
 }  // namespace
 
 Result<std::unique_ptr<ScenarioViewer>> ScenarioViewer::join(const ScenarioView& view, ClientConfig config,
-                                                             LinkUse use) {
-  ASSIGN_OR_RETURN(auto relay, make_link(view, config.address, use));
+                                                             ViewerTask task) {
+  ASSIGN_OR_RETURN(auto relay, make_link(view, config.address, task));
   if (relay != nullptr) config.address = {"127.0.0.1", relay->port(), config.address.is_tls};
   ASSIGN_OR_RETURN(config.hello.mode, parse_mode(view.mode));
   config.hello.name = "scenario " + view.name;
@@ -58,7 +60,7 @@ Result<std::unique_ptr<ScenarioViewer>> ScenarioViewer::join(const ScenarioView&
   config.hello.frame_height = view.height;
   config.hello.codec_wish = view.codec;
   config.hello.step_ns = measured_step_ns();
-  std::unique_ptr<ScenarioViewer> viewer(new ScenarioViewer(view, std::move(relay)));
+  std::unique_ptr<ScenarioViewer> viewer(new ScenarioViewer(view, task, std::move(relay)));
   auto joined = std::make_shared<std::promise<Status>>();
   viewer->thread_ = std::thread([self = viewer.get(), config = std::move(config), joined] {
     name_thread("viewer");
@@ -102,9 +104,10 @@ void ScenarioViewer::run(LiveConnection& live) {
 void ScenarioViewer::watch(ViewerSession& session) {
   measured_asset_.reset();
   last_sim_time_ns_ = 0;
+  last_state_ = nullptr;
   {
     const std::lock_guard lock(mutex_);
-    last_state_ = state_before_ = nullptr;
+    next_moment_ns_ = 0;
   }
   session.set_snapshot_listener([this, &session](const auto& state) { take(session, state); });
 }
@@ -180,6 +183,7 @@ void ScenarioViewer::take(ViewerSession& session, const std::shared_ptr<const Sn
     }
   }
   const double mps = head_mps(*state);
+  measure_moment(state);
   const std::lock_guard lock(mutex_);
   look_.largest_head_mps = std::max(look_.largest_head_mps, mps);
   look_.tick = state->tick;
@@ -192,26 +196,38 @@ void ScenarioViewer::take(ViewerSession& session, const std::shared_ptr<const Sn
   }
   look_.stretch_grain = grain;
   look_.bound_m = bound_m;
-  state_before_ = std::exchange(last_state_, state);
 }
 
-std::optional<Coherence> ScenarioViewer::coherence() const {
-  std::shared_ptr<const Snapshot> before, now;
+/// With the state before it.
+void ScenarioViewer::measure_moment(const std::shared_ptr<const Snapshot>& state) {
+  if (!task_.measures_coherence) return;
+  const std::shared_ptr<const Snapshot> before = std::exchange(last_state_, state);
+  if (before == nullptr || before->strand_count != state->strand_count ||
+      before->vertex_count != state->vertex_count || before->sim_time_ns >= state->sim_time_ns)
+    return;
   {
     const std::lock_guard lock(mutex_);
-    before = state_before_;
-    now = last_state_;
+    if (state->sim_time_ns < next_moment_ns_) return;
+    next_moment_ns_ = state->sim_time_ns + kMomentNs;
   }
-  if (before == nullptr || before->strand_count != now->strand_count ||
-      before->vertex_count != now->vertex_count || before->sim_time_ns >= now->sim_time_ns)
-    return std::nullopt;
-  const double passed_s = static_cast<double>(now->sim_time_ns - before->sim_time_ns) * kSPerNs;
-  const std::vector<glm::vec3> from_m = positions_in_head(*before), to_m = positions_in_head(*now);
+  const double passed_s = static_cast<double>(state->sim_time_ns - before->sim_time_ns) * kSPerNs;
+  const std::vector<glm::vec3> from_m = positions_in_head(*before), to_m = positions_in_head(*state);
   const std::vector<glm::dvec3> position_m(to_m.begin(), to_m.end());
   std::vector<glm::dvec3> velocity_mps(position_m.size());
   for (size_t i = 0; i < position_m.size(); ++i)
     velocity_mps[i] = (position_m[i] - glm::dvec3(from_m[i])) / passed_s;
-  return measure_coherence({now->strand_count, now->vertex_count, position_m, velocity_mps});
+  const Coherence moment =
+      measure_coherence({state->strand_count, state->vertex_count, position_m, velocity_mps});
+  const double time_s = static_cast<double>(state->sim_time_ns) * kSPerNs;
+  const double share = moment.incoherent_share(), order = moment.order();
+  const std::lock_guard lock(mutex_);
+  SeenCoherence& seen = look_.coherence;
+  seen.all += moment;
+  const bool is_first = seen.moment_count++ == 0;
+  if (is_first || share > seen.worst_share)
+    std::tie(seen.worst_share, seen.worst_share_s) = std::pair(share, time_s);
+  if (is_first || order < seen.least_order)
+    std::tie(seen.least_order, seen.least_order_s) = std::pair(order, time_s);
 }
 
 ViewerLook ScenarioViewer::look() const {
@@ -240,6 +256,8 @@ void ScenarioViewer::begin_measure() {
   look_.largest_stretch = 0.0;
   look_.stretch_place = {};
   look_.largest_head_mps = 0.0;
+  look_.coherence = {};
+  next_moment_ns_ = 0;
 }
 
 }  // namespace strandcast

@@ -37,6 +37,14 @@ struct StretchPlace {
   uint64_t tick = 0;
 };
 
+/// Coherence of the first state with the one before, and so on every tenth of a second.
+struct SeenCoherence {
+  Coherence all;  // summed, as strandcast-report coherence sums its moments
+  uint32_t moment_count = 0;
+  double worst_share = 0.0, worst_share_s = 0.0;  // of a moment, and when, simulated
+  double least_order = 1.0, least_order_s = 0.0;  // likewise
+};
+
 /// State of the viewer at one moment.
 struct ViewerLook {
   ViewerCounts counts;
@@ -52,6 +60,7 @@ struct ViewerLook {
   double stretch_grain = 0.0;     // no finer than this is seen, through the bound of the stream
   double bound_m = 0.0;           // that bound
   double largest_head_mps = 0.0;  // likewise, between two states; infinite for what is no number
+  SeenCoherence coherence;        // likewise, where the task says so
   std::string codec;
 };
 
@@ -64,15 +73,18 @@ struct ViewerPicture {
   StreamMode mode = StreamMode::Strands;
 };
 
-/// Whether a viewer's link is the same from the start to the end.
-enum class LinkUse { Stays, Changes };
+/// What the rest of the scenario asks of a viewer.
+struct ViewerTask {
+  bool has_changing_link = false;
+  bool measures_coherence = false;
+};
 
 class ScenarioViewer {
  public:
   /// Connects, through a relay if the link is limited or changes; errors as
   /// ViewerSession::open().
   static Result<std::unique_ptr<ScenarioViewer>> join(const ScenarioView& view, ClientConfig config,
-                                                      LinkUse use);
+                                                      ViewerTask task);
   ~ScenarioViewer();
   ScenarioViewer(const ScenarioViewer&) = delete;
   ScenarioViewer& operator=(const ScenarioViewer&) = delete;
@@ -81,26 +93,26 @@ class ScenarioViewer {
   const ScenarioView& view() const { return view_; }
   ViewerLook look() const;
   ViewerPicture picture() const;
-  /// Measures the last state with the one before; empty before there are two of one server.
-  std::optional<Coherence> coherence() const;
-  /// Restarts the measurement of the largest stretch and speed.
+  /// Restarts the measurement of stretch, speed and coherence.
   void begin_measure();
   /// Puts another line in the place of the one that it has. The viewer must have joined with
-  /// LinkUse::Changes.
+  /// a changing link.
   void change_link(const ScenarioLink& link);
 
  private:
-  ScenarioViewer(ScenarioView view, std::unique_ptr<chaos::ChaosRelay> relay)
-      : view_(std::move(view)), relay_(std::move(relay)) {}
+  ScenarioViewer(ScenarioView view, ViewerTask task, std::unique_ptr<chaos::ChaosRelay> relay)
+      : view_(std::move(view)), task_(task), relay_(std::move(relay)) {}
   void run(LiveConnection& live);
   void watch(ViewerSession& session);
   ViewerCounts counts_of(ViewerSession& session) const;
   void note(LiveConnection& live);
   void take(ViewerSession& session, const std::shared_ptr<const Snapshot>& state);
   double head_mps(const Snapshot& state);
+  void measure_moment(const std::shared_ptr<const Snapshot>& state);
   void measure_rest(const std::shared_ptr<const SceneAsset>& asset);
 
   const ScenarioView view_;
+  const ViewerTask task_;
   const std::unique_ptr<chaos::ChaosRelay> relay_;  // null: straight to the server
 
   // Of the thread.
@@ -109,9 +121,10 @@ class ScenarioViewer {
   std::vector<float> rest_length_m_;  // (vertex_count - 1 x strand_count)
   Pose last_world_from_head_;
   int64_t last_sim_time_ns_ = 0;  // 0 = none
+  std::shared_ptr<const Snapshot> last_state_;
 
-  mutable std::mutex mutex_;  // guards the block below
-  std::shared_ptr<const Snapshot> last_state_, state_before_;
+  mutable std::mutex mutex_;    // guards the block below
+  int64_t next_moment_ns_ = 0;  // simulated
   ViewerLook look_;
   ViewerPicture picture_;
   std::atomic<bool> is_leaving_{false};
