@@ -236,9 +236,10 @@ HeldEnds held_ends(std::span<const uint8_t> pins) {
           static_cast<size_t>(std::find_if(pins.rbegin(), pins.rend(), is_free) - pins.rbegin())};
 }
 
-/// A simulation pins all strands alike: at each end as many vertices as most of them, of equally many the
-/// fewer. Returns what to say of strands that pin others; empty if there are none.
-std::string pin_alike(Groom& groom) {
+/// A simulation pins all roots alike, as many vertices as most of them do, of equally many the fewer. A tip
+/// is free or held: then by as many vertices as most held ones. Returns what to say of strands that pin
+/// others, and of tips of both kinds.
+std::vector<std::string> settle_pins(Groom& groom) {
   const size_t count = groom.vertex_count(0);
   const auto pins_of = [&](uint32_t strand) {
     return std::span(groom.pinned).subspan(groom.offset[strand], groom.vertex_count(strand));
@@ -249,26 +250,37 @@ std::string pin_alike(Groom& groom) {
     ++roots[ends.root];
     ++tips[ends.tip];
   }
-  const auto most = [](const std::vector<size_t>& strands) {
+  const auto most = [](std::span<const size_t> strands) {
     return static_cast<size_t>(std::max_element(strands.begin(), strands.end()) - strands.begin());
   };
-  const HeldEnds held{most(roots), most(tips)};
-  size_t changed = 0;
+  const size_t free_count = tips[0];
+  tips[0] = 0;
+  HeldEnds held{most(roots), most(tips)};
+  // Where nothing would be left to move beside strands that do, no tip is held.
+  if (free_count > 0 && held.root + held.tip >= count) held.tip = 0;
+  size_t changed = 0, tied = 0;
   for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
     const auto pins = pins_of(strand);
+    const size_t tip = held_ends(pins).tip > 0 ? held.tip : 0;
     bool is_other = false;
     for (size_t i = 0; i < count; ++i) {
-      const uint8_t pin = i < held.root || i + held.tip >= count ? 1 : 0;
+      const uint8_t pin = i < held.root || i + tip >= count ? 1 : 0;
       is_other = is_other || pin != pins[i];
       pins[i] = pin;
     }
     changed += is_other ? 1 : 0;
+    tied += tip > 0 ? 1 : 0;
   }
-  if (changed == 0) return {};
-  return fmt::format(
-      "{} of {} strands hold other vertices than most: {} at the root and {} at the tip are held of all now "
-      "(groom.file.pinning states it)",
-      changed, groom.strand_count(), held.root, held.tip);
+  std::vector<std::string> said;
+  if (changed > 0)
+    said.push_back(
+        fmt::format("{} of {} strands hold other vertices than most: {} at the root and {} at held "
+                    "tips are held now (groom.file.pinning states it)",
+                    changed, groom.strand_count(), held.root, held.tip));
+  if (tied > 0 && tied < groom.strand_count())
+    said.push_back(fmt::format("the tips of {} of {} strands are held, the others are free", tied,
+                               groom.strand_count()));
+  return said;
 }
 
 /// What strands can be made of; the rest is left out and named.
@@ -433,7 +445,7 @@ Result<PlacedGroom> load_placed_groom(const GroomFileOptions& options) {
     placed.groom = resample(placed.groom, vertex_count);
   }
   if (options.pinning) placed.groom = with_pinning(std::move(placed.groom), *options.pinning);
-  if (std::string freed = pin_alike(placed.groom); !freed.empty()) placed.notes.push_back(std::move(freed));
+  for (std::string& note : settle_pins(placed.groom)) placed.notes.push_back(std::move(note));
   placed.notes.push_back(fmt::format("{} strands x {} vertices, {}", placed.groom.strand_count(),
                                      placed.groom.uniform_vertex_count(), size_text(placed.groom)));
   return placed;

@@ -47,6 +47,8 @@ struct StepModel {
   uint32_t vertex_count = 0;
   uint32_t pinned_root_count = 1;
   uint32_t pinned_tail_count = 0;
+  std::vector<uint8_t>
+      has_tail;  // (strand_count) 1 = those are pinned, 0 = its tip is free; empty: all alike
   // What the kernel reads besides, (rows x strand_count), strand fastest; empty where it has no such plane.
   std::vector<glm::vec4> rod_edge;    // (vertex_count x strand_count)
   std::vector<glm::vec4> rod_strand;  // (kRodStrandRows x strand_count)
@@ -58,6 +60,9 @@ struct StepModel {
   bool meets_body = false;
   std::shared_ptr<const ToldField> field;  // null: none
 
+  bool has_free_tips() const { return !has_tail.empty() || pinned_tail_count == 0; }
+  /// First vertex that is pinned at the tip of every strand.
+  uint32_t free_end() const { return vertex_count - (has_tail.empty() ? pinned_tail_count : 0); }
   bool has_passes() const { return bend || drag_along_share != 1.0 || meets_body || field != nullptr; }
 };
 /// A volume that is finer is not told of: strands are predicted without it.

@@ -115,6 +115,13 @@ KernelDesc body_collider_kernel(int memory) {
   return kernel;
 }
 
+KernelDesc put_back_kernel(Tips of) {
+  KernelDesc kernel = pass_kernel("sim/put_back.comp");
+  kernel.variant = {{"HAS_PINNED_TAIL", of == Tips::Pinned ? 1 : 0}};
+  kernel.meets_air = kernel.meets_colliders = false;
+  return kernel;
+}
+
 std::vector<glm::vec4> body_table(const BodyInput& body, double h_s, bool is_new) {
   std::vector<glm::vec4> table(kBodyTableSize, glm::vec4(0.0f));
   const size_t capsule_count = std::min(body.capsules.size(), kMaxBodyCapsules);

@@ -14,6 +14,13 @@
 
 namespace strandcast {
 
+/// Whether the last vertices of strands follow the head.
+enum class Tips : uint8_t { Free, Pinned };
+inline constexpr Tips kBothTips[] = {Tips::Free, Tips::Pinned};
+constexpr Tips other(Tips tips) {
+  return tips == Tips::Free ? Tips::Pinned : Tips::Free;
+}
+
 /// What of a model goes along when a pass moves strands (MEMORY of shaders/sim/carried.glsl).
 constexpr int pass_memory(bool has_way, bool has_axis) {
   return has_axis ? 2 : has_way ? 1 : 0;
@@ -45,6 +52,10 @@ struct FieldGrid {
 KernelDesc field_collider_kernel(const FieldGrid& grid, int memory);
 
 KernelDesc body_collider_kernel(int memory);
+
+/// Strands whose tips are pinned, or free, get back what a plane had (shaders/sim/put_back.comp). The model's
+/// kernel and the passes around it run once for each kind, where a groom has both.
+KernelDesc put_back_kernel(Tips of);
 /// The shapes as the kernel looks them up, with every number held to the limits of a step.
 std::vector<glm::vec4> body_table(const BodyInput& body, double h_s, bool is_new);
 extern const size_t kBodyTableSize;

@@ -20,7 +20,7 @@ class BendLimit {
                                 const CarriedPlanes& carried, const BendLimitDesc& limits);
 
   /// Returns whether the pass moves strands of this layout.
-  static bool holds(const StrandLayout& layout) { return layout.pinned_tail_count == 0; }
+  static bool holds(const StrandLayout& layout) { return layout.has_free_tips(); }
   /// Runs the pass after a substep; `strands` are the planes of the state.
   void run(const StepBlock& step, BoundPlanes strands, const CarriedPlanes& carried);
   uint64_t size_bytes() const { return program_->size_bytes(); }

@@ -20,7 +20,7 @@ class BodyCollider {
 
   /// Returns whether the pass moves strands of this layout.
   static bool holds(const StrandLayout& layout) {
-    return layout.pinned_tail_count == 0 && layout.pinned_root_count < layout.vertex_count;
+    return layout.has_free_tips() && layout.pinned_root_count < layout.vertex_count;
   }
   /// Runs the pass after the substep `step`, which was made of `input`; `strands` are the planes of the
   /// state.

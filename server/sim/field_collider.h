@@ -22,7 +22,7 @@ class FieldCollider {
 
   /// Returns whether the pass moves strands of this layout.
   static bool holds(const StrandLayout& layout) {
-    return layout.pinned_tail_count == 0 && layout.pinned_root_count < layout.vertex_count;
+    return layout.has_free_tips() && layout.pinned_root_count < layout.vertex_count;
   }
   /// Runs the pass after the substep `step`; `strands` are the planes of the state.
   void run(const StepBlock& step, BoundPlanes strands, const CarriedPlanes& carried);

@@ -13,7 +13,7 @@ Result<FollicleLimit> FollicleLimit::make(Executor& executor, const SceneFeature
 }
 
 bool FollicleLimit::holds(const StepInput& input, const StrandLayout& layout) {
-  return has_follicle_limit(input) && layout.pinned_tail_count == 0 &&
+  return has_follicle_limit(input) && layout.has_free_tips() &&
          layout.pinned_root_count < layout.vertex_count;
 }
 

@@ -35,6 +35,7 @@ Status KernelSolver::prepare_all() {
   // Gusts pull by the model's own drag alone.
   of_model.has_turbulence = features_.has_turbulence && parameters_.air_drag_per_s > 0.0;
   ASSIGN_OR_RETURN(program_, executor_.make_program(kernel(), of_model, layout()));
+  if (layout().is_mixed()) RETURN_IF_ERROR(prepare_mixed(of_model));
   if (features_.has_follicle_limit) {
     ASSIGN_OR_RETURN(follicle_limit_, FollicleLimit::make(executor_, features_, layout(), carried()));
   }
@@ -60,6 +61,22 @@ Status KernelSolver::prepare_all() {
   return {};
 }
 
+Status KernelSolver::prepare_mixed(const SceneFeatures& of_model) {
+  KernelDesc free_tips = kernel();
+  free_tips.variant["HAS_PINNED_TAIL"] = 0;
+  ASSIGN_OR_RETURN(free_tips_program_, executor_.make_program(free_tips, of_model, layout()));
+  ASSIGN_OR_RETURN(mixed_tips_, MixedTips::make(executor_, features_, layout(), moving()));
+  return {};
+}
+
+BoundPlanes KernelSolver::moving() const {
+  BoundPlanes planes = strands_->planes();
+  bind(planes);
+  for (const PlaneRole role : {PlaneRole::Rest, PlaneRole::RodEdge, PlaneRole::RodStrand})
+    plane_of(planes, role) = nullptr;
+  return planes;
+}
+
 Status KernelSolver::load(const Groom& groom, const glm::dquat& world_from_head_rotation) {
   RETURN_IF_ERROR(strands_->load(groom, world_from_head_rotation));
   RETURN_IF_ERROR(prepare_all());
@@ -82,23 +99,36 @@ void KernelSolver::gather(const StepInput& input) {
 
 void KernelSolver::substep(const StepInput& input) {
   adapt(input);
-  const StepBlock block = make_step_block(input, parameters_, layout().counts(), strands_->head());
-  if (volume_forces_) {
-    if (input.renews_volume) gather(input);
-    has_gathered_ = false;
-    volume_forces_->apply(block, *strands_, carried().way);
+  if (input.renews_volume) gather(input);
+  has_gathered_ = false;
+  if (!mixed_tips_) {
+    run(input, layout().has_free_tips() ? Tips::Free : Tips::Pinned, *program_);
+  } else {
+    const StepBlock block = make_step_block(input, parameters_, layout().counts(), strands_->head());
+    for (const Tips tips : kBothTips) {
+      mixed_tips_->keep(other(tips), block, moving());
+      run(input, tips, tips == Tips::Free ? *free_tips_program_ : *program_);
+      mixed_tips_->put_back(other(tips), block, moving());
+    }
   }
+  strands_->advance(input);
+}
+
+void KernelSolver::run(const StepInput& input, Tips tips, KernelProgram& program) {
+  const StepBlock block = make_step_block(input, parameters_, layout().counts(tips), strands_->head());
+  if (volume_forces_) volume_forces_->apply(block, *strands_, carried().way);
   if (oriented_drag_) oriented_drag_->run(block, strands_->planes(), carried().way);
   BoundPlanes planes = strands_->planes();
   bind(planes);
-  program_->run(block, input.colliders.size(), planes);
+  program.run(block, input.colliders.size(), planes);
+  // Two ends hold the others.
+  if (tips == Tips::Pinned) return;
   if (bend_limit_) bend_limit_->run(block, strands_->planes(), carried());
   if (follicle_limit_ && FollicleLimit::holds(input, layout()))
     follicle_limit_->run(block, input.colliders.size(), strands_->planes(), carried());
   if (body_collider_) body_collider_->run(block, input, strands_->planes(), carried());
   // Last: whatever turned them, strands end outside of the head.
   if (field_collider_) field_collider_->run(block, strands_->planes(), carried());
-  strands_->advance(input);
 }
 
 // A strand that is written as it was read goes on as if nothing had happened; another one starts anew.
@@ -128,6 +158,7 @@ std::shared_ptr<const StepModel> KernelSolver::step_model() {
   model->vertex_count = layout().vertex_count;
   model->pinned_root_count = layout().pinned_root_count;
   model->pinned_tail_count = layout().pinned_tail_count;
+  model->has_tail = layout().has_tail;
   BoundPlanes planes{};
   bind(planes);
   if (const StrandPlane* edge = plane_of(planes, PlaneRole::RodEdge)) edge->read(model->rod_edge);
@@ -138,6 +169,7 @@ std::shared_ptr<const StepModel> KernelSolver::step_model() {
 uint64_t KernelSolver::memory_bytes() const {
   uint64_t bytes = strands_->memory_bytes() + model_bytes();
   if (program_) bytes += program_->size_bytes();
+  if (mixed_tips_) bytes += free_tips_program_->size_bytes() + mixed_tips_->size_bytes();
   if (follicle_limit_) bytes += follicle_limit_->size_bytes();
   if (oriented_drag_) bytes += oriented_drag_->size_bytes();
   if (bend_limit_) bytes += bend_limit_->size_bytes();

@@ -14,6 +14,7 @@
 #include "server/sim/body_collider.h"
 #include "server/sim/field_collider.h"
 #include "server/sim/follicle_limit.h"
+#include "server/sim/mixed_tips.h"
 #include "server/sim/oriented_drag.h"
 #include "server/sim/solver_registry.h"
 #include "server/sim/strand_state.h"
@@ -68,12 +69,21 @@ class KernelSolver : public Solver {
 
  private:
   Status prepare_all();
+  /// Prepares what strands of two kinds need.
+  Status prepare_mixed(const SceneFeatures& of_model);
+  /// Returns the planes that kernels write.
+  BoundPlanes moving() const;
+  /// Runs a substep's kernels for strands of this kind.
+  void run(const StepInput& input, Tips tips, KernelProgram& program);
 
   Executor& executor_;
   std::shared_ptr<StrandState> strands_;
   StrandParameters parameters_;
   SceneFeatures features_;
   std::unique_ptr<KernelProgram> program_;
+  // Where strands of both kinds are: program_ is that of pinned tips.
+  std::unique_ptr<KernelProgram> free_tips_program_;
+  std::optional<MixedTips> mixed_tips_;
   std::optional<FollicleLimit> follicle_limit_;  // where the scene has one
   VolumeDesc volume_;
   std::shared_ptr<const Groom> volume_target_;

@@ -38,9 +38,14 @@ void ReferenceSolver::substep(const StepInput& input) {
   step.before = head_;
   on_step(step);
   const size_t n = layout_.vertex_count;
-  for (uint32_t s = 0; s < layout_.strand_count; ++s)
+  const uint32_t tail_count = layout_.pinned_tail_count;
+  for (uint32_t s = 0; s < layout_.strand_count; ++s) {
+    // Models see what this strand pins.
+    layout_.pinned_tail_count = layout_.is_mixed() && layout_.has_tail[s] == 0 ? 0 : tail_count;
     step_strand(step, s, std::span(position_m_).subspan(s * n, n),
                 std::span(velocity_mps_).subspan(s * n, n));
+  }
+  layout_.pinned_tail_count = tail_count;
   if (has_follicle_limit(input)) hold_roots(step);
   head_.advance(input);
   is_at_rest_ = false;
@@ -50,8 +55,9 @@ void ReferenceSolver::substep(const StepInput& input) {
 void ReferenceSolver::hold_roots(const ReferenceStep& step) {
   const uint32_t first = layout_.pinned_root_count;
   const size_t n = layout_.vertex_count;
-  if (layout_.pinned_tail_count > 0 || first >= n) return;
+  if (first >= n) return;
   for (uint32_t s = 0; s < layout_.strand_count; ++s) {
+    if (layout_.tail_count(s) > 0) continue;
     ReferenceRoot root;
     root.groomed = step.rotation * (glm::dvec3(layout_.rest[layout_.index(first, s)]) -
                                     glm::dvec3(layout_.rest[layout_.index(first - 1, s)]));

@@ -81,25 +81,41 @@ void fill_strand(const Groom& groom, uint32_t strand_index, StrandLayout& layout
   }
 }
 
+/// Roots alike; tips free, or with as many pinned vertices as others.
+Status set_pins(const Groom& groom, StrandLayout& layout) {
+  uint32_t tail_total = 0;
+  for (uint32_t i = 0; i < layout.strand_count; ++i) {
+    ASSIGN_OR_RETURN(const PinnedRuns runs, read_pinned_runs(groom, i));
+    if (i == 0) layout.pinned_root_count = runs.root_count;
+    if (layout.pinned_tail_count == 0) layout.pinned_tail_count = runs.tail_count;
+    const bool has_tail = runs.tail_count > 0;
+    if (runs.root_count != layout.pinned_root_count ||
+        (has_tail && runs.tail_count != layout.pinned_tail_count)) {
+      return make_error(ErrorCode::BadInput,
+                        "groom '{}': strand {} pins {} + {} vertices but others pin {} + {}; strands must "
+                        "agree, but tips may be free",
+                        groom.name, i, runs.root_count, runs.tail_count, layout.pinned_root_count,
+                        layout.pinned_tail_count);
+    }
+    layout.has_tail.push_back(has_tail ? 1 : 0);
+    tail_total += has_tail ? 1 : 0;
+  }
+  if (tail_total == 0 || tail_total == layout.strand_count) layout.has_tail = {};
+  if (layout.is_mixed() && layout.pinned_root_count >= layout.tail_begin())
+    return make_error(ErrorCode::BadInput,
+                      "groom '{}' pins all vertices of some strands but not of others; free their tips",
+                      groom.name);
+  return {};
+}
+
 }  // namespace
 
 Result<StrandLayout> make_strand_layout(const Groom& groom, uint32_t most_vertices) {
   RETURN_IF_ERROR(check_shape(groom, most_vertices));
-  ASSIGN_OR_RETURN(const PinnedRuns first, read_pinned_runs(groom, 0));
-  for (uint32_t i = 1; i < groom.strand_count(); ++i) {
-    ASSIGN_OR_RETURN(const PinnedRuns runs, read_pinned_runs(groom, i));
-    if (runs.root_count != first.root_count || runs.tail_count != first.tail_count) {
-      return make_error(
-          ErrorCode::BadInput,
-          "groom '{}': strand {} pins {} + {} vertices but strand 0 pins {} + {}; all strands must agree",
-          groom.name, i, runs.root_count, runs.tail_count, first.root_count, first.tail_count);
-    }
-  }
   StrandLayout layout;
   layout.strand_count = groom.strand_count();
   layout.vertex_count = groom.vertex_count(0);
-  layout.pinned_root_count = first.root_count;
-  layout.pinned_tail_count = first.tail_count;
+  RETURN_IF_ERROR(set_pins(groom, layout));
   const size_t total = static_cast<size_t>(layout.strand_count) * layout.vertex_count;
   layout.rest.resize(total);
   layout.arc.resize(total);

@@ -1,5 +1,6 @@
 // Laws that every row of the solver table keeps, on the GPU and in double.
 #include <algorithm>
+#include <array>
 
 #include "tests/support/solver_bounds.h"
 #include "tests/support/solver_fixture.h"
@@ -253,6 +254,38 @@ TEST_F(SolverLaws, TheOrderOfStrandsChangesNoBit) {
         ASSERT_EQ(state.position_m[i * strand_count + s], expected.position_m[i * strand_count + source]);
         ASSERT_EQ(state.velocity_mps[i * strand_count + s], expected.velocity_mps[i * strand_count + source]);
       }
+    }
+  }
+}
+
+/// Some tips are tied and others free: each strand moves as in a groom of its own kind, to the bit.
+TEST_F(SolverLaws, StrandsOfBothKindsOfTipsMoveAsAmongTheirOwn) {
+  const std::array<Groom, 2> alike = {make_law_groom(), make_law_groom({.pinning = Pinning::BothEnds})};
+  Groom mixed = alike[0];
+  const auto kind_of = [](uint32_t strand) { return strand % 3 == 1 ? 1u : 0u; };
+  for (uint32_t s = 0; s < mixed.strand_count(); ++s)
+    std::copy_n(alike[kind_of(s)].pinned.begin() + mixed.offset[s], mixed.vertex_count(s),
+                mixed.pinned.begin() + mixed.offset[s]);
+  SceneFeatures features = all_features();
+  features.has_follicle_limit = features.has_oriented_drag = true;
+  for (const SolverKind& kind : kinds_of_long_tests()) {
+    SCOPED_TRACE(kind.name());
+    const auto moved = [&](const Groom& groom) {
+      auto solver = make(kind, groom, {}, {1.0, 0.0, 0.0, 0.0}, features);
+      for (int step = 1; step <= 12; ++step) {
+        StepInput input = moving_input(step, kSubstepS);
+        input.follicle_limit_rad = 0.1;
+        solver->substep(input);
+      }
+      return read(*solver);
+    };
+    const SolverState state = moved(mixed);
+    const std::array<SolverState, 2> expected = {moved(alike[0]), moved(alike[1])};
+    EXPECT_GT(largest_distance_m(expected[0].position_m, expected[1].position_m), 0.01);
+    for (size_t at = 0; at < state.position_m.size(); ++at) {
+      const auto strand = static_cast<uint32_t>(at % mixed.strand_count());
+      ASSERT_EQ(state.position_m[at], expected[kind_of(strand)].position_m[at]) << strand;
+      ASSERT_EQ(state.velocity_mps[at], expected[kind_of(strand)].velocity_mps[at]) << strand;
     }
   }
 }

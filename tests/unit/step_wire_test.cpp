@@ -230,6 +230,29 @@ TEST(StepWire, WhatIsReadIsWhatWasWritten) {
     EXPECT_NEAR(model->rod_strand[i].w / trail.model->rod_strand[i].w, 1.0f, 1e-3f);
 }
 
+// Which tips are pinned is told by strand; rods of both kinds follow from it.
+TEST(StepWire, TipsArePinnedByStrand) {
+  SteppedHair hair = walking_hair("direct_rod");
+  StepModel mixed = *hair.step().snapshot.trail->model;
+  mixed.pinned_tail_count = 2;
+  for (uint32_t s = 0; s < kStrands; ++s) mixed.has_tail.push_back(s % 3 == 0 ? 1 : 0);
+  const auto read_model = [&](ByteReader& reader) {
+    return step::read_model(reader, hair.rest_in_head_m(), kStrands, kVertices);
+  };
+  std::vector<std::byte> bytes;
+  step::write_model(mixed, hair.rest_in_head_m(), kStrands, bytes);
+  ByteReader reader(bytes);
+  const auto model = read_model(reader);
+  ASSERT_TRUE(model) << model.error().to_string();
+  EXPECT_TRUE(reader.rest().empty());
+  EXPECT_EQ(model->has_tail, mixed.has_tail);
+  EXPECT_EQ(model->pinned_tail_count, 2u);
+  EXPECT_EQ(code_of(bytes, 3, uint8_t{0}, read_model), ErrorCode::BadInput) << "pins nothing";
+  bytes.resize(5);
+  ByteReader cut(bytes);
+  EXPECT_EQ(read_model(cut).error().code, ErrorCode::BadInput);
+}
+
 // Joints of a rod whose rest shape carries its weight follow from that weight.
 TEST(StepWire, TellsRodsBesideTheirWeight) {
   constexpr size_t kMostBytesAStrand = 24;  // of 14 joints and a clamp

@@ -315,7 +315,7 @@ void Predictor::find_history(const StepInput& first) {
   const auto found = [&](PlaneRole role) -> const StrandBlocks& {
     return *known.planes[static_cast<size_t>(role)];
   };
-  const uint32_t tail = model_.vertex_count - model_.pinned_tail_count;
+  const uint32_t tail = model_.free_end();
   for_rows([&](uint32_t block, uint32_t v) {
     const bool is_free = v >= model_.pinned_root_count && v < tail;
     const float half_s = is_free ? kHalf * seconds : 0.0f;

@@ -94,15 +94,35 @@ Status Predictor::prepare() {
     if (role != PlaneRole::RodAxis || has_twist) at(state_.planes, role) = make(vertex_count);
   fill_rest();
   fill_fixed();
+  if (!model_.has_tail.empty()) RETURN_IF_ERROR(prepare_mixed(set));
   RETURN_IF_ERROR(prepare_passes(set));
   return tells_volume(model_) ? prepare_volume(set) : Status{};
+}
+
+Status Predictor::prepare_mixed(simd::InstructionSet set) {
+  KernelDesc free_tips = model_.kernel;
+  free_tips.variant["HAS_PINNED_TAIL"] = 0;
+  const LaneKernel* kernel = find_lane_kernel(free_tips, set);
+  if (kernel == nullptr)
+    return make_error(ErrorCode::Unsupported, "this build has no {} for this processor to predict with",
+                      free_tips.shader_path);
+  LaneWork work{places_, model_.vertex_count, true, true, &ground_.workers, ground_.priority};
+  work.has_turbulence = model_.parameters.air_drag_per_s > 0.0;
+  free_tips_program_.emplace(*kernel, free_tips, work);
+  std::vector<uint8_t> has_tail;
+  for (uint32_t place = 0; place < places_; ++place) {
+    const uint32_t strand = ground_.layout.strand_at[place];
+    has_tail.push_back(model_.has_tail[strand == kNoStrand ? ground_.layout.strand_at[0] : strand]);
+  }
+  ASSIGN_OR_RETURN(mixed_tips_, TipMask::make(has_tail, state_.planes, set, work));
+  return {};
 }
 
 /// Strands whose tips are held are left alone by all but the drag, as in the simulation.
 Status Predictor::prepare_passes(simd::InstructionSet set) {
   const bool has_twist = model_.kernel.variant_of("HAS_TWIST") != 0;
   const int memory = pass_memory(kernel_.carries_way, kernel_.carries_way && has_twist);
-  const bool has_free_tips = model_.pinned_tail_count == 0 && model_.pinned_root_count < model_.vertex_count;
+  const bool has_free_tips = model_.has_free_tips() && model_.pinned_root_count < model_.vertex_count;
   const auto make = [&](const KernelDesc& desc, std::optional<LaneProgram>& program) -> Status {
     const LaneKernel* kernel = find_lane_kernel(desc, set);
     if (kernel == nullptr)
@@ -162,12 +182,13 @@ Status Predictor::prepare_volume(simd::InstructionSet set) {
   return {};
 }
 
-void Predictor::run_volume(const StepInput& input, const StepBlock& block, const LanePlanes& planes) {
-  if (input.renews_volume) {
-    const auto view = [&](PlaneRole role) { return planes[static_cast<size_t>(role)]->view(); };
-    const PlaneRole motion = kernel_.carries_way ? PlaneRole::Displacement : PlaneRole::Velocity;
-    volume_->fill(block, {view(PlaneRole::Position), view(motion), kernel_.carries_way}, volume_table_);
-  }
+void Predictor::fill_volume(const StepBlock& block) {
+  const auto view = [&](PlaneRole role) { return moving(role)->view(); };
+  const PlaneRole motion = kernel_.carries_way ? PlaneRole::Displacement : PlaneRole::Velocity;
+  volume_->fill(block, {view(PlaneRole::Position), view(motion), kernel_.carries_way}, volume_table_);
+}
+
+void Predictor::run_volume(const StepBlock& block, const LanePlanes& planes) {
   LaneTables tables{};
   tables[static_cast<size_t>(TableRole::Volume)] = {&volume_table_.data()->x,
                                                     static_cast<uint32_t>(volume_table_.size())};
@@ -290,8 +311,8 @@ void Predictor::turn(const glm::dquat& by) {
       });
 }
 
-StepBlock Predictor::block_of(const StepInput& input) const {
-  const uint32_t tail = model_.vertex_count - model_.pinned_tail_count;
+StepBlock Predictor::block_of(const StepInput& input, Tips tips) const {
+  const uint32_t tail = model_.vertex_count - (tips == Tips::Free ? 0 : model_.pinned_tail_count);
   const StrandCounts counts{places_, model_.vertex_count, model_.pinned_root_count, tail};
   StepBlock block = make_step_block(input, model_.parameters, counts, state_.head);
   block.follicle_cosine = scene_.follicle_cosine;
@@ -307,20 +328,35 @@ LanePlanes Predictor::bound_planes() const {
 }
 
 void Predictor::run(const StepInput& input) {
-  const StepBlock block = block_of(input);
+  const Tips alike = model_.has_free_tips() ? Tips::Free : Tips::Pinned;
+  const StepBlock block = block_of(input, alike);
+  if (volume_ && input.renews_volume) fill_volume(block);
+  if (mixed_tips_ == nullptr) {
+    run_kind(input, alike, *program_);
+  } else {
+    for (const Tips tips : kBothTips) {
+      mixed_tips_->keep(other(tips), block, state_.planes);
+      run_kind(input, tips, tips == Tips::Free ? *free_tips_program_ : *program_);
+      mixed_tips_->put_back(other(tips), block, state_.planes);
+    }
+  }
+  state_.head.advance(input);
+}
+
+void Predictor::run_kind(const StepInput& input, Tips tips, LaneProgram& program) {
+  const StepBlock block = block_of(input, tips);
   LanePlanes planes = bound_planes();
-  if (volume_) run_volume(input, block, planes);
+  if (volume_) run_volume(block, planes);
   LanePlanes of_passes = planes;
   if (!kernel_.carries_way) of_passes[static_cast<size_t>(PlaneRole::Displacement)] = nullptr;
   if (drag_program_) drag_program_->run(block, 0, of_passes);
-  program_->run(block, input.colliders.size(), planes);
+  program.run(block, input.colliders.size(), planes);
+  if (tips == Tips::Pinned) return;
   if (bend_program_) bend_program_->run(block, 0, of_passes);
-  if (has_follicle_limit(input) && model_.pinned_tail_count == 0 &&
-      model_.pinned_root_count < model_.vertex_count)
+  if (has_follicle_limit(input) && model_.pinned_root_count < model_.vertex_count)
     follicle_program_->run(block, input.colliders.size(), of_passes);
   if (body_program_ && input.body.acts()) run_body(input, block, of_passes);
   if (field_program_) run_field(block, of_passes);
-  state_.head.advance(input);
 }
 
 void Predictor::run_body(const StepInput& input, const StepBlock& block, LanePlanes planes) {
@@ -347,7 +383,7 @@ void Predictor::begin_body(const StepInput& first) {
   }
   LanePlanes planes = bound_planes();
   if (!kernel_.carries_way) planes[static_cast<size_t>(PlaneRole::Displacement)] = nullptr;
-  run_body(before, block_of(before), planes);
+  run_body(before, block_of(before, Tips::Free), planes);
   for (uint32_t block = 0; block < block_count(); ++block)
     for (uint32_t v = 0; v < model_.vertex_count; ++v) {
       float* clearance = state_.body_before->row(block, v, 3);
@@ -401,12 +437,11 @@ void Predictor::correct(const Correction& of) {
   const auto per_second = static_cast<float>(of.seconds > 0.0 ? kGain / of.seconds : 0.0);
   const Turn world_from_head = step_turn_of(limited_rotation(state_.pose.rotation));
   for_blocks([&](uint32_t begin, uint32_t end) {
-    correct_blocks(ground_.set,
-                   {ground_.layout, of.expected, of.decoded, world_from_head, of.quantum_m, per_second,
-                    model_.pinned_root_count, model_.vertex_count - model_.pinned_tail_count,
-                    *moving(PlaneRole::Position), *moving(PlaneRole::Velocity),
-                    kernel_.carries_way ? moving(PlaneRole::Displacement) : nullptr,
-                    moving(PlaneRole::VelocityChange), moving(PlaneRole::RodAxis), begin, end});
+    correct_blocks(ground_.set, {ground_.layout, of.expected, of.decoded, world_from_head, of.quantum_m,
+                                 per_second, model_.pinned_root_count, model_.free_end(),
+                                 *moving(PlaneRole::Position), *moving(PlaneRole::Velocity),
+                                 kernel_.carries_way ? moving(PlaneRole::Displacement) : nullptr,
+                                 moving(PlaneRole::VelocityChange), moving(PlaneRole::RodAxis), begin, end});
   });
 }
 

@@ -18,6 +18,7 @@
 #include "common/strands/byte_io.h"
 #include "common/strands/step/numbers.h"
 #include "common/strands/step/step_reader.h"
+#include "common/strands/step/tip_mask.h"
 #include "common/strands/step/wire.h"
 #include "common/strands/tangent/motion.h"
 #include "common/strands/value_coder.h"
@@ -122,9 +123,11 @@ class Predictor {
   void fill_rest();
   void fill_fixed();
   Status prepare_volume(simd::InstructionSet set);
-  void run_volume(const StepInput& input, const StepBlock& block, const LanePlanes& planes);
+  Status prepare_mixed(simd::InstructionSet set);
+  void run_volume(const StepBlock& block, const LanePlanes& planes);
+  void fill_volume(const StepBlock& block);
   Status prepare_passes(simd::InstructionSet set);
-  StepBlock block_of(const StepInput& input) const;
+  StepBlock block_of(const StepInput& input, Tips tips) const;
   LanePlanes bound_planes() const;
   void run_body(const StepInput& input, const StepBlock& block, LanePlanes planes);
   void run_field(const StepBlock& block, LanePlanes planes);
@@ -149,6 +152,7 @@ class Predictor {
   static TwistTurn turn_of_fine_steps(int32_t steps);
   void turn(const glm::dquat& by);
   void run(const StepInput& input);
+  void run_kind(const StepInput& input, Tips tips, LaneProgram& program);
   StrandBlocks* moving(PlaneRole role) const;
   std::vector<StatePlane> state_planes() const;
   float share_history();
@@ -193,6 +197,9 @@ class Predictor {
   std::vector<int32_t> twist_steps_;     // (places x vertex_count)
   float history_s_ = 0.0f;               // last substep of strands that remember it
   std::optional<LaneProgram> program_;
+  // Where strands of both kinds are: program_ is that of pinned tips.
+  std::optional<LaneProgram> free_tips_program_;
+  std::unique_ptr<TipMask> mixed_tips_;
   std::optional<LaneProgram> follicle_program_;
   // Where the model tells of a volume.
   std::unique_ptr<VolumeLaw> volume_;

@@ -133,9 +133,9 @@ struct Load {
   std::vector<glm::dvec3> moment;  // at the joint before each edge
   std::vector<double> tension_m2ps2;
 };
-Load load_of(const RodShapes& shapes, const Line& line) {
+Load load_of(const RodShapes& shapes, uint32_t strand, const Line& line) {
   Load load;
-  if (shapes.weight_mps2 == glm::vec3(0.0f) || shapes.bend_m4ps2.empty() || shapes.pinned_tail_count > 0)
+  if (shapes.weight_mps2 == glm::vec3(0.0f) || shapes.bend_m4ps2.empty() || shapes.tail_count(strand) > 0)
     return load;
   const uint32_t n = shapes.vertex_count;
   load.moment.assign(n + 1, glm::dvec3(0.0));
@@ -190,8 +190,8 @@ Joint joint_at(const RodShapes& shapes, const Line& line, const Load& load, doub
 void fill_strand(const RodShapes& shapes, uint32_t s, const Line& line, RodPlanes& planes) {
   const uint32_t n = shapes.vertex_count;
   const uint32_t first = shapes.pinned_root_count;
-  const uint32_t tail = std::min(n - shapes.pinned_tail_count, n - 1);
-  const Load load = load_of(shapes, line);
+  const uint32_t tail = std::min(n - shapes.tail_count(s), n - 1);
+  const Load load = load_of(shapes, s, line);
   const double bend = shapes.bend_m4ps2.empty() ? 0.0 : static_cast<double>(shapes.bend_m4ps2[s]);
   const auto put = [&](uint32_t row, const glm::dvec3& vector, double w) {
     planes.strand[size_t{row} * shapes.strand_count + s] = glm::vec4(glm::dvec4(vector, w));
@@ -219,7 +219,7 @@ void fill_strand(const RodShapes& shapes, uint32_t s, const Line& line, RodPlane
       axis = unit(axis - line.direction[v] * glm::dot(axis, line.direction[v]),
                   any_perpendicular(line.direction[v]));
     }
-    if (v > n - shapes.pinned_tail_count) told = {0.0, 0.0, 1.0};
+    if (v > n - shapes.tail_count(s)) told = {0.0, 0.0, 1.0};
     if (!shapes.has_twist) told = 2.0 * told.z * told - glm::dvec3(0.0, 0.0, 1.0);
     planes.edge[size_t{v} * shapes.strand_count + s] =
         glm::vec4(glm::dvec4(told, static_cast<double>(line.segment_m[v])));

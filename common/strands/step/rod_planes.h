@@ -22,12 +22,17 @@ struct RodShapes {
   uint32_t vertex_count;
   uint32_t pinned_root_count;
   uint32_t pinned_tail_count;
+  std::span<const uint8_t> has_tail;  // as StepModel
   bool has_twist;
   // Weight that the rest shape carries; none without stiffness.
   glm::vec3 weight_mps2{0.0f};
   double tip_length_m = 0.0;               // of hair that weighs as much as what hangs at the tip
   double twist_over_bend = 0.0;            // stiffness
   std::span<const float> bend_m4ps2 = {};  // (strand_count) stiffness
+
+  uint32_t tail_count(uint32_t strand) const {
+    return has_tail.empty() || has_tail[strand] != 0 ? pinned_tail_count : 0;
+  }
 };
 RodPlanes natural_rods(const RodShapes& shapes);
 

@@ -9,6 +9,7 @@
 #include "common/strands/step/graded_field.h"
 #include "common/strands/step/numbers.h"
 #include "common/strands/step/rod_planes.h"
+#include "common/strands/step/tip_mask.h"
 #include "common/strands/strand_limits.h"
 #include "common/strands/strand_payload.h"
 #include "common/strands/wrapping.h"
@@ -26,7 +27,7 @@ constexpr float kMostStiffness = 1e12f;
 constexpr double kMostTipLengthM = 1e3;
 constexpr double kLargest = 1e20;  // of parameters and constants
 constexpr uint8_t kVolume = 0x80;  // beside a kernel's number
-constexpr uint8_t kPasses = 0x40;
+constexpr uint8_t kPasses = 0x40, kMixedTips = 0x20;
 // Of the passes.
 constexpr uint8_t kBend = 1, kDrag = 2, kMeetsBody = 4, kField = 8, kGradedField = 16;
 constexpr uint8_t kSceneBody = 0x80;  // beside the substeps
@@ -122,14 +123,15 @@ float of_first_bits(int32_t bits) {
 struct RodsTold {
   std::span<const glm::vec3> rest_in_head_m;
   uint32_t strand_count;
+  std::span<const uint8_t> has_tail;  // of these strands
   double twist_over_bend = 0.0;
   glm::vec3 weight_mps2{0.0f};
   std::vector<float> bend_m4ps2 = {};
 };
 RodPlanes natural_rods_of(const StepModel& model, const RodsTold& told) {
-  RodShapes shapes{told.rest_in_head_m,     told.strand_count,
-                   model.vertex_count,      model.pinned_root_count,
-                   model.pinned_tail_count, model.kernel.variant_of("HAS_TWIST") != 0};
+  const bool has_twist = model.kernel.variant_of("HAS_TWIST") != 0;
+  RodShapes shapes{told.rest_in_head_m,     told.strand_count, model.vertex_count, model.pinned_root_count,
+                   model.pinned_tail_count, told.has_tail,     has_twist};
   shapes.weight_mps2 = told.weight_mps2;
   shapes.twist_over_bend = told.twist_over_bend;
   shapes.bend_m4ps2 = told.bend_m4ps2;
@@ -146,8 +148,10 @@ glm::vec3 carried_weight(const StepModel& model, const RodsTold& told, const glm
   constexpr int kShares = 16;
   const uint32_t count = std::min(told.strand_count, kSample);
   std::vector<glm::vec3> rest_in_head_m(size_t{count} * model.vertex_count);
-  RodsTold sample{rest_in_head_m, count, told.twist_over_bend};
   const auto strand_of = [&](uint32_t i) { return i * (told.strand_count / count); };
+  std::vector<uint8_t> has_tail(told.has_tail.empty() ? 0 : count);
+  for (uint32_t i = 0; i < has_tail.size(); ++i) has_tail[i] = told.has_tail[strand_of(i)];
+  RodsTold sample{rest_in_head_m, count, has_tail, told.twist_over_bend};
   for (uint32_t i = 0; i < count; ++i) {
     sample.bend_m4ps2.push_back(told.bend_m4ps2[strand_of(i)]);
     for (uint32_t v = 0; v < model.vertex_count; ++v)
@@ -202,7 +206,7 @@ void write_rods(StepModel model, RodsTold told, const glm::dvec3& gravity_mps2,
 
 Status read_rods(ByteReader& bytes, std::span<const glm::vec3> rest_in_head_m, StepModel& model) {
   Numbers from{bytes};
-  RodsTold told{rest_in_head_m, model.strand_count};
+  RodsTold told{rest_in_head_m, model.strand_count, model.has_tail};
   const auto twist_over_bend = from.take<float>(static_cast<double>(kMostStiffness));
   told.weight_mps2 = from.vector<float, glm::vec3>(kMaxGravityMps2);
   from.are_usable &= twist_over_bend >= 0.0f;
@@ -514,11 +518,12 @@ void write_model(const StepModel& model, std::span<const glm::vec3> rest_in_head
                  std::vector<std::byte>& bytes, const glm::dvec3& gravity_mps2) {
   ByteWriter to(bytes);
   const StepKernel* kernel = find_step_kernel(model.kernel.shader_path);
-  to.put(static_cast<uint8_t>(kernel->number | (tells_volume(model) ? kVolume : 0) |
-                              (model.has_passes() ? kPasses : 0)));
+  const int extras = (tells_volume(model) ? kVolume : 0) | (model.has_passes() ? kPasses : 0);
+  to.put(static_cast<uint8_t>(kernel->number | extras | (model.has_tail.empty() ? 0 : kMixedTips)));
   to.put(static_cast<uint8_t>(model.kernel.variant_of("HAS_TWIST")));
   to.put(static_cast<uint8_t>(model.pinned_root_count));
   to.put(static_cast<uint8_t>(model.pinned_tail_count));
+  if (!model.has_tail.empty()) write_tails(std::span(model.has_tail).first(strand_count), to);
   visit_parameters(model.parameters, [&](const double& value) { to.put(value); });
   to.put(static_cast<uint8_t>(model.kernel.constants.size()));
   for (const auto& [name, value] : model.kernel.constants) {
@@ -529,7 +534,8 @@ void write_model(const StepModel& model, std::span<const glm::vec3> rest_in_head
   }
   if (tells_volume(model)) write_volume(model.volume, to);
   if (model.has_passes()) write_passes(model, bytes);
-  if (!kernel->fixed.empty()) write_rods(model, {rest_in_head_m, strand_count}, gravity_mps2, bytes);
+  if (!kernel->fixed.empty())
+    write_rods(model, {rest_in_head_m, strand_count, model.has_tail}, gravity_mps2, bytes);
 }
 
 Result<StepModel> read_model(ByteReader& bytes, std::span<const glm::vec3> rest_in_head_m,
@@ -539,7 +545,7 @@ Result<StepModel> read_model(ByteReader& bytes, std::span<const glm::vec3> rest_
     return make_error(ErrorCode::Unsupported, "strands without a rest shape cannot be predicted by a step");
   StepModel model;
   const auto first = bytes.take<uint8_t>();
-  const auto number = static_cast<uint8_t>(first & ~(kVolume | kPasses));
+  const auto number = static_cast<uint8_t>(first & ~(kVolume | kPasses | kMixedTips));
   const StepKernel* kernel = find_step_kernel(number);
   if (kernel == nullptr)
     return make_error(ErrorCode::Unsupported, "a step of kernel {}, which this build does not know", number);
@@ -548,9 +554,12 @@ Result<StepModel> read_model(ByteReader& bytes, std::span<const glm::vec3> rest_
   model.vertex_count = vertex_count;
   model.pinned_root_count = bytes.take<uint8_t>();
   model.pinned_tail_count = bytes.take<uint8_t>();
-  if (model.pinned_root_count < 1 || model.pinned_root_count + model.pinned_tail_count > vertex_count)
+  const bool is_mixed = (first & kMixedTips) != 0;
+  if (model.pinned_root_count < 1 || model.pinned_root_count + model.pinned_tail_count > vertex_count ||
+      (is_mixed && model.pinned_tail_count == 0))
     return make_error(ErrorCode::BadInput, "a step pins {} and {} of {} vertices", model.pinned_root_count,
                       model.pinned_tail_count, vertex_count);
+  ASSIGN_OR_RETURN(model.has_tail, read_tails(bytes, is_mixed ? strand_count : 0));
   visit_parameters(model.parameters, [&](double& value) { value = from.take<double>(kLargest); });
   ASSIGN_OR_RETURN(model.kernel.constants, read_constants(bytes));
   model.kernel.shader_path = kernel->shader_path;

@@ -128,7 +128,7 @@ class DirectRod final : public KernelSolver {
       arrays.strand[3 * strand_count + s] = glm::vec4(glm::dvec4(rest.tail_axis, rod.twist_stiffness_m4ps2));
       for (uint32_t i = 0; i < layout().vertex_count; ++i) {
         const size_t at = layout().index(i, s);
-        const bool is_clamp = i == layout().pinned_root_count || i > layout().tail_begin();
+        const bool is_clamp = i == layout().pinned_root_count || i > shape.tail_begin;
         const glm::dvec3 tangent = is_clamp ? glm::dvec3(0.0, 0.0, 1.0) : rest.joint_tangent[i];
         arrays.edge[at] = glm::vec4(glm::dvec4(tangent, rest.segment_m[i]));
         arrays.axis[at] = glm::vec4(glm::dvec4(state().head().world_from_head_rotation * rest.axis[i], 0.0));

@@ -221,7 +221,7 @@ RodShape make_rod_shape(const StrandLayout& layout, uint32_t strand_index, const
   const uint32_t n = layout.vertex_count;
   RodShape shape;
   const uint32_t first = shape.first = layout.pinned_root_count;
-  shape.tail_begin = layout.tail_begin();
+  shape.tail_begin = n - layout.tail_count(strand_index);
   shape.segment_m.assign(n, 0.0);
   for (uint32_t i = 1; i < n; ++i) {
     shape.segment_m[i] = static_cast<double>(layout.rest[layout.index(i, strand_index)].w);
@@ -232,7 +232,7 @@ RodShape make_rod_shape(const StrandLayout& layout, uint32_t strand_index, const
   shape.shortest_m = std::max(kShortestShare * shape.mean_segment_m, kShortestRestM);
   shape.direction = edge_directions(layout, strand_index, shape.shortest_m);
 
-  const double share = layout.pinned_tail_count == 0 ? parameters.sag_free : 0.0;
+  const double share = layout.tail_count(strand_index) == 0 ? parameters.sag_free : 0.0;
   shape.load.assign(n, glm::dvec3(0.0));
   shape.tension_m2ps2.assign(n, 0.0);
   double beyond = parameters.tip_length_m;

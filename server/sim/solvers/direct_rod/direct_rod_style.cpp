@@ -168,6 +168,7 @@ int least_step(const RodShape& shape, const RodParameters& parameters, double ra
 /// What a fit depends on.
 struct FitKey {
   uint64_t shape_hash = 0;
+  uint64_t tails_hash = 0;
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
   uint32_t first = 0;
@@ -221,13 +222,14 @@ std::shared_ptr<const StyleFit> fit_rod_style(const StrandLayout& layout, const 
                                               const glm::dvec3& groom_gravity_in_head_mps2,
                                               const std::stop_token& stop) {
   const glm::dvec3 carried = parameters.sag_free * groom_gravity_in_head_mps2;
-  const bool is_carried = layout.pinned_tail_count == 0 && glm::dot(carried, carried) > 0.0;
+  const bool is_carried = layout.has_free_tips() && glm::dot(carried, carried) > 0.0;
   // A chain holds nothing, however many times stiffer.
   const bool is_sought = is_carried && parameters.style_margin > 0.0 && parameters.stiffness_m4ps2 > 0.0;
   auto fit = std::make_shared<StyleFit>();
   fit->stiffening.assign(layout.strand_count, 1.0f);
   if (!is_sought) return fit;
   const FitKey key = {hash_bytes(std::as_bytes(std::span(layout.rest))),
+                      hash_bytes(std::as_bytes(std::span(layout.has_tail))),
                       layout.strand_count,
                       layout.vertex_count,
                       layout.pinned_root_count,
@@ -242,6 +244,7 @@ std::shared_ptr<const StyleFit> fit_rod_style(const StrandLayout& layout, const 
   workers.at(Priority::Background)
       .for_ranges(layout.strand_count, kStrandsPerRange, [&](size_t begin, size_t end) {
         for (auto s = static_cast<uint32_t>(begin); s < end && !stop.stop_requested(); ++s) {
+          if (layout.tail_count(s) > 0) continue;  // two ends hold it
           const RodShape shape = make_rod_shape(layout, s, parameters, groom_gravity_in_head_mps2);
           const double length = std::max(shape.free_length_m, shape.mean_segment_m);
           const double edges = shape.vertex_count() - shape.first;
