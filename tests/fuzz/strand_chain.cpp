@@ -81,7 +81,7 @@ std::shared_ptr<const StepModel> step_model(const HairSize& size, std::span<cons
   if (!is_rod) return model;
   model->kernel.variant = {{"HAS_PINNED_TAIL", 0}, {"HAS_TWIST", 1}};
   model->kernel.constants = {{"u_solves", 1u}, {"u_order", 2u}, {"u_bending_damping", 2e-3}};
-  step::RodPlanes rods = step::natural_rods({rest_in_head_m, size.strands, size.vertices, 2, 0, true});
+  step::RodPlanes rods = step::natural_rods({rest_in_head_m, size.strands, size.vertices, 2, 0, {}, true});
   for (uint32_t s = 0; s < size.strands; ++s) {
     rods.strand[2 * size.strands + s].w = static_cast<float>(kBendStiffness);
     rods.strand[3 * size.strands + s].w = static_cast<float>(kTwistStiffness);

@@ -173,7 +173,7 @@ std::shared_ptr<const StepModel> tiny_model(const StepKernel& kernel,
   model->kernel.variant["HAS_TWIST"] = 1;
   model->kernel.constants = {{"u_solves", 1u}, {"u_order", 2u}, {"u_bending_damping", 2e-3}};
   step::RodPlanes rods =
-      step::natural_rods({rest_in_head_m, kTinyHair.strand_count, kTinyHair.vertex_count, 2, 0, true});
+      step::natural_rods({rest_in_head_m, kTinyHair.strand_count, kTinyHair.vertex_count, 2, 0, {}, true});
   for (uint32_t s = 0; s < kTinyHair.strand_count; ++s)
     for (const uint32_t row : {2u, 3u}) rods.strand[row * kTinyHair.strand_count + s].w = 1e-3f;
   model->rod_edge = std::move(rods.edge);
