@@ -52,7 +52,7 @@ inline constexpr uint32_t kStreamVertices = 16;
 /// Bits per vertex of the built-in head motions.
 inline constexpr double kIdleBits = 1.4;
 inline constexpr double kActiveBits = 2.3;
-inline constexpr double kViolentBits = 6.3;
+inline constexpr double kViolentBits = 6.4;
 /// Of `delta` beside it in these.
 inline constexpr double kLeastDeltaRatio = 1.7;
 inline constexpr double kMostDeltaRatio = 4.0;

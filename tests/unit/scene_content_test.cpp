@@ -258,14 +258,15 @@ TEST(SceneContent, WhatWasGuessedIsSaid) {
 }
 
 /// Strands of two vertices out of a ball about the origin, which is `longer` along +Z, as a .hair file.
-test::ByteFile hair_on_a_ball(float radius_m, float longer = 1.0f) {
+/// Roots go down to `lowest` radii; -1: all around.
+test::ByteFile hair_on_a_ball(float radius_m, float longer = 1.0f, float lowest = -1.0f) {
   constexpr uint32_t kStrands = 40, kPoints = 2;
   test::ByteFile file;
   for (const char c : {'H', 'A', 'I', 'R'}) file.add(c);
   file.add(kStrands).add(kPoints * kStrands).add(kPoints).add(kPoints - 1);
   file.add(0.1f).add(0.0f).add(0.5f).add(0.4f).add(0.3f).zeros(88);
   for (uint32_t s = 0; s < kStrands; ++s) {
-    const float height = 2.0f * (static_cast<float>(s) + 0.5f) / kStrands - 1.0f;
+    const float height = lowest + (1.0f - lowest) * (static_cast<float>(s) + 0.5f) / kStrands;
     const float level = std::sqrt(1.0f - height * height);
     const float angle = 2.4f * static_cast<float>(s);
     for (const float away_m : {radius_m, radius_m + 0.1f})
@@ -306,12 +307,17 @@ TEST(SceneContent, FurGetsNoHeadUnlessOneIsStated) {
   scene.head.radius_m = 0.0f;
   FileGroomDesc file;
   file.unit_m = 1.0f;
-  for (const auto& [longer, has_head] : {std::pair(1.0f, true), std::pair(4.0f, false)}) {
-    file.path = folder.write("ball.hair", hair_on_a_ball(0.1f, longer).text());
+  struct Case {
+    float longer, lowest;
+    bool has_head;
+  };
+  for (const auto& [longer, lowest, has_head] :
+       {Case{1.0f, -0.2f, true}, Case{1.0f, -1.0f, false}, Case{4.0f, -1.0f, false}}) {
+    file.path = folder.write("ball.hair", hair_on_a_ball(0.1f, longer, lowest).text());
     scene.groom = file;
     const auto content = load_scene_content(scene);
     ASSERT_TRUE(content) << content.error().to_string();
-    EXPECT_EQ(!content->head.triangle.empty(), has_head) << longer;
+    EXPECT_EQ(!content->head.triangle.empty(), has_head) << longer << " " << lowest;
     EXPECT_EQ(!content->colliders.empty(), has_head) << longer;
     const auto says_so = Contains(HasSubstr("no head is put under it"));
     if (has_head) {
