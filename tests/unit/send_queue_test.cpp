@@ -56,6 +56,7 @@ TEST(SendQueue, ExactFramesWaitWhileALinkStandsStill) {
   const auto exact = [](uint32_t sequence, size_t bytes) {
     auto made = std::make_shared<EncodedFrame>(*delta(sequence));
     made->message.resize(bytes);
+    made->message[0] = std::byte{static_cast<uint8_t>(Opcode::StrandDelta)};
     made->message[kFrameHeaderBytes] = std::byte{128};  // WIRE.md: the frame is exact
     return made;
   };
