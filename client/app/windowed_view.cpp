@@ -232,7 +232,7 @@ class WindowedView {
     if (actions.wants_pause_toggle)
       steer(ControlCommand{state_->status.is_paused ? Command::Resume : Command::Pause});
     if (actions.wants_step) steer(ControlCommand{Command::StepOnce});
-    if (actions.wants_record_toggle) steer(RecordCommand{state_->status.recording.empty()});
+    if (actions.wants_record_toggle) toggle_take();
     if (actions.wants_mode_toggle) change_mode();
     if (actions.wants_playout_toggle) {
       playout_ = playout_ == Playout::Smooth ? Playout::LowLatency : Playout::Smooth;
@@ -277,6 +277,16 @@ class WindowedView {
     const Status saved = save_scene(look_.file(), text);
     show_message(saved ? fmt::format("saved {0}: strandcast-server --scene {0}", look_.file())
                        : saved.error().to_string());
+  }
+
+  /// Begins a take, or ends it. A recording that runs alone, and was not begun here, may be the server's
+  /// whole run: a take begins beside it.
+  void toggle_take() {
+    const std::string& recorded = state_->status.recording;
+    const bool is_beside = recorded.find(".mcap: ") != recorded.rfind(".mcap: ");
+    const bool begins = recorded.empty() || !(has_begun_take_ || is_beside);
+    has_begun_take_ = recorded.empty();
+    steer(RecordCommand{begins});
   }
 
   /// Changes from strands to frames, to the server's choice, and back to strands.
@@ -491,6 +501,7 @@ class WindowedView {
   OrbitCamera orbit_{CameraDesc{}};
   std::string own_reason_;  // why this machine needs frames; empty = the server's reason counts
   Playout playout_;
+  bool has_begun_take_ = false;  // when nothing else was recorded
   LookControl look_;
   HairSliders sliders_;
   uint64_t asked_session_ = 0;  // for the sliders' values; 0 = none
