@@ -187,7 +187,9 @@ Status check_recording(const ViewOptions& options) {
   if (!options.trace.empty())
     return make_error(ErrorCode::BadInput, "--trace is of frames that a server sends: a recording has none");
   if (options.is_headless || !options.screenshot.empty() || !options.clip.empty())
-    return make_error(ErrorCode::BadInput, "a recording without a window is drawn by --export FILE");
+    return make_error(
+        ErrorCode::BadInput,
+        "a recording without a window is drawn by --export FILE; a server is named by --connect");
   return {};
 }
 

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "common/base/hash.h"
+#include "common/base/mercy.h"
 #include "common/base/worker_pool.h"
 #include "server/sim/directions.h"
 
@@ -288,9 +289,8 @@ std::vector<std::string> describe(const StyleFit& fit) {
   }
   if (softened > 0)
     notes.push_back(
-        fmt::format("{} strands have edges too short for single precision to move them as stiff as hair: "
-                    "they are softened",
-                    softened));
+        fmt::format("{} too short for single precision to move as stiff as hair, and softened",
+                    counted(static_cast<uint64_t>(softened), "strand has edges", "strands have edges")));
   if (fit.unheld_count > 0)
     notes.push_back(fmt::format(
         "{} strands are no lasting equilibrium even at {:g} times the stiffness (a joint would have to turn "
