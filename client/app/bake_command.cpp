@@ -1,6 +1,7 @@
 #include "client/app/bake_command.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <iostream>
 #include <utility>
@@ -56,7 +57,37 @@ Result<std::optional<HairOrigin>> origin_of(const BakedStates& states) {
   return std::optional(std::move(origin));
 }
 
+/// No file of a person's is written over: neither a hair file, nor one that stands where the file to write
+/// was left out.
+Status check_paths(const BakeCommand& command) {
+  std::vector<std::string> hair = command.exported.paths;
+  const std::string out = std::move(hair.back());
+  hair.pop_back();
+  const bool names_none =
+      hair.empty() && command.scene.empty() &&
+      std::none_of(command.overrides.begin(), command.overrides.end(),
+                   [](const std::string& assignment) { return assignment.starts_with("groom."); });
+  std::error_code failure;
+  const auto motion = std::find_if(hair.begin(), hair.end(), [](const std::string& path) {
+    return std::filesystem::path(path).extension() == ".bvh";
+  });
+  if (motion != hair.end())
+    return make_error(ErrorCode::BadInput, "{} is motion, not hair: --motion {}", *motion, *motion);
+  for (const std::string& path : hair)
+    if (std::filesystem::equivalent(path, out, failure))
+      return make_error(ErrorCode::BadInput,
+                        "{} is read, and would be written over: name another file to write", out);
+  if (names_none && std::filesystem::exists(out, failure))
+    return make_error(
+        ErrorCode::BadInput,
+        "{} is there already, and no file to write stands after it: bake {} OUT.abc bakes its hair "
+        "(remove it, to bake the built-in hair into it)",
+        out, out);
+  return {};
+}
+
 Result<ExportReport> bake(const BakeCommand& command, const std::atomic<bool>& stop) {
+  RETURN_IF_ERROR(check_paths(command));
   ASSIGN_OR_RETURN(FeedPlan plan, bake_plan(command));
   std::optional<CurveMotion> curves;
   if (is_of_curves(command.feed.motion)) {

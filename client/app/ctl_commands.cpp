@@ -39,7 +39,7 @@ using std::chrono::milliseconds;
 constexpr milliseconds kAnswerTimeout{5000};
 constexpr milliseconds kHealthTimeout{3000};
 constexpr float kGustLengthM = 9.0f;
-constexpr const char* kUsualTimecodeFps = "24";
+constexpr FrameRate kUsualTimecodeFps{24, 1};
 constexpr double kLongWaitS = 0.5;    // less is what a connection takes
 constexpr double kLeastFeedS = 0.01;  // 0 is without end
 constexpr int64_t kInputsIntervalNs = 2'000'000'000;
@@ -197,14 +197,18 @@ Result<FeedPlan> make_feed_plan(const FeedOptions& options, const FindHair& find
   FeedPlan plan;
   plan.rate_hz = options.rate_hz;
   plan.speed = options.speed;
-  ASSIGN_OR_RETURN(const FrameRate fps,
-                   parse_frame_rate(options.fps.empty() ? kUsualTimecodeFps : options.fps));
+  std::optional<FrameRate> fps;
+  if (!options.fps.empty()) {
+    ASSIGN_OR_RETURN(fps, parse_frame_rate(options.fps));
+  }
   if (!options.timecode.empty()) {
-    ASSIGN_OR_RETURN(const Timecode first, parse_timecode(options.timecode, fps));
+    ASSIGN_OR_RETURN(const Timecode first, parse_timecode(options.timecode, fps.value_or(kUsualTimecodeFps)));
     plan.timecode = [first](double t_s) { return advanced(first, t_s * first.rate.hz()); };
   }
   if (!options.ltc.empty()) {
-    ASSIGN_OR_RETURN(plan.timecode, open_ltc(options.ltc, fps));
+    ASSIGN_OR_RETURN(plan.timecode, open_ltc(options.ltc, fps, [](const std::string& sentence) {
+                       std::cerr << sentence + '\n';
+                     }));
   }
   double length_s = 0.0;  // of a motion file; 0 = without end
   glm::dquat turn(1, 0, 0, 0);
@@ -317,24 +321,6 @@ FeedListener progress_listener() {
   return isatty(STDERR_FILENO) != 0 ? FeedListener(print_progress) : FeedListener();
 }
 
-/// Of the head that is named; else of each that the server has. Waits for the server, `limit` at most.
-Result<std::vector<std::unique_ptr<SteadyClient>>> connect_sources(const CtlTarget& target,
-                                                                   const std::atomic<bool>& stop,
-                                                                   milliseconds limit) {
-  std::vector<std::unique_ptr<SteadyClient>> heads;
-  ASSIGN_OR_RETURN(ClientConfig config, speaking_config(target, Role::Source));
-  heads.push_back(std::make_unique<SteadyClient>(config));
-  RETURN_IF_ERROR(heads.front()->await_welcome(stop, limit));
-  if (!target.head.empty()) return heads;
-  const std::vector<std::string> names = heads.front()->welcome().heads;
-  for (size_t i = 1; i < names.size(); ++i) {
-    config.hello.head = names[i];
-    heads.push_back(std::make_unique<SteadyClient>(config));
-    RETURN_IF_ERROR(heads.back()->await_welcome(stop, limit));
-  }
-  return heads;
-}
-
 /// The hair of the server's scene, which curves move.
 Result<HairOrigin> hair_of(const CtlTarget& target) {
   ASSIGN_OR_RETURN(const SceneDesc scene, ask_scene(target));
@@ -348,6 +334,10 @@ Result<HairOrigin> hair_of(const CtlTarget& target) {
 int run_mocap_feed(const FeedOptions& options, const FeedPlan& plan, const std::atomic<bool>& stop) {
   const auto encoding = find_mocap_encoding(options.as);
   if (!encoding) return ctl_failure(at("--as", encoding.error()));
+  if (plan.timecode && !encoding->has_timecode)
+    return ctl_failure(make_error(
+        ErrorCode::BadInput, "{} carries no timecode: leave --timecode and --ltc out, or send opentrackio",
+        encoding->name));
   // What names no port gets the protocol's own.
   auto to = parse_address(options.to);
   if (!to) return ctl_failure(to.error());
@@ -357,8 +347,10 @@ int run_mocap_feed(const FeedOptions& options, const FeedPlan& plan, const std::
   std::cerr << fmt::format("sending {} to {}: motion {}, {} packets per second\n", encoding->name,
                            to->to_string(), options.motion, options.rate_hz);
   uint32_t number = 0;
-  const auto send = [&](double time_s, const Pose& pose, const std::optional<glm::vec3>& wind_mps) {
-    return (*sender)->send(encoding->encode({time_s, pose, wind_mps, number++, options.rate_hz}));
+  const auto send = [&](MocapMoment moment) {
+    moment.number = number++;
+    moment.rate_hz = options.rate_hz;
+    return (*sender)->send(encoding->encode(moment));
   };
   const FeedProgress done = feed_moments(send, plan, stop, progress_listener());
   std::cout << fmt::format("sent {:.1f} s: {} packets, at most {:.1f} ms late, {} skipped, {} unsent\n",
@@ -380,9 +372,10 @@ int run_feed(const CtlTarget& target, const FeedOptions& options, const std::ato
                                   kMaxFeedRateHz));
   const bool has_limit = options.seconds > 0.0;
   const int64_t begin_ns = now_ns();
-  const auto heads = connect_sources(
-      target, stop,
-      has_limit ? milliseconds(static_cast<int64_t>(options.seconds * 1e3)) : milliseconds::max());
+  const milliseconds limit =
+      has_limit ? milliseconds(static_cast<int64_t>(options.seconds * 1e3)) : milliseconds::max();
+  const auto config = speaking_config(target, Role::Source);
+  const auto heads = config ? connect_heads(*config, stop, limit) : config.error();
   if (!heads) return ctl_failure(heads.error());
   // The wait for the server counts.
   const double waited_s = static_cast<double>(now_ns() - begin_ns) / kNsPerS;
@@ -391,7 +384,8 @@ int run_feed(const CtlTarget& target, const FeedOptions& options, const std::ato
   const std::vector<std::string>& names = heads->front()->welcome().heads;
   std::cerr << fmt::format("feeding {}{}: motion {}, wind {}, {} samples per second\n", target.connect,
                            heads->size() > 1 ? fmt::format(" ({})", fmt::join(names, ", ")) : "",
-                           options.motion, options.wind, options.rate_hz);
+                           options.motion, options.wind, options.rate_hz)
+            << (options.timecode.empty() ? "" : fmt::format("timecode from {} on\n", options.timecode));
   const auto done = feed(*heads, *plan, stop, progress_listener());
   if (isatty(STDERR_FILENO) != 0) std::cerr << '\n';
   if (!done) return ctl_failure(done.error(), kRefusedExit);

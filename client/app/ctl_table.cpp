@@ -51,7 +51,8 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
   timecode->excludes(ltc);
   app.add_option(
          "--fps", feed.fps,
-         "Frames per second that --timecode or --ltc counts, such as 23.976 or 24000/1001 (default: 24), "
+         "Frames per second that --timecode or --ltc counts, such as 23.976 or 24000/1001 (default: 24, and "
+         "of sound its own), "
          "and those of a BVH file that states none")
       ->check(CLI::Validator(
           [](std::string text) { return make_frame_rate(text, kLeastFrameRate, kMostFrameRate); }, ""));

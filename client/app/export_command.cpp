@@ -195,8 +195,6 @@ Result<ExportOptions> export_options(const ExportCommand& command) {
     return make_error(ErrorCode::BadInput, "--to and --seconds both say where it ends: give one of them");
   if (command.from && command.to && is_timecode(from) != is_timecode(to))
     return make_error(ErrorCode::BadInput, "--from and --to are both seconds, or both timecodes");
-  if (is_timecode(from) && command.seconds)
-    return make_error(ErrorCode::BadInput, "behind a timecode --to says the end, as a timecode");
   if (is_timecode(from)) options.from_timecode = from;
   if (is_timecode(to)) options.to_timecode = to;
   options.from_s = command.at_s.value_or(seconds_of(from).value_or(0.0));

@@ -190,9 +190,12 @@ class MomentWay {
   explicit MomentWay(const SendMoment& send) : send_(send) {}
 
   void send(const FeedPlan& plan, int64_t, FeedProgress& progress) {
-    const auto wind_mps = plan.wind ? std::optional(plan.wind(progress.motion_s)) : std::nullopt;
-    const Pose pose = plan.motion ? plan.motion(progress.motion_s) : Pose{};
-    count(send_(progress.elapsed_s, pose, wind_mps), progress.motion_samples, progress);
+    MocapMoment moment;
+    moment.time_s = progress.elapsed_s;
+    if (plan.motion) moment.world_from_head = plan.motion(progress.motion_s);
+    if (plan.wind) moment.wind_mps = plan.wind(progress.motion_s);
+    if (plan.timecode) moment.timecode = plan.timecode(progress.motion_s);
+    count(send_(std::move(moment)), progress.motion_samples, progress);
   }
   Status read_events(const FeedPlan&, FeedProgress&) { return {}; }
   void flush() {}
@@ -202,6 +205,22 @@ class MomentWay {
 };
 
 }  // namespace
+
+Result<std::vector<std::unique_ptr<SteadyClient>>> connect_heads(ClientConfig config,
+                                                                 const std::atomic<bool>& stop,
+                                                                 milliseconds limit) {
+  std::vector<std::unique_ptr<SteadyClient>> heads;
+  heads.push_back(std::make_unique<SteadyClient>(config));
+  RETURN_IF_ERROR(heads.front()->await_welcome(stop, limit));
+  if (!config.hello.head.empty()) return heads;
+  const std::vector<std::string> names = heads.front()->welcome().heads;
+  for (size_t i = 1; i < names.size(); ++i) {
+    config.hello.head = names[i];
+    heads.push_back(std::make_unique<SteadyClient>(config));
+    RETURN_IF_ERROR(heads.back()->await_welcome(stop, limit));
+  }
+  return heads;
+}
 
 double follow_pace(double present, const ServerStatus& status) {
   if (status.is_paused) return 0.0;

@@ -18,6 +18,7 @@
 #include "common/base/result.h"
 #include "common/base/timecode.h"
 #include "common/math/pose.h"
+#include "common/motion/mocap_packet.h"
 
 namespace strandcast {
 
@@ -65,14 +66,20 @@ struct FeedProgress {
 /// its first moments.
 std::string slow_motion_sentence(const FeedProgress& done, double speed);
 
-/// Sends one moment of a plan where there is no server to talk to.
-using SendMoment = std::function<bool(double time_s, const Pose&, const std::optional<glm::vec3>& wind_mps)>;
+/// Sends one moment of a plan where there is no server to talk to: its time, pose, wind and timecode are set.
+using SendMoment = std::function<bool(MocapMoment moment)>;
 
 /// Called about once a second.
 using FeedListener = std::function<void(const FeedProgress&)>;
 
 /// A simulation that goes on for so long without the motion that is sent has not heard it.
 inline constexpr std::chrono::milliseconds kUnheardTime{2000};
+
+/// Connects to the head that `config` names, else to each that the server has. Waits for the server, `limit`
+/// at most.
+Result<std::vector<std::unique_ptr<SteadyClient>>> connect_heads(ClientConfig config,
+                                                                 const std::atomic<bool>& stop,
+                                                                 std::chrono::milliseconds limit);
 
 /// Feeds one head or several, each by a connection of its own, with the same samples. Runs until the plan's
 /// duration is over or `stop` is set. A connection that is lost comes back; meanwhile the motion waits,

@@ -30,6 +30,10 @@ constexpr uint32_t kMaxWavRateHz = 768'000;
 constexpr size_t kChunkSamples = 1024;
 constexpr size_t kMaxLtcFrames = 24 * 3600 * 60;
 constexpr int64_t kLiveStaleNs = 1'000'000'000;
+constexpr FrameRate kMostFrames{30, 1};    // of linear timecode: all numbers are read so
+constexpr double kOtherRate = 0.1;         // a tape runs at another speed by less
+constexpr uint32_t kMeasuredPairs = 10;    // of sound as it comes
+constexpr int64_t kSilentNs = 5 * kSInNs;  // without timecode, until that is said
 
 template <class T>
 T number_at(const char* bytes) {
@@ -45,6 +49,8 @@ uint32_t value_of(const std::array<bool, kWordBits>& bits, size_t begin, size_t 
   return value;
 }
 
+constexpr size_t kDropAt = 10;
+
 std::optional<Timecode> timecode_of_word(const std::array<bool, kWordBits>& bits, const FrameRate& fps) {
   constexpr size_t kSyncAt = 64;
   constexpr uint32_t kSync = 0xBFFC;  // 0011 1111 1111 1101, the first bit lowest
@@ -54,7 +60,6 @@ std::optional<Timecode> timecode_of_word(const std::array<bool, kWordBits>& bits
   };
   const TimecodeFields fields{two_digits(48, 56, 2), two_digits(32, 40, 3), two_digits(16, 24, 3),
                               two_digits(0, 8, 2)};
-  constexpr size_t kDropAt = 10;
   const auto timecode = make_timecode(fields, fps, bits[kDropAt] && is_timecode_rate(fps, true));
   return timecode ? std::optional(*timecode) : std::nullopt;
 }
@@ -105,12 +110,29 @@ void LtcDecoder::note_bit(bool bit, double at) {
   bits_.back() = bit;
   if (++bit_count_ < kWordBits) return;
   if (const auto timecode = timecode_of_word(bits_, fps_))
-    newest_ = LtcFrame{*timecode, at / sample_rate_hz_, false};
+    newest_ = LtcFrame{*timecode, at / sample_rate_hz_, false, bits_[kDropAt]};
   // An edge in the middle of a bit is so either way round, and no word holds the end of another backwards.
   std::array<bool, kWordBits> turned;
   std::reverse_copy(bits_.begin(), bits_.end(), turned.begin());
   if (const auto timecode = timecode_of_word(turned, fps_))
-    newest_ = LtcFrame{*timecode, at / sample_rate_hz_, true};
+    newest_ = LtcFrame{*timecode, at / sample_rate_hz_, true, turned[kDropAt]};
+}
+
+void LtcRateMeter::add(const LtcFrame& frame) {
+  const std::optional<LtcFrame> before = std::exchange(last_, frame);
+  drops_ = drops_ || frame.has_drop_flag;
+  // Not where seconds begin: there the number depends on the rate.
+  if (!before || std::abs(frames_between(before->timecode, frame.timecode)) != 1.0) return;
+  sum_s_ += frame.end_s - before->end_s;
+  ++pair_count_;
+}
+
+FrameRate LtcRateMeter::nearest() const {
+  constexpr FrameRate kRates[] = {{24000, 1001}, {24, 1}, {25, 1}, {30000, 1001}, {30, 1}};
+  if (drops_) return kRates[3];
+  return *std::min_element(std::begin(kRates), std::end(kRates), [this](const auto& a, const auto& b) {
+    return std::abs(a.hz() - hz()) < std::abs(b.hz() - hz());
+  });
 }
 
 Result<WavReader> WavReader::open(std::istream& in) {
@@ -183,22 +205,52 @@ size_t WavReader::read(std::span<float> samples) {
 
 namespace {
 
-Result<TimecodeAt> read_ltc_file(const std::string& path, const FrameRate& fps) {
+std::string other_rate_text(const LtcRateMeter& meter, const FrameRate& fps) {
+  return fmt::format("its timecode counts {} frames per second, and --fps says {}: leave --fps out",
+                     frame_rate_text(meter.nearest().hz()), frame_rate_text(fps.hz()));
+}
+
+bool is_other_rate(const LtcRateMeter& meter, const FrameRate& fps) {
+  return meter.pair_count() > 0 && std::abs(meter.hz() / fps.hz() - 1.0) > kOtherRate;
+}
+
+std::string count_text(const Timecode& timecode) {
+  return fmt::format("{} of {} frames per second{}", timecode_text(timecode),
+                     frame_rate_text(timecode.rate.hz()), timecode.is_drop ? ", drop-frame" : "");
+}
+
+using LtcFrames = std::vector<LtcFrame>;
+
+Result<LtcFrames> frames_of_file(const std::string& path, const FrameRate& fps) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return at(path, make_error(ErrorCode::NotFound, "cannot be read"));
   auto reader = WavReader::open(file);
   if (!reader) return at(path, reader.error());
   LtcDecoder decoder(reader->sample_rate_hz(), fps);
-  auto frames = std::make_shared<std::vector<LtcFrame>>();
+  LtcFrames frames;
   std::vector<float> samples(kChunkSamples);
   while (const size_t count = reader->read(samples))
     if (const auto frame = decoder.add(std::span(samples).first(count));
-        frame && frames->size() < kMaxLtcFrames)
-      frames->push_back(*frame);
-  if (frames->empty())
-    return at(path,
-              make_error(ErrorCode::BadInput, "has no timecode of {} frames per second in its first channel",
-                         frame_rate_text(fps.hz())));
+        frame && frames.size() < kMaxLtcFrames)
+      frames.push_back(*frame);
+  if (frames.empty())
+    return at(path, make_error(ErrorCode::BadInput, "has no timecode in its first channel"));
+  return frames;
+}
+
+Result<TimecodeAt> read_ltc_file(const std::string& path, const std::optional<FrameRate>& fps,
+                                 const LtcListener& listener) {
+  ASSIGN_OR_RETURN(const LtcFrames counted, frames_of_file(path, kMostFrames));
+  LtcRateMeter meter;
+  for (const LtcFrame& frame : counted) meter.add(frame);
+  if (fps && is_other_rate(meter, *fps))
+    return at(path, make_error(ErrorCode::BadInput, "{}", other_rate_text(meter, *fps)));
+  const FrameRate rate = fps                      ? *fps
+                         : meter.pair_count() > 0 ? meter.nearest()
+                                                  : counted.front().timecode.rate;
+  ASSIGN_OR_RETURN(LtcFrames read, frames_of_file(path, rate));
+  const auto frames = std::make_shared<const LtcFrames>(std::move(read));
+  listener(fmt::format("{}: timecode from {} on", path, count_text(frames->front().timecode)));
   return TimecodeAt([frames](double time_s) -> std::optional<Timecode> {
     const auto later = std::upper_bound(frames->begin(), frames->end(), time_s,
                                         [](double t_s, const LtcFrame& frame) { return t_s < frame.end_s; });
@@ -207,41 +259,78 @@ Result<TimecodeAt> read_ltc_file(const std::string& path, const FrameRate& fps) 
   });
 }
 
-Result<TimecodeAt> read_live_ltc(const FrameRate& fps) {
-  struct Live {
-    std::mutex mutex;
-    std::optional<LtcFrame> frame;
-    int64_t end_ns = 0;  // of its word
-  };
-  auto reader = WavReader::open(std::cin);
-  if (!reader) return at("standard input", reader.error());
-  const auto live = std::make_shared<Live>();
-  std::thread([live, reader = *reader, fps]() mutable {
-    LtcDecoder decoder(reader.sample_rate_hz(), fps);
+/// Timecode in sound as it comes.
+class LiveLtc {
+ public:
+  LiveLtc(const WavReader& reader, const std::optional<FrameRate>& fps, LtcListener listener)
+      : reader_(reader), fps_(fps), listener_(std::move(listener)) {}
+
+  /// Reads to the end, on a thread of its own.
+  void run() {
+    const double rate_hz = reader_.sample_rate_hz();
+    LtcDecoder decoder(rate_hz, fps_.value_or(kMostFrames));
+    LtcRateMeter meter;
     std::vector<float> samples(kChunkSamples / 4);
     double read_s = 0.0;
-    while (const size_t count = reader.read(samples)) {
+    bool is_counted = false;
+    while (const size_t count = reader_.read(samples)) {
       const auto frame = decoder.add(std::span(samples).first(count));
-      read_s += static_cast<double>(count) / reader.sample_rate_hz();
+      read_s += static_cast<double>(count) / rate_hz;
       if (!frame) continue;
-      const std::lock_guard lock(live->mutex);
-      live->end_ns = now_ns() - static_cast<int64_t>((read_s - frame->end_s) * kNsPerS);
-      live->frame = frame;
+      if (is_counted || fps_) put(*frame, read_s);
+      if (is_counted) continue;
+      meter.add(*frame);
+      if (meter.pair_count() < kMeasuredPairs) continue;
+      is_counted = true;
+      if (fps_ && is_other_rate(meter, *fps_))
+        listener_("standard input: " + other_rate_text(meter, *fps_));
+      else
+        listener_(fmt::format("standard input: timecode of {} frames per second",
+                              frame_rate_text(fps_.value_or(meter.nearest()).hz())));
+      if (!fps_) decoder.set_fps(meter.nearest());
     }
-  }).detach();
-  return TimecodeAt([live](double) -> std::optional<Timecode> {
-    const std::lock_guard lock(live->mutex);
-    const int64_t passed_ns = now_ns() - live->end_ns;
-    if (!live->frame || passed_ns > kLiveStaleNs) return std::nullopt;
-    return live->frame->after(static_cast<double>(passed_ns) * kSPerNs);
-  });
+  }
+
+  std::optional<Timecode> now() {
+    const std::lock_guard lock(mutex_);
+    if (!frame_ && now_ns() - begin_ns_ > kSilentNs && !std::exchange(was_silent_, true))
+      listener_("standard input: no timecode yet in the first channel of the sound");
+    const int64_t passed_ns = now_ns() - end_ns_;
+    if (!frame_ || passed_ns > kLiveStaleNs) return std::nullopt;
+    return frame_->after(static_cast<double>(passed_ns) * kSPerNs);
+  }
+
+ private:
+  void put(const LtcFrame& frame, double read_s) {
+    const std::lock_guard lock(mutex_);
+    end_ns_ = now_ns() - static_cast<int64_t>((read_s - frame.end_s) * kNsPerS);
+    frame_ = frame;
+  }
+
+  WavReader reader_;
+  const std::optional<FrameRate> fps_;
+  const LtcListener listener_;
+  const int64_t begin_ns_ = now_ns();
+  std::mutex mutex_;  // guards the block below
+  bool was_silent_ = false;
+  std::optional<LtcFrame> frame_;
+  int64_t end_ns_ = 0;  // of its word
+};
+
+Result<TimecodeAt> read_live_ltc(const std::optional<FrameRate>& fps, const LtcListener& listener) {
+  auto reader = WavReader::open(std::cin);
+  if (!reader) return at("standard input", reader.error());
+  const auto live = std::make_shared<LiveLtc>(*reader, fps, listener);
+  std::thread([live] { live->run(); }).detach();
+  return TimecodeAt([live](double) { return live->now(); });
 }
 
 }  // namespace
 
-Result<TimecodeAt> open_ltc(const std::string& path, const FrameRate& fps) {
-  if (!is_timecode_rate(fps, false)) return make_timecode({}, fps, false).error();
-  return path == "-" ? read_live_ltc(fps) : read_ltc_file(path, fps);
+Result<TimecodeAt> open_ltc(const std::string& path, const std::optional<FrameRate>& fps,
+                            const LtcListener& listener) {
+  if (fps && !is_timecode_rate(*fps, false)) return make_timecode({}, *fps, false).error();
+  return path == "-" ? read_live_ltc(fps, listener) : read_ltc_file(path, fps, listener);
 }
 
 }  // namespace strandcast

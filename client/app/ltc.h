@@ -8,6 +8,7 @@
 #include <istream>
 #include <optional>
 #include <span>
+#include <string>
 
 #include "common/base/result.h"
 #include "common/base/timecode.h"
@@ -19,6 +20,7 @@ struct LtcFrame {
   Timecode timecode;
   double end_s = 0.0;         // of its word since the first sample: the next frame begins here
   bool is_backwards = false;  // the word ends with its own beginning, and the frame before follows
+  bool has_drop_flag = false;
 
   /// Returns the timecode so long after the word's end.
   Timecode after(double passed_s) const {
@@ -35,13 +37,15 @@ class LtcDecoder {
   /// Reads further samples, and returns the newest frame that ended within them. Words that are no time of
   /// day are left out.
   std::optional<LtcFrame> add(std::span<const float> samples);
+  /// Counts words from the next one on as frames of another rate.
+  void set_fps(const FrameRate& fps) { fps_ = fps; }
 
  private:
   void note_edge(double at);
   void note_bit(bool bit, double at);
 
   const double sample_rate_hz_;
-  const FrameRate fps_;
+  FrameRate fps_;
   double bit_samples_ = 0.0;  // length of a bit, as it was of late
   double level_ = 0.0;        // of the loudest samples, as it was of late
   bool is_high_ = false;
@@ -52,6 +56,24 @@ class LtcDecoder {
   std::array<bool, 80> bits_{};  // the newest ones, a ring
   size_t bit_count_ = 0;
   std::optional<LtcFrame> newest_;
+};
+
+/// How many frames a second linear timecode counts, by the time from one to the next.
+class LtcRateMeter {
+ public:
+  void add(const LtcFrame& frame);
+  /// Returns the number of pairs of neighbours so far.
+  uint32_t pair_count() const { return pair_count_; }
+  /// Returns frames per second as they come, at the tape's speed; call it after the first pair.
+  double hz() const { return pair_count_ / sum_s_; }
+  /// Returns the rate of linear timecode that is nearest; 29.97 where words say that they drop numbers.
+  FrameRate nearest() const;
+
+ private:
+  std::optional<LtcFrame> last_;
+  double sum_s_ = 0.0;
+  uint32_t pair_count_ = 0;
+  bool drops_ = false;
 };
 
 /// The sound of a WAV file as it comes; its first channel.
@@ -79,8 +101,13 @@ class WavReader {
 /// Where linear timecode is at a time since its beginning; empty before the first frame. Any thread.
 using TimecodeAt = std::function<std::optional<Timecode>(double time_s)>;
 
+/// Receives sentences for a person, on any thread.
+using LtcListener = std::function<void(const std::string&)>;
+
 /// Reads a WAV file with linear timecode, or standard input ("-") as it comes, on a thread of its own that
-/// ends with the program. BadInput or NotFound if it cannot be read; a file needs one frame at least.
-Result<TimecodeAt> open_ltc(const std::string& path, const FrameRate& fps);
+/// ends with the program. Without `fps` its rate is measured. BadInput or NotFound if it cannot be read; a
+/// file needs one frame at least, and no other rate than `fps`.
+Result<TimecodeAt> open_ltc(const std::string& path, const std::optional<FrameRate>& fps,
+                            const LtcListener& listener);
 
 }  // namespace strandcast

@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "client/app/ctl_commands.h"
+#include "client/app/recorded_states.h"
 #include "common/base/units.h"
 #include "common/record/recording_check.h"
 #include "common/record/recording_reader.h"
@@ -102,6 +103,8 @@ int run_recording_info(const std::filesystem::path& path) {
     print_line("began",
                fmt::format("at step {}, while the simulation ran: --replay cannot simulate it again", *tick));
   if (const std::string take = take_text(start.slate, start.take); !take.empty()) print_line("take", take);
+  if (const std::string timecode = recorded_timecodes(path).text(); !timecode.empty())
+    print_line("timecode", timecode);
   print_line("simulated", start.sim_device_name);
   if (scene)
     print_line("scene", fmt::format("solver {}, {:g} steps/s of {} substeps, within {:g} mm",

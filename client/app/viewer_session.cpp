@@ -171,7 +171,7 @@ void ViewerSession::take_mode(ModeChange change) {
 void ViewerSession::show(StreamMode mode) {
   if (!modes_->note_shown(mode)) return;
   // Each stream counts its frames by itself, and those that were not sent to us are not missing.
-  last_picture_sequence_ = 0;
+  image_header_.sequence = 0;
   picture_latency_.restart();
   if (mode == StreamMode::Frames) replay_->forget_sequence();
 }
@@ -265,17 +265,15 @@ void ViewerSession::take_picture(const MediaEvent& event) {
   }
   show(StreamMode::Frames);
   if (header.base_sequence == 0) ++picture_stats_.whole_frames;
-  const bool is_same_stream = last_picture_sequence_ != 0 && header.stream_id == last_picture_stream_;
-  if (is_same_stream && header.sequence > last_picture_sequence_ + 1)
-    picture_stats_.missed_frames += header.sequence - last_picture_sequence_ - 1;
-  last_picture_sequence_ = header.sequence;
-  last_picture_stream_ = header.stream_id;
+  const FrameHeader last = std::exchange(image_header_, header);
+  const bool is_same_stream = last.sequence != 0 && header.stream_id == last.stream_id;
+  if (is_same_stream && header.sequence > last.sequence + 1)
+    picture_stats_.missed_frames += header.sequence - last.sequence - 1;
   picture_latency_.add_picture(header.sim_time_ns, now_ns(), client_->clock());
   picture_decode_timer_.add_ms(static_cast<double>(now_ns() - begin_ns) * 1e-6);
   image_ = std::make_shared<const Image>(*pictures_.image());
   if (is_blank(*image_)) ++blank_pictures_;
   ++image_count_;
-  image_sim_time_ns_ = header.sim_time_ns;
   tell_times(event, nullptr);
   acknowledge(event, begin_ns);
 }

@@ -107,7 +107,9 @@ class ViewerSession {
   std::shared_ptr<const Image> shared_image() const { return image_; }
   uint64_t image_count() const { return image_count_; }
   /// Returns the simulation time of the newest picture, ns.
-  int64_t image_sim_time_ns() const { return image_sim_time_ns_; }
+  int64_t image_sim_time_ns() const { return image_header_.sim_time_ns; }
+  /// Returns true if no finer picture of that state will come.
+  bool is_image_still() const { return (image_header_.flags & kStillPicture) != 0; }
 
   /// Returns how the server codes strands for this viewer; it changes with the link.
   const StreamQuality& quality() const { return quality_; }
@@ -178,9 +180,7 @@ class ViewerSession {
   bool was_shown_ = false;
   uint64_t blank_pictures_ = 0;
   uint64_t image_count_ = 0;
-  int64_t image_sim_time_ns_ = 0;
-  uint32_t last_picture_sequence_ = 0;
-  uint16_t last_picture_stream_ = 0;
+  FrameHeader image_header_;  // sequence 0 before the first
   std::optional<FrameQuality> frame_quality_;
   StreamQuality quality_;
   uint64_t quality_changes_ = 0;

@@ -30,9 +30,10 @@ struct ExportOptions {
   std::optional<glm::dmat4> file_from_space = {};
   ExportSpace space = ExportSpace::Head;
   ExportRole role = ExportRole::Strands;
-  double from_s = 0.0;                               // after the first state
-  std::optional<double> to_s;                        // likewise; empty: to the last state
-  std::string from_timecode = {}, to_timecode = {};  // instead of seconds; empty: these
+  double from_s = 0.0;         // after the first state
+  std::optional<double> to_s;  // likewise; empty: to the last state
+  // Instead of seconds; empty: these. With from_timecode alone to_s counts from there.
+  std::string from_timecode = {}, to_timecode = {};
   int64_t first_number = 1;   // of the first frame: frames since midnight, where states carry timecode
   bool has_head = false;      // the head as a mesh, too; not for .csv
   bool is_one_frame = false;  // the one at from_s, without the rest shape (.ply)

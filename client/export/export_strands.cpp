@@ -36,6 +36,7 @@ struct FramePlan {
   ExportOptions options;
   SampleRange range;
   std::string first_timecode;  // empty: frames are so many seconds after the first state
+  std::string remark;          // for a person, empty = none
 };
 
 Error other_rate(const FrameRate& rate) {
@@ -65,6 +66,8 @@ Status plan_by_timecode(const TimecodeTrack& track, const FrameRate& rate, Frame
   if (!plan.options.to_timecode.empty()) {
     ASSIGN_OR_RETURN(to, parse_timecode(plan.options.to_timecode, rate));
   }
+  if (from && plan.options.to_s) to = advanced(*from, *plan.options.to_s * rate.hz());
+  plan.options.to_s = plan.range.to_s = std::nullopt;
   ASSIGN_OR_RETURN(TimecodeTrack::Frames frames, track.frames(from, to));
   if (frames.time_ns.empty())
     return make_error(ErrorCode::BadInput, "no whole frame lies between the states of this range");
@@ -96,6 +99,7 @@ Status count_on(const CountedState& now, FramePlan& plan) {
     return make_error(ErrorCode::BadInput, "it is {} already, {} is over", timecode_text(first),
                       timecode_text(from));
   options.from_s = plan.range.from_s = std::max(0.0, waited) / rate.hz();
+  if (options.to_s && !options.from_timecode.empty()) *options.to_s += options.from_s;
   if (!options.to_timecode.empty()) {
     ASSIGN_OR_RETURN(const Timecode to, parse_timecode(options.to_timecode, rate));
     options.to_s = frames_between(first, to) / rate.hz();
@@ -111,7 +115,7 @@ Status count_on(const CountedState& now, FramePlan& plan) {
 }
 
 Result<FramePlan> plan_frames(ExportSource& source, const ExportOptions& options) {
-  FramePlan plan{options, {options.fps, options.from_s, options.to_s}, {}};
+  FramePlan plan{options, {options.fps, options.from_s, options.to_s}, {}, {}};
   const TimecodeTrack& track = source.timecodes();
   ASSIGN_OR_RETURN(plan.range.first_ns, source.skip_to(0.0));
   if (const auto running = source.counted(); running && plan.range.first_ns) {
@@ -121,6 +125,11 @@ Result<FramePlan> plan_frames(ExportSource& source, const ExportOptions& options
   ASSIGN_OR_RETURN(const bool is_by_timecode,
                    goes_by_timecode(options, track, plan.range.first_ns.value_or(0)));
   if (is_by_timecode) RETURN_IF_ERROR(plan_by_timecode(track, track.first()->rate, plan));
+  if (!is_by_timecode && track.first() && !options.has_fps)
+    plan.options.fps = plan.range.fps = track.first()->rate;
+  if (!is_by_timecode && track.first() && !options.is_one_frame)
+    plan.remark = fmt::format("frames count from 1, not by timecode ({}): --from and --to name a part of it",
+                              track.text());
   if (is_by_timecode && plan.range.first_ns)
     plan.options.from_s =
         std::max(0.0, static_cast<double>(plan.range.time_ns.front() - *plan.range.first_ns) / kNsPerS);
@@ -139,6 +148,7 @@ class Export {
         progress_({"export", options_.is_quiet, "frame"}) {
     report_.fps = options_.fps.hz();
     report_.first_timecode = plan.first_timecode;
+    if (!plan.remark.empty()) report_.remarks.push_back(plan.remark);
     const ExportOptions& options = options_;
     if (const auto count = static_cast<uint32_t>(plan.range.time_ns.size()); count > 0) {
       progress_.expect(count, count);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "common/base/units.h"
 
 namespace strandcast {
@@ -36,6 +38,20 @@ std::optional<Timecode> TimecodeTrack::first() const {
 
 bool TimecodeTrack::is_whole(int64_t first_ns) const {
   return stretches_.size() == 1 && stretches_.front().point.front().sim_time_ns - first_ns <= kSInNs;
+}
+
+std::string TimecodeTrack::text() const {
+  if (stretches_.empty()) return {};
+  const Stretch& last = stretches_.back();
+  const Timecode first = stretches_.front().first;
+  std::string text = fmt::format("{} to {} of {} frames per second{}", timecode_text(first),
+                                 timecode_text(advanced(last.first, last.point.back().place)),
+                                 frame_rate_text(first.rate.hz()), first.is_drop ? ", drop-frame" : "");
+  const size_t jumps = stretches_.size() - 1;
+  if (jumps > 0)
+    text += fmt::format(", with {} jump{}{} to {}", jumps, jumps == 1 ? "" : "s",
+                        jumps == 1 ? "" : ", the first", timecode_text(stretches_[1].first));
+  return text;
 }
 
 /// `begin`, `end`: places within the stretch.

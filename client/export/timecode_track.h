@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "common/base/result.h"
@@ -21,6 +22,10 @@ class TimecodeTrack {
 
   /// Returns whether timecode begins about with the first state, at `first_ns`, and never jumps.
   bool is_whole(int64_t first_ns) const;
+
+  /// Returns a text such as "01:00:00:00 to 01:00:09:23 of 24 frames per second, with 2 jumps, the first to
+  /// 02:00:00:00"; empty without timecode.
+  std::string text() const;
 
   /// Times of a run of frames, simulated.
   struct Frames {

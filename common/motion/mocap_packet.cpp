@@ -198,12 +198,12 @@ std::vector<std::byte> encode_track(const MocapMoment& moment, TrackEncoding enc
 constexpr MocapEncoding kEncodings[] = {
     {"vmc", 39539, encode_vmc},
     {"opentrack", 4242, encode_opentrack},
-    {"freed", 40000, encode_freed, true},
+    {"freed", 40000, encode_freed, true, true},
     {"vrchat", 9000, encode_vrchat},
     {"opentrackio", kOpenTrackIoPort,
-     [](const MocapMoment& moment) { return encode_track(moment, TrackEncoding::Json); }, true},
+     [](const MocapMoment& moment) { return encode_track(moment, TrackEncoding::Json); }, true, true},
     {"opentrackio-cbor", kOpenTrackIoPort,
-     [](const MocapMoment& moment) { return encode_track(moment, TrackEncoding::Cbor); }, true}};
+     [](const MocapMoment& moment) { return encode_track(moment, TrackEncoding::Cbor); }, true, true}};
 
 }  // namespace
 

@@ -34,6 +34,7 @@ struct MocapEncoding {
   uint16_t port;  // that servers listen on
   std::vector<std::byte> (*encode)(const MocapMoment&);
   bool numbers_sources = false;  // several heads can go to one address
+  bool has_timecode = false;
 };
 
 /// Returns the names of all protocols for a person, for example "vmc, freed".

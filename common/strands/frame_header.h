@@ -35,13 +35,15 @@ inline constexpr uint16_t kPictureStreamBit = 0x8000;
 constexpr uint16_t picture_stream_id(uint32_t picture_class) {
   return static_cast<uint16_t>(kPictureStreamBit | (picture_class & (kPictureStreamBit - 1u)));
 }
+/// Bit of a picture's flags: it is the finest of its state.
+inline constexpr uint8_t kStillPicture = 1;
 inline constexpr uint32_t kMaxMediaPayloadBytes = 64u << 20;
 
 struct FrameHeader {
   Opcode opcode = Opcode::StrandDelta;
-  uint8_t flags = 0;           // of strands: bits of the bust (strand_payload.h); else reserved, 0
-  uint16_t stream_id = 0;      // the strand class; of pictures, their class and kPictureStreamBit
-  uint32_t sequence = 0;       // counts per stream, from 1
+  uint8_t flags = 0;       // strands: bits of the bust (strand_payload.h); pictures: kStillPicture; else 0
+  uint16_t stream_id = 0;  // the strand class; of pictures, their class and kPictureStreamBit
+  uint32_t sequence = 0;   // counts per stream, from 1
   uint32_t base_sequence = 0;  // a delta decodes only right after this one; 0 = none needed
   uint32_t payload_bytes = 0;
   int64_t sim_time_ns = 0;

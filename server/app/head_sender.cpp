@@ -6,6 +6,8 @@
 #include "common/base/units.h"
 #include "common/log/log.h"
 #include "server/app/mocap_option.h"
+#include "server/input/live/live_source.h"
+#include "server/net/ip_address.h"
 
 namespace strandcast {
 
@@ -18,6 +20,24 @@ Result<HeadSend> parse_head_send(const std::string& text) {
   if (!place.host.empty()) send.to.host = place.host;
   send.to.port = place.port != 0 ? static_cast<uint16_t>(place.port) : encoding->port;
   return send;
+}
+
+Status check_sends(const std::vector<HeadSend>& sends, const SceneDesc& scene) {
+  std::vector<LiveDesc> inputs = scene.live;
+  for (const SceneDesc& head : scene.heads) inputs.insert(inputs.end(), head.live.begin(), head.live.end());
+  for (const HeadSend& send : sends) {
+    const auto to = IpAddress::parse(send.to.host);
+    if (send.to.host != "localhost" && !(to && to->is_loopback())) continue;
+    for (size_t i = 0; i < inputs.size(); ++i) {
+      ASSIGN_OR_RETURN(const auto input, LiveSource::make(inputs[i], i));
+      if (input->protocol().transport == LiveTransport::Udp && input->port() == send.to.port)
+        return make_error(ErrorCode::BadInput,
+                          "--send {} goes to port {} of this machine, where this server hears {}: "
+                          "--send {}://HOST:PORT names another place",
+                          send.protocol, send.to.port, inputs[i].protocol, send.protocol);
+    }
+  }
+  return {};
 }
 
 HeadSender::HeadSender(std::vector<Way> ways, HeadSenderConfig config)

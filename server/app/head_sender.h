@@ -33,6 +33,9 @@ struct HeadSend {
 /// explains the accepted forms, or lists the protocols.
 Result<HeadSend> parse_head_send(const std::string& text);
 
+/// Returns an error where what is sent comes back into a live input of this machine.
+Status check_sends(const std::vector<HeadSend>& sends, const SceneDesc& scene);
+
 /// What else goes with a state.
 struct HeadTold {
   std::optional<glm::vec3> wind_mps;  // at the head, world

@@ -10,6 +10,7 @@ namespace {
 
 constexpr size_t kMaxOptionChars = 100;
 constexpr uint32_t kMaxPort = 65'535;
+constexpr const char* kCountsInSpareWord = "freed";
 
 Error not_understood(const char* option, const std::string& text, const char* why) {
   return make_error(ErrorCode::BadInput,
@@ -62,14 +63,21 @@ Result<SceneDesc> with_mocap(const SceneDesc& scene, const MocapOptions& options
   if (options.inputs.empty()) return scene;
   SceneDesc changed = scene;
   changed.live.clear();
+  bool is_counted = false;
   for (const std::string& input : options.inputs) {
     ASSIGN_OR_RETURN(LiveDesc live, parse_mocap(input));
     live.subject = options.subject;
     live.axes = options.axes;
-    if (!options.timecode.empty()) live.axes += "/" + options.timecode;
+    if (!options.timecode.empty() && live.protocol == kCountsInSpareWord) {
+      live.axes += "/" + options.timecode;
+      is_counted = true;
+    }
     live.scale = options.scale;
     changed.live.push_back(std::move(live));
   }
+  if (!options.timecode.empty() && !is_counted)
+    return make_error(ErrorCode::BadInput,
+                      "--mocap-timecode says how freed counts frames, and no --mocap names it");
   return with_overrides(changed, overrides);
 }
 

@@ -445,6 +445,7 @@ Result<ServerConfig> load_config(const ServerOptions& options) {
     ASSIGN_OR_RETURN(config.scene.heads[i],
                      choose_solver(scene.heads[i], own.heads[i].solver, options.overrides));
   }
+  RETURN_IF_ERROR(check_sends(config.sends, scene));
   if (const std::string note = left_out_note(scene, config.scene); !note.empty()) log_warn("app", "{}", note);
   return config;
 }

@@ -180,6 +180,11 @@ std::vector<std::shared_ptr<Recorder>> RecordDesk::recorders() const {
   return all;
 }
 
+bool RecordDesk::has_take() const {
+  const std::lock_guard lock(mutex_);
+  return take_ != nullptr;
+}
+
 void RecordDesk::obey(const RecordCommand& command, Reply reply) {
   if (!folder_) return reply(Notice{true, kNoRecordings});
   {

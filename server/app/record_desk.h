@@ -86,6 +86,8 @@ class RecordDesk {
   /// Starts or stops a take; without one, stops the recording that began with the server. The reply comes on
   /// another thread, unless the command is refused at once.
   void obey(const RecordCommand& command, Reply reply);
+  /// Returns whether a recording is under way that a command began.
+  bool has_take() const;
   /// Describes the recordings for a person: "take 5.mcap: 12.5 s, 3.2 MB", or why they ended; empty = nothing
   /// is recorded.
   std::string text() const;

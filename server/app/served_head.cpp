@@ -14,6 +14,14 @@
 #include "server/encode/picture_painter.h"
 
 namespace strandcast {
+namespace {
+
+// Of pictures in lockstep: it tells a state's lattice, whichever states came before. Others may be off by the
+// bound, and by what differs with the times at which pictures are drawn.
+constexpr const char* kSteppedPictureCodec = "delta";
+
+}  // namespace
+
 Result<std::unique_ptr<ServedHead>> ServedHead::load(const ServerConfig& config, size_t number,
                                                      OtherHeads others) {
   std::unique_ptr<ServedHead> head(new ServedHead(config, number));
@@ -61,7 +69,8 @@ Status ServedHead::load(OtherHeads others) {
                              [this](const auto& other, const LookDesc& look) {
                                return config_.make_painter({painting_, other, look});
                              },
-                             [this](const SnapshotInfo& state) { stages_.note_state(state, now_ns()); }}));
+                             [this](const SnapshotInfo& state) { stages_.note_state(state, now_ns()); },
+                             config_.is_lockstep ? kSteppedPictureCodec : std::string()}));
   is_drawn_by_processors_ = config_.is_drawn_by_processors(painter.device);
   ASSIGN_OR_RETURN(idle_picture_passes_,
                    plan_picture_passes(*asset, scene.look, likely_renderer(config_.renderer, scene.look), 0));
@@ -121,7 +130,7 @@ NetHead ServedHead::admit(Whole whole) {
   desk_ = std::make_unique<SessionDesk>(SessionDesk::Parts{
       config_.scene, *hub_, *source_, inputs_, stages_, codecs_, asset_frame_, is_drawn_by_processors_,
       config_.scene.live.empty() ? nullptr : live_, number_, std::move(whole.heads), std::move(whole.scene),
-      [this] { return quality_reason(); }, records_.get(), whole.records});
+      [this] { return quality_reason(); }, records_.get(), whole.records, std::move(whole.sources)});
   desk_->set_metrics(std::move(whole.metrics));
   NetHead head{name(), desk_.get(), hub_->strand_classes(), {}};
   for (const StrandCodecInfo& codec : codecs_) head.strand_codecs.push_back(codec.bytes);
@@ -288,7 +297,7 @@ void ServedHead::count_strands(ServerCounters& counters) const {
   for (const auto& [stream_id, of_stream] : counters.strand_streams) {
     const StrandStream stream = strand_stream_of(stream_id);
     const uint32_t readers = hub_->strand_readers(stream_id);
-    counters.strand_viewers_of[codecs_[stream.codec].name] += readers;
+    if (stream.codec < codecs_.size()) counters.strand_viewers_of[codecs_[stream.codec].name] += readers;
     counters.strand_classes_in_use += readers > 0 ? 1 : 0;
     if (stream.strand_class > 0) continue;
     StrandEncodeCounters& first = counters.encode;

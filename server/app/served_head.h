@@ -44,6 +44,7 @@ class ServedHead {
     std::function<std::optional<SceneDesc>()> scene;  // with all heads, as it runs; from any thread
     std::function<std::string()> metrics;             // likewise
     const RecordDesks* records = nullptr;             // of all heads, where there are several that record
+    std::vector<StateSource*> sources = {};           // of all heads, where there are several
   };
   /// Makes the handler of this head's sessions.
   NetHead admit(Whole whole);
@@ -57,6 +58,7 @@ class ServedHead {
   // From any thread once it was admitted.
   const std::string& name() const { return config_.scene.name; }
   StreamHub& hub() { return *hub_; }
+  StateSource& source() { return *source_; }
   PaintedHead painted() { return {hub_.get(), source_->asset()}; }
   /// Returns the scene as it runs; empty if the source has no scene.
   std::optional<SceneDesc> scene() const;

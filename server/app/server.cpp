@@ -137,7 +137,13 @@ void Server::State::record(RecordDesk& own, const RecordCommand& command) const 
     else
       log_info("record", "{}", said.text);
   };
-  if (records_ != nullptr)
+  // What anybody on this machine may send ends no file that a person's option began.
+  const auto has_take = [](const auto& head) {
+    return head->records() != nullptr && head->records()->has_take();
+  };
+  if (!command.is_wanted && std::none_of(heads_.begin(), heads_.end(), has_take))
+    log_warn("record", "a sender ends a take, and none is being recorded");
+  else if (records_ != nullptr)
     records_->obey(command, reply);
   else
     own.obey(command, reply);
@@ -167,7 +173,10 @@ Status Server::State::listen() {
   whole.scene = [this] { return scene(); };
   whole.metrics = [this] { return metrics(); };
   if (heads_.size() > 1)
-    for (const auto& head : heads_) whole.heads.push_back(head->name());
+    for (const auto& head : heads_) {
+      whole.heads.push_back(head->name());
+      whole.sources.push_back(&head->source());
+    }
   if (heads_.size() > 1 && heads_.front()->records() != nullptr) {
     std::vector<RecordDesks::Of> records;
     for (const auto& head : heads_) records.push_back({head->name(), head->records()});

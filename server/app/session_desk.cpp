@@ -9,6 +9,7 @@
 #include "common/base/version.h"
 #include "common/log/log.h"
 #include "common/scene/scene_file.h"
+#include "server/app/joined_answers.h"
 
 namespace strandcast {
 namespace {
@@ -104,7 +105,7 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
   }
   viewers_.note_address(visitor.session, visitor.address);
   if (is_relay) teller_.add(visitor.session);
-  if (parts_.all_records != nullptr && hello.head.empty()) whole_viewers_.insert(visitor.session);
+  if (!parts_.heads.empty() && hello.head.empty()) whole_viewers_.insert(visitor.session);
   Admission admission;
   admission.welcome = make_welcome(*place, codec);
   if (visitor.subscription.gets(StreamMode::Strands)) admission.asset = asset();
@@ -186,8 +187,18 @@ void SessionDesk::on_need(SessionId, const StreamNeed& need) {
 void SessionDesk::obey(SessionId session, const ControlCommand& command) {
   // Each of these waits for the one before, and a test makes many.
   const bool is_counted = command.command == Command::StepOnce && command.step_count > 0;
-  if (is_counted || may_control(session, name_of(command.command)))
-    parts_.source.post(command, reply_to(session, name_of(command.command)), viewers_.describe(session));
+  if (is_counted || may_control(session, name_of(command.command))) control(session, command);
+}
+
+/// The head that the session named, else all.
+void SessionDesk::control(SessionId session, const ControlCommand& command) {
+  StateSource::Reply reply = reply_to(session, name_of(command.command));
+  const std::string who = viewers_.describe(session);
+  if (!whole_viewers_.contains(session)) return parts_.source.post(command, std::move(reply), who);
+  const auto answers = std::make_shared<JoinedAnswers>(parts_.heads, std::move(reply));
+  for (size_t i = 0; i < parts_.sources.size(); ++i)
+    parts_.sources[i]->post(
+        command, [answers, i](Notice notice) { answers->take(i, std::move(notice)); }, who);
 }
 
 void SessionDesk::obey(SessionId session, const SetParameter& parameter) {
@@ -280,7 +291,8 @@ void SessionDesk::obey(SessionId session, const CameraCommand& command) {
 void SessionDesk::obey(SessionId session, const RecordCommand& command) {
   const std::string what = command.is_wanted ? "record start " + command.name : "record stop";
   if (!may_control(session, what)) return;
-  if (whole_viewers_.contains(session)) return parts_.all_records->obey(command, reply_to(session, what));
+  if (parts_.all_records != nullptr && whole_viewers_.contains(session))
+    return parts_.all_records->obey(command, reply_to(session, what));
   if (parts_.records != nullptr) return parts_.records->obey(command, reply_to(session, what));
   net_->send(session, Notice{true, std::string(kNoRecordings)});
 }
@@ -444,8 +456,10 @@ Status SessionDesk::readiness() {
 }
 
 void SessionDesk::on_left(SessionId session) {
-  parts_.source.leave(viewers_.describe(session));
-  whole_viewers_.erase(session);
+  const std::string who = viewers_.describe(session);
+  parts_.source.leave(who);
+  if (whole_viewers_.erase(session) > 0)
+    for (StateSource* const source : parts_.sources) source->leave(who);
   control_budget_.remove(session);
   parameter_budget_.remove(session);
   answer(session, StateTimesRequest{false});

@@ -55,6 +55,7 @@ class SessionDesk : public NetHandler, private StreamReader {
     std::function<std::string()> quality_reason = {};
     RecordDesk* records = nullptr;             // null: nothing is recorded here
     const RecordDesks* all_records = nullptr;  // of all heads, where there are several
+    std::vector<StateSource*> sources = {};    // likewise
   };
   explicit SessionDesk(Parts parts);
 
@@ -102,6 +103,7 @@ class SessionDesk : public NetHandler, private StreamReader {
   void list_classes(const std::vector<StrandClass>& classes, const std::string& reason);
 
   void obey(SessionId session, const ControlCommand& command);
+  void control(SessionId session, const ControlCommand& command);
   void obey(SessionId session, const SetParameter& parameter);
   void obey(SessionId session, const LiveCommand& command);
   void obey(SessionId session, const CameraCommand& command);

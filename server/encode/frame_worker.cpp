@@ -358,10 +358,11 @@ std::optional<FrameWorker::Due> FrameWorker::next_due_of(uint32_t picture_class,
     if (!first || time_ns < first->wait.due_ns)
       first = Due{picture_class, task, {time_ns, time_ns + drawn.spacing_ns}};
   };
-  if (drawn.decode_count != decode_count_) consider(Task::Paint, paint_due_ns(drawn));
+  const bool is_current = drawn.decode_count == decode_count_;
+  if (!is_current) consider(Task::Paint, paint_due_ns(drawn));
   if (drawn.encoder == nullptr) return first;
   if (drawn.is_whole_wanted) consider(Task::Whole, drawn.encoder->whole_due_ns());
-  if (config_.still_periods > 0 && !drawn.is_still)
+  if (config_.still_periods > 0 && !drawn.is_still && is_current)
     consider(Task::Still, drawn.change_ns + config_.still_periods * frame_interval_ns_);
   return first;
 }
@@ -385,6 +386,7 @@ void FrameWorker::paint_alike(const PictureView& view) {
                         paint_due_ns(drawn) <= begin_ns + frame_interval_ns_ / 2;
     if (!is_due || !look_alike(drawn.view, view)) continue;
     drawn.decode_count = decode_count_;
+    drawn.sim_time_ns = snapshot_->sim_time_ns;
     drawn.schedule.begin(begin_ns, drawn.spacing_ns);
     classes.push_back(picture_class);
   }
@@ -459,8 +461,8 @@ void FrameWorker::follow_look() {
   for (const auto& [picture_class, drawn] : drawn_) hooks_.on_look_refused(picture_class, status.error());
 }
 
-PictureStamp FrameWorker::stamp(uint32_t picture_class) const {
-  return {picture_stream_id(picture_class), snapshot_->sim_time_ns, now_ns()};
+PictureStamp FrameWorker::stamp(uint32_t picture_class, bool is_still) const {
+  return {picture_stream_id(picture_class), drawn_.at(picture_class).sim_time_ns, now_ns(), is_still};
 }
 
 Status FrameWorker::encode(uint32_t picture_class, const Image& image) {
@@ -471,7 +473,7 @@ Status FrameWorker::encode(uint32_t picture_class, const Image& image) {
   }
   const int64_t begin_ns = now_ns();
   ASSIGN_OR_RETURN(const PicturePtr picture,
-                   drawn.encoder->encode(image, drawn.view.quality, stamp(picture_class)));
+                   drawn.encoder->encode(image, drawn.view.quality, stamp(picture_class, false)));
   if (picture == nullptr) {
     const std::lock_guard lock(mutex_);
     ++counters_.unchanged;
@@ -496,7 +498,7 @@ Status FrameWorker::resend(const Due& due) {
   (is_still ? drawn.is_still : drawn.is_whole_wanted) = is_still;
   PictureEncoder& encoder = *drawn.encoder;
   const uint32_t last_sequence = encoder.sequence();
-  const PictureStamp now = stamp(due.picture_class);
+  const PictureStamp now = stamp(due.picture_class, is_still);
   ASSIGN_OR_RETURN(const PicturePtr picture, is_still ? encoder.still(now) : encoder.whole(now));
   if (picture == nullptr) return {};
   {

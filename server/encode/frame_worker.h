@@ -117,6 +117,7 @@ class FrameWorker {
     std::unique_ptr<PictureEncoder> encoder;  // null until the first picture of this size and codec
     uint32_t last_sequence = 0;               // of the encoders before it
     uint64_t decode_count = 0;                // when last drawn, 0 = never with this view
+    int64_t sim_time_ns = 0;                  // of the state that was drawn
     PictureSchedule schedule;
     int64_t change_ns = 0;     // when the picture last changed
     double cost_ms = 0.0;      // smoothed, of drawing and encoding this view; 0 = not known
@@ -168,7 +169,7 @@ class FrameWorker {
   void note_left_out();
   Status encode(uint32_t picture_class, const Image& image);
   Status resend(const Due& due);
-  PictureStamp stamp(uint32_t picture_class) const;
+  PictureStamp stamp(uint32_t picture_class, bool is_still) const;
   void give(uint32_t picture_class, const PicturePtr& picture);
   void refuse(uint32_t picture_class, const Error& error);
   void fail(const Error& error);

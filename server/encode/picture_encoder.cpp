@@ -22,6 +22,7 @@ FrameHeader make_header(Opcode opcode, uint32_t sequence, uint32_t base_sequence
   header.base_sequence = base_sequence;
   header.sim_time_ns = stamp.sim_time_ns;
   header.send_time_ns = stamp.time_ns;
+  header.flags = stamp.is_still ? kStillPicture : 0;
   return header;
 }
 
@@ -52,8 +53,9 @@ class WholeEncoder : public PictureEncoder {
   uint32_t sequence() const override { return sequence_; }
 
  private:
-  Result<PicturePtr> code(int quality, const PictureStamp& stamp) {
+  Result<PicturePtr> code(int quality, PictureStamp stamp) {
     ASSIGN_OR_RETURN(const auto jpeg, encode_jpeg(image_, quality));
+    stamp.is_still = quality >= kStillQuality;
     ASSIGN_OR_RETURN(newest_, one_message(make_header(Opcode::JpegFrame, sequence_ + 1, 0, stamp), jpeg));
     ++sequence_;
     quality_ = quality;

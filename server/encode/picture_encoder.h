@@ -22,7 +22,8 @@ inline constexpr int64_t kKeyframePauseNs = 1'000'000'000;
 struct PictureStamp {
   uint16_t stream_id = 0;
   int64_t sim_time_ns = 0;
-  int64_t time_ns = 0;  // server clock
+  int64_t time_ns = 0;    // server clock
+  bool is_still = false;  // the finest of this state
 };
 
 class PictureEncoder {

@@ -24,13 +24,15 @@ bool is_alike(const SourceDemand& a, const SourceDemand& b) {
 }
 
 std::vector<std::string> codecs_of(const StreamHubConfig& config) {
-  if (config.fallback_codec.empty()) return {config.stream.codec};
-  return {config.stream.codec, config.fallback_codec};
+  std::vector<std::string> codecs{config.stream.codec};
+  for (const std::string& other : {config.fallback_codec, config.picture_codec})
+    if (!other.empty()) codecs.push_back(other);
+  return codecs;
 }
 
 }  // namespace
 
-/// Pictures are drawn from what every viewer could decode, all strands of it.
+/// Pictures are drawn from all strands of the last codec.
 StreamHub::StreamHub(StreamHubConfig config)
     : config_(std::move(config)),
       codecs_(codecs_of(config_)),

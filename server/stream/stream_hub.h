@@ -35,6 +35,7 @@ struct StreamHubConfig {
   std::function<MakePicturePainter(const std::shared_ptr<const SceneAsset>&, const LookDesc&)> painter_of =
       {};
   std::function<void(const SnapshotInfo&)> on_state = {};  // hears of each before any reader; may be empty
+  std::string picture_codec = {};  // that pictures are drawn from; empty = what every viewer can decode
 };
 
 class StreamHub : public StateSink, public DemandDesk {
@@ -79,8 +80,8 @@ class StreamHub : public StateSink, public DemandDesk {
   void tell_camera(uint64_t viewer, const CameraDesc& camera);
 
   StreamDesc stream() const;
-  /// Returns the codecs of the strands: the scene's and its fallback. Each has all classes, whose streams are
-  /// numbered by stream_id_of(). Only demanded streams are encoded.
+  /// Returns the codecs of the strands: the scene's, its fallback, and the one of pictures if it is another.
+  /// Each has all classes, whose streams are numbered by stream_id_of(). Only demanded streams are encoded.
   const std::vector<std::string>& strand_codecs() const { return codecs_; }
   /// Returns the newest look.
   LookChange look() const;

@@ -180,9 +180,9 @@ TEST(Feed, AFeederThatWasHeldUpSkipsToNow) {
   FeedPlan plan = plan_of(true);
   std::atomic<bool> stop = false;
   std::vector<double> time_s, place_m;
-  const SendMoment send = [&](double at_s, const Pose& pose, const std::optional<glm::vec3>&) {
-    time_s.push_back(at_s);
-    place_m.push_back(pose.position_m.x);
+  const SendMoment send = [&](const MocapMoment& moment) {
+    time_s.push_back(moment.time_s);
+    place_m.push_back(moment.world_from_head.position_m.x);
     if (time_s.size() == 10) std::this_thread::sleep_for(kHeldUp);
     stop = time_s.size() == 20;
     return true;

@@ -171,6 +171,20 @@ TEST_F(Heads, ASessionIsAboutTheHeadThatItNames) {
   EXPECT_NE(first->look().look.hair_color, "red");
 }
 
+TEST_F(Heads, WhoNamesNoneStopsAndStepsAllOfThem) {
+  if (!begin()) return;
+  const auto sim = [this](size_t head) { return server_->counters(head).sim; };
+  EXPECT_EQ(run_command(target_of(""), ControlCommand{Command::Pause}), kDoneExit);
+  EXPECT_TRUE(sim(0).is_paused && sim(1).is_paused);
+  const uint64_t first = sim(0).tick, other = sim(1).tick;
+  EXPECT_EQ(run_command(target_of(""), ControlCommand{Command::StepOnce, 5}), kDoneExit);
+  EXPECT_EQ(sim(0).tick, first + 5);
+  EXPECT_EQ(sim(1).tick, other + 5);
+  EXPECT_EQ(run_command(target_of("ben"), ControlCommand{Command::StepOnce, 2}), kDoneExit);
+  EXPECT_EQ(sim(0).tick, first + 5);
+  EXPECT_EQ(sim(1).tick, other + 7) << "the one that was named";
+}
+
 TEST_F(Heads, AnUnknownNameIsAnsweredWithThoseThereAre) {
   if (!begin()) return;
   const auto wrong = ViewerClient::connect(config_for("carl"));

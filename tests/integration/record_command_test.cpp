@@ -403,6 +403,27 @@ TEST_F(RecordCommands, EndWhereTheDiskGetsFull) {
   EXPECT_THAT(stop_recording().text, HasSubstr("Nothing is being recorded"));
 }
 
+// Anybody on this machine may send a stop.
+TEST_F(RecordCommands, ASenderEndsNoRecordingThatBeganWithTheServer) {
+  ServerConfig both = config();
+  both.record = RecordConfig{file("run.mcap"), IfPresent::Refuse};
+  const uint16_t port = test::free_udp_port();
+  both.scene.live = {LiveDesc{.protocol = "vmc", .port = port}};
+  if (!start(both)) return;
+  test::UdpSocket desk;
+  desk.send(test::osc("/strandcast/record/start", {std::string("12A")}), port);
+  ASSERT_TRUE(eventually([&] { return file_count() == 2u; }));
+  record_states(3);
+  for (int i = 0; i < 2; ++i) {
+    desk.send(test::osc("/strandcast/record/stop", {}), port);
+    record_states(10);
+  }
+  EXPECT_TRUE(server_->counters().record.has_value());
+  const auto reader = RecordingReader::open(file("12A.mcap"));
+  ASSERT_TRUE(reader) << reader.error().to_string();
+  EXPECT_FALSE(stop_recording().is_error) << "a person may end it";
+}
+
 TEST_F(RecordCommands, EndTheRecordingThatBeganWithTheServer) {
   ServerConfig both = config();
   both.record = RecordConfig{file("run.mcap"), IfPresent::Refuse};

@@ -300,8 +300,24 @@ TEST_F(ScenarioProgram, PicturesOfTheServerAreTheSameInEveryRunInLockstep) {
                                     "do { step: 30 }\n"
                                     "do { expect { picture { golden: \"seen.png\" db_above: 98 } } }\n");
   EXPECT_EQ(run({"--scenario", path.string(), "--renew"}), 0) << text_of("said");
+  const std::string first = text_of("seen.png");
+  EXPECT_EQ(run({"--scenario", path.string(), "--renew"}), 0) << text_of("said");
+  EXPECT_EQ(text_of("seen.png"), first);
   EXPECT_EQ(run({"--scenario", path.string()}), 0) << text_of("said");
   EXPECT_THAT(text_of("said"), HasSubstr("measured 99.0 dB")) << "no difference at all";
+}
+
+TEST_F(ScenarioProgram, HeadsOfALockstepAreFedAndSteppedTogether) {
+  const std::string scene = std::string(STRANDCAST_SOURCE_DIR) + "/deploy/scenes/two_heads.textproto";
+  const auto path = write("two.textproto", "name: \"two\"\ndo { start { scene: \"" + scene +
+                                               "\" lockstep: true } }\n"
+                                               "do { feed { motion: \"shake\" } }\n"
+                                               "do { step: 20 }\n"
+                                               "do { expect { metric { name: \"strandcast_sim_steps_total\" "
+                                               "equals: 20 } } }\n"
+                                               "do { expect { metric { name: \"strandcast_input_accepted_"
+                                               "total\" above: 19 } } }\n");
+  EXPECT_EQ(run({"--scenario", path.string()}), 0) << text_of("said");
 }
 
 TEST_F(ScenarioProgram, AWrongFileIsExitCodeTwoAndOneSentence) {

@@ -315,6 +315,21 @@ TEST(Export, AnExportOfARunningServerBeginsAtAFrameOfItsTimecode) {
   EXPECT_EQ(run("", "")->first_timecode, "") << "30 frames a second are not those that are counted";
 }
 
+TEST(Export, WhereTimecodeJumpsAllIsExportedAtItsRateAndSaid) {
+  const TemporaryFolder folder;
+  ExportOptions options;
+  options.path = folder.path() / "hair.csv";
+  MadeStates states(61);
+  count_timecode(states);
+  states.timecodes_.add(states.states_.back()->sim_time_ns, *parse_timecode("05:00:00:00", {24000, 1001}));
+  const ExportReport report = exported(states, options);
+  EXPECT_EQ(report.frame_count, 24u) << "1.0 s at 23.976, the first at the first state";
+  EXPECT_NEAR(report.fps, 24000.0 / 1001.0, 1e-9);
+  EXPECT_THAT(report.remarks, testing::Contains(testing::AllOf(
+                                  HasSubstr("frames count from 1, not by timecode"),
+                                  HasSubstr("with 1 jump to 05:00:00:00"), HasSubstr("--from and --to"))));
+}
+
 TEST(Export, ARangeOfTimecodeIsKept) {
   const TemporaryFolder folder;
   ExportOptions options;
@@ -324,6 +339,12 @@ TEST(Export, ARangeOfTimecodeIsKept) {
   MadeStates states(61);
   count_timecode(states);
   EXPECT_EQ(exported(states, options).frame_count, 6u);
+  options.to_timecode.clear();
+  options.to_s = 5.0 * 1001.0 / 24000.0;
+  MadeStates length(61);
+  count_timecode(length);
+  EXPECT_EQ(exported(length, options).frame_count, 6u) << "so long behind the timecode";
+  options.to_s.reset();
   const auto rows = rows_of(options.path);
   EXPECT_EQ(rows[kStrands * kVertices][0], (3600 + 2 * 60 + 3) * 24 + 10);
   EXPECT_NEAR(rows[kStrands * kVertices][1], 5.75 * 1001.0 / 24000.0, 1e-6);
@@ -334,7 +355,8 @@ TEST(Export, ARangeOfTimecodeIsKept) {
     const auto report = export_strands(source, options, kNeverStopped);
     return report ? std::string() : report.error().to_string();
   };
-  EXPECT_THAT(refusal("02:00:00:00", "", states), HasSubstr("they go from 01:02:03:04 to 01:02:04:"));
+  EXPECT_THAT(refusal("02:00:00:00", "", states),
+              testing::AllOf(HasSubstr("they go from 01:02:03:04 to 01:02:04:"), Not(HasSubstr("jumps"))));
   EXPECT_THAT(refusal("01:02:03:20", "01:02:03:10", states), HasSubstr("before the beginning"));
   EXPECT_THAT(refusal("01:02:03:24", "", states), HasSubstr("23:59:59:23"));
   MadeStates none(61);

@@ -551,6 +551,27 @@ TEST_F(FrameWork, WhatStandsStillIsSentOnceMoreFinely) {
   ASSERT_TRUE(eventually([&] { return worker->counters().stills == 2; })) << "after every change";
 }
 
+// A view that is drawn more rarely than pictures are refined: the state that is to be drawn next has not
+// been.
+TEST_F(FrameWork, AStillIsOfTheStateThatWasDrawnAndOfNoOlderThanTheNewest) {
+  const auto worker = start(10.0, 5);
+  auto views = one_view();
+  views[1].rate_divisor = 8;
+  next_delta();
+  worker->set_views(views);
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 1; }));
+  worker->offer(next_delta());
+  ASSERT_TRUE(eventually([&] { return frame_count() == 3; }));
+  EXPECT_EQ(worker->counters().stills, 1u);
+  const int64_t first_ns = make_state(1).sim_time_ns, next_ns = make_state(2).sim_time_ns;
+  using Mark = std::pair<int64_t, int>;
+  std::vector<Mark> marks;
+  for (const auto& [picture_class, frame] : frames())
+    marks.emplace_back(frame->header.sim_time_ns, frame->header.flags);
+  EXPECT_EQ(marks, (std::vector<Mark>{{first_ns, 0}, {next_ns, 0}, {next_ns, kStillPicture}}));
+}
+
 TEST_F(FrameWork, AStillWaitsForItsPeriods) {
   const auto worker = start(kNeverHz, 5);
   next_delta();

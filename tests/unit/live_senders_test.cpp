@@ -265,12 +265,12 @@ TEST(LiveSenders, AnglesThatNoHeadHasAreImpossibleAndSaid) {
 constexpr double kAwayDeg = 40.0;
 constexpr double kAwayRad = kAwayDeg * std::numbers::pi / 180.0;
 
-/// A head that looks 40 degrees aside, zeros for so long, and the head again.
-Stage with_zeros(double rate_hz, double lost_s) {
+/// A head that looks so far aside, zeros for so long, and the head again.
+Stage with_zeros(double rate_hz, double lost_s, double away_deg = kAwayDeg) {
   Stage stage({.protocol = "opentrack"});
   for (double t_s = 0.0; t_s < 3.0 + lost_s; t_s += 1.0 / rate_hz) {
     const bool is_lost = t_s >= 1.0 && t_s < 1.0 + lost_s;
-    stage.send(is_lost ? test::opentrack({}) : test::opentrack({5, 2, 30, kAwayDeg, 0, 0}),
+    stage.send(is_lost ? test::opentrack({}) : test::opentrack({5, 2, 30, away_deg, 0, 0}),
                kStart + static_cast<int64_t>(t_s * kNsPerS));
   }
   return stage;
@@ -298,6 +298,17 @@ TEST(LiveSenders, ZerosOfATrackerThatHasLostTheHeadDoNotThrowIt) {
     EXPECT_LE(longer.fastest_turn_rad_per_s(), steepest * kAwayRad) << rate_hz;
     EXPECT_LE(longer.fastest_mps(), steepest * glm::length(glm::dvec3(0.05, 0.02, 0.30))) << rate_hz;
     EXPECT_EQ(longer.count("carried"), 0u);
+  }
+}
+
+// A head that was turned by less than a wrong turn has is thrown no more by zeros.
+TEST(LiveSenders, ZerosAreNotBelievedOfAHeadThatIsTurnedByLittle) {
+  for (const double away_deg : {5.0, 25.0}) {
+    const Stage stage = with_zeros(60.0, 2.0, away_deg);
+    const double away_rad = away_deg * std::numbers::pi / 180.0;
+    const double steepest = 1.001 * 1.5 / (static_cast<double>(kEaseNs) * kSPerNs);
+    EXPECT_LE(stage.fastest_turn_rad_per_s(), steepest * away_rad) << away_deg;
+    EXPECT_LE(stage.fastest_mps(), steepest * glm::length(glm::dvec3(0.05, 0.02, 0.30))) << away_deg;
   }
 }
 

@@ -187,6 +187,18 @@ TEST(FreedParser, TheSpareWordCountsFramesWhereItIsSaid) {
   EXPECT_THAT(refusal("opentrack", "xyz-ypr/25"), HasSubstr("xyz-ypr/25"));
 }
 
+TEST(FreedParser, ASpareWordThatStandsCountsNoFrames) {
+  const auto notes_after = [](int packets, bool counts) {
+    const auto parser = live_parser_of("freed", "/25");
+    for (int i = 0; i < packets; ++i)
+      (void)only_pose(*parser, test::freed({.spare = static_cast<uint16_t>(counts ? i / 2 : 7)}));
+    return parser->take_notes();
+  };
+  EXPECT_THAT(notes_after(119, false), IsEmpty());
+  EXPECT_THAT(notes_after(300, false), ElementsAre(HasSubstr("stand at 7: they count no frames")));
+  EXPECT_THAT(notes_after(300, true), IsEmpty());
+}
+
 TEST(FreedParser, RefusesWrongChecksumsAndOtherSizes) {
   const auto parser = live_parser_of("freed");
   const PacketBytes right = test::freed({});

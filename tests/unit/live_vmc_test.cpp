@@ -260,6 +260,40 @@ TEST(VmcParser, ForgetsBonesThatDoNotComeAnyMore) {
   EXPECT_LT(told_late, 40u) << "then frames end without it";
 }
 
+// A body that moves on without its head moves no hair, and whoever sends it hears why.
+TEST(VmcParser, AHeadThatIsToldNoMoreIsLost) {
+  const auto parser = live_parser_of("vmc");
+  EXPECT_EQ(heights(*parser, {osc_bundle({hips(1), head(1)})}).size(), 1u);
+  size_t told = 0;
+  for (int i = 0; i < 100; ++i) told += heights(*parser, {osc_bundle({hips(2), upper_chest(1)})}).size();
+  EXPECT_LT(told, 40u) << "then it is lost";
+  EXPECT_THAT(parser->take_notes(), ElementsAre(HasSubstr("no Head among them")));
+  EXPECT_THAT(parser->take_notes(), IsEmpty()) << "once";
+  told = 0;
+  for (int i = 0; i < 40; ++i)
+    told += heights(*parser, {osc_bundle({hips(2), upper_chest(1), head(1)})}).size();
+  EXPECT_GT(told, 30u) << "it is back";
+  const auto never = live_parser_of("vmc");
+  for (int i = 0; i < 100; ++i) EXPECT_THAT(heights(*never, {osc_bundle({hips(2)})}), IsEmpty());
+  EXPECT_THAT(never->take_notes(), ElementsAre(HasSubstr("no Head among them")));
+}
+
+TEST(VmcParser, AStartTakesNumbersOfBothKinds) {
+  const auto parser = live_parser_of("vmc");
+  const auto take_of = [&](const std::vector<test::OscValue>& values) {
+    return parser->take_of(osc("/strandcast/record/start", values));
+  };
+  EXPECT_EQ(take_of({std::string("12A"), 3.0f})->take, 3u);
+  EXPECT_EQ(take_of({int32_t{7}, int32_t{2}})->slate, "7");
+  EXPECT_EQ(take_of({})->take, 0u);
+  for (const float wrong : {2.5f, -1.0f, 1e30f, std::nanf("")})
+    EXPECT_FALSE(take_of({std::string("12A"), wrong})) << wrong;
+  const std::vector<test::OscValue> half = {std::string("12A"), 2.5f};
+  (void)parsed(*parser, osc("/strandcast/record/start", half));
+  EXPECT_THAT(parser->take_notes(),
+              ElementsAre(HasSubstr("start takes a slate (text) and a take (a number)")));
+}
+
 TEST(VmcParser, ShowsAQuaternionWithoutDirection) {
   const auto parser = live_parser_of("vmc");
   for (const test::Quad& bad : {test::Quad{0, 0, 0, 0}, test::Quad{0, NAN, 0, 1}, test::Quad{9, 9, 9, 9}}) {

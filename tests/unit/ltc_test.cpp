@@ -77,6 +77,8 @@ std::vector<float> sound_of(Timecode timecode, int frames, const Sound& sound) {
   return samples;
 }
 
+const LtcListener kSilence = [](const std::string&) {};
+
 std::vector<LtcFrame> frames_in(const std::vector<float>& samples, double sample_rate_hz,
                                 const FrameRate& fps) {
   LtcDecoder decoder(sample_rate_hz, fps);
@@ -177,7 +179,7 @@ TEST(Ltc, AWavFileTellsWhereItIs) {
   const std::string path = (folder.path() / "ltc.wav").string();
   for (const uint16_t bits : {16, 24, 32}) {
     std::ofstream(path, std::ios::binary) << wav_of(sound_of(first, 50, {}), bits, bits == 24 ? 2 : 1);
-    const auto at = open_ltc(path, {25, 1});
+    const auto at = open_ltc(path, FrameRate{25, 1}, kSilence);
     ASSERT_TRUE(at) << at.error().to_string();
     EXPECT_FALSE((*at)(0.02)) << "no word has ended yet";
     EXPECT_NEAR(frames_between(first, *(*at)(1.01)), 25.0, 0.01);
@@ -185,12 +187,38 @@ TEST(Ltc, AWavFileTellsWhereItIs) {
   }
 }
 
+// Words do not tell how many there are in a second: their times do, and whether numbers are dropped.
+TEST(Ltc, TheRateOfAFileIsMeasured) {
+  const TemporaryFolder folder;
+  const std::string path = (folder.path() / "ltc.wav").string();
+  const std::pair<const char*, FrameRate> kFirst[] = {
+      {"01:00:00:00", {24, 1}},       {"01:00:00:00", {24000, 1001}}, {"01:00:00:00", {25, 1}},
+      {"01:00:00;00", {30000, 1001}}, {"01:00:00:00", {30000, 1001}}, {"01:00:00:00", {30, 1}}};
+  for (const auto& [text, fps] : kFirst) {
+    const Timecode first = *parse_timecode(text, fps);
+    std::ofstream(path, std::ios::binary) << wav_of(sound_of(first, 60, {}), 16, 1);
+    std::vector<std::string> said;
+    const auto at =
+        open_ltc(path, std::nullopt, [&](const std::string& sentence) { said.push_back(sentence); });
+    ASSERT_TRUE(at) << at.error().to_string();
+    const Timecode found = *(*at)(1.0);
+    EXPECT_TRUE(is_same_count(found, first)) << text << " at " << fps.hz() << ": " << found.rate.hz();
+    EXPECT_NEAR(frames_between(first, found), fps.hz() - 0.01 * fps.hz(), 0.1);
+    EXPECT_THAT(said, testing::ElementsAre(testing::EndsWith(
+                          fmt::format("of {} frames per second{} on", frame_rate_text(fps.hz()),
+                                      first.is_drop ? ", drop-frame" : ""))));
+  }
+  // The last one counts 30 a second.
+  EXPECT_THAT(open_ltc(path, FrameRate{24, 1}, kSilence).error().to_string(),
+              HasSubstr("counts 30 frames per second, and --fps says 24"));
+}
+
 TEST(Ltc, SaysWhatIsWrongWithAFile) {
   const TemporaryFolder folder;
   const std::string path = (folder.path() / "ltc.wav").string();
   const auto refusal = [&](const std::string& bytes, const FrameRate& fps = {25, 1}) {
     std::ofstream(path, std::ios::binary) << bytes;
-    const auto opened = open_ltc(path, fps);
+    const auto opened = open_ltc(path, fps, kSilence);
     return opened ? std::string() : opened.error().to_string();
   };
   const std::string silent = wav_of(std::vector<float>(4'800), 16, 1);
@@ -199,9 +227,9 @@ TEST(Ltc, SaysWhatIsWrongWithAFile) {
   EXPECT_THAT(refusal(silent.substr(0, 40)), HasSubstr("cut off"));
   EXPECT_THAT(refusal(wav_of({}, 8, 1)), HasSubstr("16, 24 or 32 bits"));
   EXPECT_THAT(refusal(wav_of({}, 16, 0)), HasSubstr("are possible"));
-  EXPECT_THAT(refusal(silent), HasSubstr("no timecode of 25 frames per second"));
+  EXPECT_THAT(refusal(silent), HasSubstr("no timecode in its first channel"));
   EXPECT_THAT(refusal(silent, {15, 1}), HasSubstr("no timecode counts 15"));
-  EXPECT_THAT(open_ltc((folder.path() / "none.wav").string(), {25, 1}).error().to_string(),
+  EXPECT_THAT(open_ltc((folder.path() / "none.wav").string(), FrameRate{25, 1}, kSilence).error().to_string(),
               HasSubstr("cannot be read"));
   // Any cut of a file is read as far as it goes, or refused.
   const std::string whole = wav_of(sound_of(*parse_timecode("01:00:00:00", {25, 1}), 3, {}), 16, 1);

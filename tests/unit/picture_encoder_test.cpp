@@ -167,6 +167,12 @@ TEST(PictureEncoders, AStillIsFineAndComesOnce) {
     EXPECT_GT(psnr(image, *watcher.decoder.image()), before + 3.0) << to_string(codec);
     EXPECT_EQ(*encoder->still(kStamp), nullptr) << to_string(codec);
   }
+  // Of what is as fine at once no other comes, and it says so.
+  const auto flags_at = [&](int quality) {
+    return (*make(PictureCodec::Jpeg)->encode(image, quality, kStamp))->after(0)->header.flags;
+  };
+  EXPECT_EQ(flags_at(kStillQuality - 1), 0);
+  EXPECT_EQ(flags_at(kStillQuality), kStillPicture);
 }
 
 TEST(PictureEncoders, WhoeverAsksGetsAWholePicture) {

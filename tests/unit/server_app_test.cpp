@@ -442,6 +442,16 @@ TEST(MocapOptions, AreInputsOfTheScene) {
             (Inputs{{.protocol = "vmc", .turns_only = true}}));
   EXPECT_EQ(live_of({"--mocap", "freed", "--mocap-timecode", "25"}).value(),
             (Inputs{{.protocol = "freed", .axes = "/25"}}));
+  EXPECT_EQ(live_of({"--mocap", "vmc", "--mocap", "freed", "--mocap-timecode", "25"}).value(),
+            (Inputs{{.protocol = "vmc"}, {.protocol = "freed", .axes = "/25"}}));
+  EXPECT_THAT(live_of({"--mocap", "opentrack", "--mocap-timecode", "25"}).error().to_string(),
+              HasSubstr("no --mocap names it"));
+  for (const char* const to : {"vmc", "vmc://localhost", "vmc://127.0.0.2", "opentrack:39539"})
+    EXPECT_THAT(live_of({"--mocap", "vmc", "--send", to}).error().to_string(),
+                HasSubstr("where this server hears vmc"))
+        << to;
+  for (const char* const to : {"vmc:39540", "vmc://10.0.0.5", "opentrack"})
+    EXPECT_TRUE(live_of({"--mocap", "vmc", "--send", to})) << to;
   // Those of the command line are instead of the scene's, and what is set is set of them.
   EXPECT_EQ(live_of({"--set", "live.0.turns_only=true", "--mocap", "opentrack"}).value(),
             (Inputs{{.protocol = "opentrack", .turns_only = true}}));

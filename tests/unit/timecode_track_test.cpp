@@ -61,6 +61,10 @@ TEST(TimecodeTrack, FindsFramesInTheFirstStretchThatHasThem) {
   EXPECT_EQ(range->time_ns, (std::vector<int64_t>{200'000'000, 240'000'000, 280'000'000, 320'000'000}));
   EXPECT_EQ(track.frames({}, at("01:00:00:01"))->time_ns.size(), 2u);
   EXPECT_THAT(track.frames(at("05:00:00:00"), {}).error().message, HasSubstr("with jumps"));
+  EXPECT_THAT(track.text(), testing::StartsWith("01:00:00:00 to 01:00:0"));
+  EXPECT_THAT(track.text(),
+              testing::EndsWith("of 25 frames per second, with 2 jumps, the first to 00:10:00:00"));
+  EXPECT_EQ(TimecodeTrack().text(), "");
 }
 
 }  // namespace

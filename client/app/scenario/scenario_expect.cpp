@@ -20,7 +20,8 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kExpectPoll{50};
-constexpr double kStillS = 4.0, kLongestStillS = 15.0;  // without another picture; of waiting for that
+constexpr double kUnchangedS = 4.0, kLongestStillS = 30.0;  // without another picture; of waiting for one
+constexpr int64_t kOnItsWayNs = 150'000'000;                // for a picture
 constexpr size_t kMaxExpectedChars = 300;
 constexpr double kRefusalTimeoutS = 10.0;
 constexpr size_t kHashChars = 16;
@@ -357,16 +358,22 @@ void ScenarioRun::expect_back(const ScenarioExpect& expect) {
          is_there);
 }
 
-/// In lockstep the server sends its picture once more, finely, and then no other until the next step.
+/// In lockstep: the finest picture of the last step, by the newest look. What was on its way when that look
+/// was set does not count. A step after which nothing looks other brings no picture.
 ViewerPicture ScenarioRun::still_picture(const ScenarioViewer& who) {
   ViewerPicture seen = who.picture();
   if (!is_lockstep_ || seen.mode != StreamMode::Frames) return seen;
+  const double step_ns = kNsPerS / client_->welcome().step_rate_hz;
+  const double wanted_ns = static_cast<double>(tick_) * step_ns;
   double changed_s = elapsed_s();
   await(kLongestStillS, [&] {
     ViewerPicture next = who.picture();
     if (next.image != seen.image) changed_s = elapsed_s();
     seen = std::move(next);
-    return elapsed_s() >= changed_s + kStillS;
+    const bool is_of_step =
+        std::abs(static_cast<double>(seen.image_sim_time_ns) - wanted_ns) <= 0.5 * step_ns;
+    const bool is_final = seen.is_image_still && is_of_step && seen.image_seen_ns > acted_ns_ + kOnItsWayNs;
+    return is_final || elapsed_s() >= changed_s + kUnchangedS;
   });
   return seen;
 }

@@ -53,14 +53,13 @@ Result<FeedPlan> plan_of(const ScenarioFeed& feed) {
 }
 
 Result<std::unique_ptr<LiveFeed>> LiveFeed::start(FeedPlan plan, const ClientConfig& config) {
-  auto client = std::make_unique<SteadyClient>(config);
   const std::atomic<bool> never{false};
-  RETURN_IF_ERROR(client->await_welcome(never, kCommandPatience));
-  std::unique_ptr<LiveFeed> live(new LiveFeed(std::move(plan), std::move(client)));
+  ASSIGN_OR_RETURN(auto heads, connect_heads(config, never, kCommandPatience));
+  std::unique_ptr<LiveFeed> live(new LiveFeed(std::move(plan), std::move(heads)));
   live->thread_ = std::thread([self = live.get()] {
     name_thread("feed");
     // The end of the connection shows in what is expected of the server.
-    (void)feed({&self->client_, 1}, self->plan_, self->stop_, [self](const FeedProgress& progress) {
+    (void)feed(self->heads_, self->plan_, self->stop_, [self](const FeedProgress& progress) {
       const std::lock_guard lock(self->mutex_);
       self->progress_ = progress;
     });

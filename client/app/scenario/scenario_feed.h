@@ -31,11 +31,11 @@ class LiveFeed {
   FeedProgress progress() const;
 
  private:
-  LiveFeed(FeedPlan plan, std::unique_ptr<SteadyClient> client)
-      : plan_(std::move(plan)), client_(std::move(client)) {}
+  LiveFeed(FeedPlan plan, std::vector<std::unique_ptr<SteadyClient>> heads)
+      : plan_(std::move(plan)), heads_(std::move(heads)) {}
 
   const FeedPlan plan_;
-  const std::unique_ptr<SteadyClient> client_;
+  const std::vector<std::unique_ptr<SteadyClient>> heads_;
   std::atomic<bool> stop_{false};
   mutable std::mutex mutex_;  // guards the one below
   FeedProgress progress_;

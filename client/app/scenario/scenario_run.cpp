@@ -55,6 +55,7 @@ ScenarioRun::ScenarioRun(const Scenario& scenario, ScenarioOptions options, Chec
 ScenarioRun::~ScenarioRun() {
   live_feed_.reset();
   viewers_.clear();
+  heads_.clear();
   client_.reset();
   relay_.reset();
   server_.reset();
@@ -81,6 +82,7 @@ ScenarioResult ScenarioRun::run() {
     line_ = action.line;
     status = go_on();
     if (status) status = carry_out(action);
+    if (!std::holds_alternative<ScenarioExpect>(action.work)) acted_ns_ = now_ns();
     if (!status) report("to be done", "no trouble", status.error().to_string(), false);
   }
   if (result_.failed_count() > 0 && !is_stopped()) save_evidence();
@@ -159,6 +161,19 @@ Status ScenarioRun::connect() {
   return refused;
 }
 
+/// Of several heads each has a connection, on which samples and steps come in order.
+Status ScenarioRun::connect_heads() {
+  if (!heads_.empty()) return {};
+  for (const std::string& name : client_->welcome().heads) {
+    ASSIGN_OR_RETURN(ClientConfig config, config_for(is_admin_ ? Role::Admin : Role::Controller));
+    config.hello.gets_no_stream = true;
+    config.hello.head = name;
+    ASSIGN_OR_RETURN(auto head, ViewerClient::connect(config));
+    heads_.push_back(std::move(head));
+  }
+  return {};
+}
+
 void ScenarioRun::take(const ClientEvent& event) {
   if (const auto* closed = std::get_if<ClosedEvent>(&event)) lost_ = closed->error;
   if (const auto* status = std::get_if<ServerStatus>(&event)) {
@@ -167,18 +182,22 @@ void ScenarioRun::take(const ClientEvent& event) {
   }
 }
 
-/// The answer to a command. Notices that came before it are no answer.
 Result<Notice> ScenarioRun::ask(const ClientMessage& message) {
   if (client_ == nullptr) return make_error(ErrorCode::BadInput, "there is no server yet: begin with start");
-  for (const ClientEvent& event : client_->poll()) take(event);
+  return ask(*client_, message);
+}
+
+/// The answer to a command. Notices that came before it are no answer.
+Result<Notice> ScenarioRun::ask(ViewerClient& client, const ClientMessage& message) {
+  for (const ClientEvent& event : client.poll()) take(event);
   if (lost_) return *lost_;
-  RETURN_IF_ERROR(client_->send(message));
+  RETURN_IF_ERROR(client.send(message));
   const auto* command = std::get_if<ControlCommand>(&message);
   const bool is_counted = command != nullptr && command->step_count > 0;
   const double end_s = elapsed_s() + (is_counted ? left_s() : std::min(left_s(), kAnswerTimeoutS));
   while (elapsed_s() < end_s) {
     RETURN_IF_ERROR(go_on());
-    for (const ClientEvent& event : client_->wait(milliseconds(20))) {
+    for (const ClientEvent& event : client.wait(milliseconds(20))) {
       take(event);
       const auto* notice = std::get_if<Notice>(&event);
       if (notice != nullptr && (notice->is_error || !is_counted || notice->tick > 0)) return *notice;
@@ -214,12 +233,18 @@ Status ScenarioRun::start_live_feed() {
 }
 
 Status ScenarioRun::step_chunk(uint64_t tick) {
-  if (stepped_feed_)
-    for (const ClientMessage& samples : stepped_feed_->samples_up_to(tick))
-      RETURN_IF_ERROR(client_->send(samples));
-  const auto count = static_cast<uint32_t>(tick - tick_);
-  ASSIGN_OR_RETURN(const Notice notice, ask(ControlCommand{Command::StepOnce, count}));
-  if (notice.is_error) return make_error(ErrorCode::Unavailable, "the server says: {}", notice.text);
+  std::vector<ClientMessage> samples;
+  if (stepped_feed_) samples = stepped_feed_->samples_up_to(tick);
+  const ControlCommand steps{Command::StepOnce, static_cast<uint32_t>(tick - tick_)};
+  RETURN_IF_ERROR(connect_heads());
+  const auto step = [&](ViewerClient& client) -> Result<Notice> {
+    for (const ClientMessage& message : samples) RETURN_IF_ERROR(client.send(message));
+    ASSIGN_OR_RETURN(Notice notice, ask(client, steps));
+    if (notice.is_error) return make_error(ErrorCode::Unavailable, "the server says: {}", notice.text);
+    return notice;
+  };
+  for (size_t i = 1; i < heads_.size(); ++i) RETURN_IF_ERROR(step(*heads_[i]));
+  ASSIGN_OR_RETURN(const Notice notice, step(heads_.empty() ? *client_ : *heads_.front()));
   tick_ = notice.tick;
   hash_ = notice.state_hash;
   return {};
@@ -409,6 +434,7 @@ Status ScenarioRun::restart_server() {
     return make_error(ErrorCode::BadInput, "a server that was not started by the scenario is not killed");
   live_feed_.reset();
   client_.reset();
+  heads_.clear();
   RETURN_IF_ERROR(server_->restart(std::min(left_s(), kStartTimeoutS), *options_.stop));
   for (const auto& [name, viewer] : viewers_) begin_absence(name);
   tick_ = 0;

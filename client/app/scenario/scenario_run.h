@@ -81,7 +81,9 @@ class ScenarioRun {
   // The connection that commands.
   Status connect();
   Result<ClientConfig> config_for(Role role) const;
+  Status connect_heads();
   Result<Notice> ask(const ClientMessage& message);
+  Result<Notice> ask(ViewerClient& client, const ClientMessage& message);
   void take(const ClientEvent& event);
   Result<std::string> metrics();
   Status start_live_feed();
@@ -132,9 +134,11 @@ class ScenarioRun {
   std::unique_ptr<ServerProcess> relay_;  // that viewers watch; null: the server itself
   bool is_lockstep_ = false;
   std::unique_ptr<ViewerClient> client_;
+  std::vector<std::unique_ptr<ViewerClient>> heads_;  // where there are several: of each, to feed and step it
   bool is_admin_ = false;
   std::optional<Error> lost_;  // why that connection is over
   uint64_t tick_ = 0;          // of the last steps
+  int64_t acted_ns_ = 0;       // when the last action ended that expects nothing, now_ns()
   std::optional<uint64_t> hash_;
   std::map<std::string, uint64_t> remembered_;
   ServerStatus status_;

@@ -136,8 +136,15 @@ void ScenarioViewer::note(LiveConnection& live) {
   look_.mode_reason = session.mode_reason();
   look_.rate_divisor = session.quality().rate_divisor;
   look_.codec = session.welcome().codec;
-  picture_ = {session.shared_asset(), session.replay().newest(), session.shared_image(), session.look(),
-              session.mode()};
+  const int64_t seen_ns = picture_.image == session.shared_image() ? picture_.image_seen_ns : now_ns();
+  picture_ = {session.shared_asset(),
+              session.replay().newest(),
+              session.shared_image(),
+              session.look(),
+              session.mode(),
+              session.image_sim_time_ns(),
+              seen_ns,
+              session.is_image_still()};
 }
 
 void ScenarioViewer::measure_rest(const std::shared_ptr<const SceneAsset>& asset) {

@@ -71,6 +71,9 @@ struct ViewerPicture {
   std::shared_ptr<const Image> image;     // of the server
   LookChange look;
   StreamMode mode = StreamMode::Strands;
+  int64_t image_sim_time_ns = 0;
+  int64_t image_seen_ns = 0;    // when it came, now_ns()
+  bool is_image_still = false;  // none finer comes of that state
 };
 
 /// What the rest of the scenario asks of a viewer.

@@ -43,7 +43,8 @@ ScenarioResult run_scenario(const Scenario& scenario, const ScenarioOptions& opt
     const CheckResult check{0,
                             fmt::format("states of run {}", i + 1),
                             "those of the first run",
-                            is_same               ? fmt::format("are, after {} steps", next.hashes.size())
+                            is_same
+                                ? fmt::format("are, after each of {} actions of steps", next.hashes.size())
                             : next.hashes.empty() ? std::string("no step led to a state")
                                                   : std::string("are others"),
                             is_same,
@@ -53,8 +54,11 @@ ScenarioResult run_scenario(const Scenario& scenario, const ScenarioOptions& opt
     result.checks.insert(result.checks.end(), next.checks.begin(), next.checks.end());
     result.checks.push_back(check);
   }
-  print(fmt::format("{}: {} of {} checks hold, {:.1f} s", result.name,
-                    result.checks.size() - result.failed_count(), result.checks.size(), result.seconds));
+  if (result.checks.empty())
+    print(fmt::format("{}: nothing is expected in it, {:.1f} s", result.name, result.seconds));
+  else
+    print(fmt::format("{}: {} of {} checks hold, {:.1f} s", result.name,
+                      result.checks.size() - result.failed_count(), result.checks.size(), result.seconds));
   return result;
 }
 

@@ -2,6 +2,7 @@
 // subject is a camera's number. Angles are `pan-tilt-roll` or `tilt-pan-roll`. The spare word is the sender's
 // own; where it, or some of its bits, counts frames of timecode, their number goes on beyond those bits.
 #include <array>
+#include <utility>
 
 #include "common/strands/byte_io.h"
 #include "server/input/live/conventions.h"
@@ -15,6 +16,7 @@ constexpr uint8_t kFreedPoseType = 0xD1;
 constexpr uint8_t kFamilyMask = 0xF0;  // all types of FreeD begin with D
 constexpr uint8_t kFamily = 0xD0;
 constexpr uint32_t kSpareBits = 16;
+constexpr uint32_t kJudgedPackets = 120;  // after which a count that stood still is none
 constexpr uint8_t kChecksumBegin = 0x40;
 constexpr double kUnitsPerDegree = 32768.0;
 constexpr double kUnitsPerMm = 64.0;
@@ -89,6 +91,7 @@ class FreedParser : public LiveParser {
       const uint32_t number = last_->spare >> count_->first_bit & ((1u << count_->bits) - 1);
       newest_ = advanced(count_->begin, static_cast<int32_t>(frames_.unwrapped(number)));
       pose.timecode = newest_;
+      note_count(number);
     }
     return packet;
   }
@@ -107,7 +110,21 @@ class FreedParser : public LiveParser {
         fmt::format("spare word {}{}", last_->spare, newest_ ? ", timecode " + timecode_text(*newest_) : "")};
   }
 
+  std::vector<std::string> take_notes() override { return std::exchange(notes_, {}); }
+
  private:
+  /// Says once that what is taken for a count of frames is none.
+  void note_count(uint32_t number) {
+    ++counted_packets_;
+    if (counted_ && number != *counted_) has_counted_ = true;
+    counted_ = number;
+    if (counted_packets_ == kJudgedPackets && !has_counted_)
+      notes_.push_back(
+          fmt::format("the bits of the spare word that --mocap-timecode names stand at {}: they "
+                      "count no frames",
+                      number));
+  }
+
   FreedPose last_pose() const {
     constexpr size_t kRollAt = 2;
     const FreedFields& fields = *last_;
@@ -120,6 +137,10 @@ class FreedParser : public LiveParser {
   std::optional<SpareCount> count_;
   WrappingCount frames_;
   std::optional<Timecode> newest_;
+  std::optional<uint32_t> counted_;  // of the newest packet
+  uint32_t counted_packets_ = 0;
+  bool has_counted_ = false;
+  std::vector<std::string> notes_;
   std::optional<FreedFields> last_;
   uint64_t ignored_ = 0;
 };

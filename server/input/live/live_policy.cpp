@@ -27,6 +27,11 @@ bool is_possible(const LivePose& pose) {
   return is_rotation && glm::length(pose.world_from_subject.position_m) <= kMaxHeadDistanceM;
 }
 
+/// As a tracker tells that has lost what it tracks.
+bool is_of_zeros(const Pose& seen) {
+  return seen.position_m == glm::dvec3(0.0) && std::abs(seen.rotation.w) == 1.0;
+}
+
 /// The part of a rotation that is about +Y.
 glm::dquat heading_of(const glm::dquat& rotation) {
   const double norm = std::hypot(rotation.w, rotation.y);
@@ -91,6 +96,7 @@ void LivePolicy::begin_another() {
   has_no_times_ = false;
   seen_.reset();
   doubted_.reset();
+  is_lost_ = false;
   jumps_ = true;
 }
 
@@ -265,10 +271,10 @@ void LivePolicy::release(const LivePose& pose, int64_t arrival_ns) {
   put(std::move(head));
 }
 
-bool LivePolicy::is_near(const LivePose& pose, const Pose& other, double most_turn_rad) const {
+bool LivePolicy::is_near(const LivePose& pose, const Pose& other, double most_m, double most_turn_rad) const {
   const Pose& seen = pose.world_from_subject;
   const bool has_place = !turns_only_ && pose.has_position;
-  return (!has_place || glm::distance(seen.position_m, other.position_m) <= kGateJumpM) &&
+  return (!has_place || glm::distance(seen.position_m, other.position_m) <= most_m) &&
          angle_between_rad(seen.rotation, other.rotation) <= most_turn_rad;
 }
 
@@ -276,14 +282,16 @@ bool LivePolicy::is_near(const LivePose& pose, const Pose& other, double most_tu
 bool LivePolicy::is_believed(const LivePose& pose, int64_t arrival_ns) {
   constexpr double kAnyTurnRad = 4.0;  // there is none beyond half a turn
   const double passed_s = static_cast<double>(arrival_ns - came_ns_) * kSPerNs;
-  const double most_turn_rad = std::max(kGateTurnRad, kGateTurnRadPerS * passed_s);
-  if (!seen_ || jumps_ || is_near(pose, *seen_, most_turn_rad)) {
+  const bool is_zero = is_of_zeros(pose.world_from_subject) || is_lost_;
+  const double most_turn_rad = is_zero ? kZerosTurnRad : std::max(kGateTurnRad, kGateTurnRadPerS * passed_s);
+  if (!seen_ || jumps_ || is_near(pose, *seen_, is_zero ? kZerosJumpM : kGateJumpM, most_turn_rad)) {
     doubted_.reset();
+    is_lost_ = is_lost_ && is_of_zeros(pose.world_from_subject);
     return true;
   }
-  const bool is_elsewhere = !is_near(pose, *seen_, kAnyTurnRad);
+  const bool is_elsewhere = !is_near(pose, *seen_, kGateJumpM, kAnyTurnRad);
   if (!is_stale(arrival_ns)) {
-    if (!doubted_ || !is_near(pose, *doubted_, kGateTurnRad)) {
+    if (!doubted_ || !is_near(pose, *doubted_, kGateJumpM, kGateTurnRad)) {
       doubted_since_ns_ = arrival_ns;
       doubted_poses_ = 0;
     }
@@ -291,6 +299,7 @@ bool LivePolicy::is_believed(const LivePose& pose, int64_t arrival_ns) {
     if (++doubted_poses_ < kGatePoses || arrival_ns - doubted_since_ns_ < kGateNs) return false;
     doubted_.reset();
     has_doubted_ = true;
+    is_lost_ = is_of_zeros(pose.world_from_subject);
   }
   if (!is_elsewhere) return true;
   jumps_ = true;

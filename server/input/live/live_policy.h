@@ -9,8 +9,9 @@
 // * A pose that is kGateJumpM away at once is accepted only if it stays there for kGatePoses and kGateNs.
 //   Otherwise it was another body, or markers were confused. Until then it counts as missing. An accepted one
 //   is a jump, through which hair is carried. A pose that is turned by kGateTurnRad at once, and by more than
-//   kGateTurnRadPerS, is doubted alike: a tracker that has lost a head sends zeros. When it is accepted, the
-//   head is eased there over kEaseNs.
+//   kGateTurnRadPerS, is doubted alike. So are zeros that are kZerosTurnRad or kZerosJumpM away at once,
+//   which a tracker sends that has lost a head, and the pose after them. When it is accepted, the head
+//   is eased there over kEaseNs.
 // * Speed is limited to kMaxLiveSpeedMps and kMaxLiveTurnRadPerS, except for bursts of kClampWindowNs; the
 //   head then follows later.
 // * Loss: nothing is given out, and the hub eases the head to rest (head_easing.h). After kMotionStaleNs
@@ -42,6 +43,8 @@ inline constexpr double kGateJumpM = 0.75;
 inline constexpr double kGateTurnRad = 0.6;
 /// Speed of the fastest turn of a person's head: what is faster at once is doubted.
 inline constexpr double kGateTurnRadPerS = 18.0;
+inline constexpr double kZerosTurnRad = 0.05;
+inline constexpr double kZerosJumpM = 0.02;
 inline constexpr uint32_t kGatePoses = 5;
 inline constexpr int64_t kGateNs = 100'000'000;
 inline constexpr int64_t kEaseNs = 250'000'000;
@@ -125,7 +128,7 @@ class LivePolicy {
   void release(const LivePose& pose, int64_t arrival_ns);
   void note_order(const LivePose& pose);
   void forget_order();
-  bool is_near(const LivePose& pose, const Pose& other, double most_turn_rad) const;
+  bool is_near(const LivePose& pose, const Pose& other, double most_m, double most_turn_rad) const;
   bool is_believed(const LivePose& pose, int64_t arrival_ns);
   void begin_ease(const Pose& target, int64_t time_ns);
   Pose eased(Pose target, int64_t time_ns);
@@ -165,6 +168,7 @@ class LivePolicy {
   std::optional<Pose> doubted_;
   int64_t doubted_since_ns_ = 0;
   uint32_t doubted_poses_ = 0;
+  bool is_lost_ = false;  // zeros were believed in the end
 
   // What the head does.
   std::optional<LiveHead> last_;  // given out

@@ -20,6 +20,7 @@ namespace strandcast {
 namespace {
 
 constexpr size_t kMaxShownTextChars = 60;
+constexpr uint32_t kMostPoseless = 120;  // samples on end, until that is said
 
 /// The value at a path of keys; null where there is none.
 const ValueTree* find_at(const ValueTree& tree, std::initializer_list<std::string_view> path) {
@@ -198,6 +199,9 @@ class OpenTrackIoParser : public LiveParser {
     note_lock(fields);
     if (fields.pose) packet.poses.push_back(pose_of(fields));
     if (!fields.pose) ++ignored_;  // of a lens or a clock alone
+    poseless_ = fields.pose ? 0 : poseless_ + 1;
+    if (poseless_ == kMostPoseless)
+      notes_.push_back(fmt::format("{} samples on end have no transforms: no head is moved", kMostPoseless));
     last_ = std::move(fields);
     return packet;
   }
@@ -286,6 +290,7 @@ class OpenTrackIoParser : public LiveParser {
   std::optional<TrackFields> last_;
   WrappingCount numbers_;  // of samples
   bool is_locked_ = true;  // what was said last
+  uint32_t poseless_ = 0;  // samples on end
   std::vector<std::string> notes_;
   uint64_t ignored_ = 0;
 };

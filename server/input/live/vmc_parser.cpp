@@ -109,6 +109,9 @@ class VmcBody {
 
   std::optional<int64_t> time_ns;  // newest that was told
 
+  /// Whether bones come, and no head among them.
+  bool lacks_head() const { return headless_frames_ >= kForgottenAfterFrames; }
+
   /// A bone; where it begins another frame, what the frame before has not told yet.
   void set(size_t bone, const NamedPose& named, std::vector<LivePose>& poses) {
     const bool begins = bone == kRoot || (bone == kHips && (seen_ & bit_of(kRoot)) == 0);
@@ -160,6 +163,9 @@ class VmcBody {
 
   /// Learns what a whole frame has.
   void end_frame() {
+    headless_frames_ = (seen_ & bit_of(kHead)) != 0 ? 0 : headless_frames_ + 1;
+    // A head that is told no more is lost, however its body moves.
+    if (lacks_head()) known_ &= ~bit_of(kHead);
     lately_ |= seen_;
     if ((seen_ & expected_) == expected_) {
       expected_ |= seen_;
@@ -175,13 +181,33 @@ class VmcBody {
 
   bool ignores_zero_positions_;
   std::array<Pose, kBoneCount> local_;
-  BoneSet known_ = 0;      // ever
-  BoneSet seen_ = 0;       // of the frame that is coming in
-  bool has_news_ = false;  // that no pose tells
-  BoneSet expected_ = 0;   // of a whole frame
-  BoneSet lately_ = 0;     // of the frames since the last whole one
+  int headless_frames_ = 0;  // in a row
+  BoneSet known_ = 0;        // ever
+  BoneSet seen_ = 0;         // of the frame that is coming in
+  bool has_news_ = false;    // that no pose tells
+  BoneSet expected_ = 0;     // of a whole frame
+  BoneSet lately_ = 0;       // of the frames since the last whole one
   int short_frames_ = 0;
 };
+
+/// A slate as text or number, and a take as a number of either kind that counts.
+std::optional<LiveTake> take_of_start(const OscMessage& message) {
+  constexpr float kMostFloatCount = 1 << 24;
+  LiveTake take;
+  OscArguments arguments(message);
+  if (message.tags.starts_with('i'))
+    take.slate = fmt::format("{}", arguments.take_int().value_or(0));
+  else if (!message.tags.empty())
+    take.slate = arguments.take_string().value_or("");
+  if (message.tags.size() > 1 && message.tags[1] == 'f') {
+    const float number = arguments.take_float().value_or(0.0f);
+    if (!(number >= 0.0f && number < kMostFloatCount && number == std::floor(number))) return std::nullopt;
+    take.take = static_cast<uint32_t>(number);
+  } else if (message.tags.size() > 1) {
+    take.take = static_cast<uint32_t>(std::max(arguments.take_int().value_or(0), 0));
+  }
+  return arguments.ok() ? std::optional(std::move(take)) : std::nullopt;
+}
 
 class VmcParser : public LiveParser {
  public:
@@ -197,6 +223,9 @@ class VmcParser : public LiveParser {
     for (const OscMessage& message : osc.messages)
       if (!apply(message, packet)) ++ignored_;
     body_.end_datagram(osc.is_bundle, packet.poses);
+    if (body_.lacks_head() && !std::exchange(has_told_headless_, true))
+      notes_.emplace_back("the sender tells bones, and no Head among them: the head rests until it does");
+    if (!body_.lacks_head()) has_told_headless_ = false;
     return packet;
   }
 
@@ -210,12 +239,7 @@ class VmcParser : public LiveParser {
       const std::string_view what = message.address.substr(kRecordAddress.size());
       if (what == "stop") return LiveTake{false, {}, 0};
       if (what != "start") continue;
-      LiveTake take;
-      OscArguments arguments(message);
-      if (!message.tags.empty()) take.slate = arguments.take_string().value_or("");
-      if (message.tags.size() > 1)
-        take.take = static_cast<uint32_t>(std::max(arguments.take_int().value_or(0), 0));
-      if (arguments.ok()) return take;
+      if (auto take = take_of_start(message)) return take;
     }
     return std::nullopt;
   }
@@ -244,6 +268,11 @@ class VmcParser : public LiveParser {
       return time_s.has_value();
     }
     if (address == "/strandcast/wind") return apply_wind(arguments, packet);
+    if (address.starts_with(kRecordAddress) && !std::exchange(has_told_start_, true))
+      notes_.push_back(
+          fmt::format("{} is not understood: start takes a slate (text) and a take (a number), "
+                      "stop takes nothing",
+                      to_line(message)));
     // Faces, cameras, lights, devices in another scale: known, and of no use here.
     return address.starts_with("/VMC/");
   }
@@ -287,6 +316,8 @@ class VmcParser : public LiveParser {
   uint32_t limit_bytes_;
   VmcBody body_;
   bool has_told_steps_ = false;
+  bool has_told_headless_ = false;
+  bool has_told_start_ = false;
   std::vector<std::string> notes_;
   std::vector<std::byte> last_;
   uint64_t ignored_ = 0;
