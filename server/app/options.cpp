@@ -21,6 +21,7 @@ std::string version_text() {
 }
 
 constexpr double kMaxRunS = 1e9;
+constexpr double kLeastExactRecordingS = 0.1;
 constexpr double kMaxViewerMbit = 1e6;
 constexpr uint32_t kMaxExplainedViewers = 10'000;
 
@@ -143,6 +144,7 @@ struct RawRunOptions {
   std::string record_path;
   std::string record_folder;
   bool replaces_recording = false;
+  double exact_recording_s = 0.0;
   bool is_replayed_in_real_time = false;
   std::string log_format = "text";
   std::string upstream;
@@ -243,6 +245,12 @@ void add_record_options(CLI::App& app, ServerOptions& options, RawRunOptions& ra
                      "into its own, run.mcap and for a head ben run-ben.mcap");
   app.add_flag("--record-replace", raw.replaces_recording, "the file of --record may be there: replace it")
       ->needs(path);
+  app.add_option("--record-exact", raw.exact_recording_s,
+                 "in lockstep: hair goes on from what keyframes of the recording tell, and a keyframe comes "
+                 "after so many seconds")
+      ->check(in_range(kLeastExactRecordingS, kMaxRunS))
+      ->needs(path)
+      ->needs(app.get_option("--lockstep"));
   auto* folder = app.add_option(
       "--record-dir", raw.record_folder,
       "who controls may begin and end recordings in this folder, made if need be (strandcast-ctl "
@@ -389,7 +397,8 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
   if (raw.has_proxy_protocol) options.config.net.proxy_protocol = ProxyProtocol::Version2;
   if (!raw.record_path.empty())
     options.config.record =
-        RecordConfig{raw.record_path, raw.replaces_recording ? IfPresent::Replace : IfPresent::Refuse};
+        RecordConfig{raw.record_path, raw.replaces_recording ? IfPresent::Replace : IfPresent::Refuse,
+                     raw.exact_recording_s};
   if (!raw.record_folder.empty()) options.config.record_folder = RecordFolder{raw.record_folder};
   if (raw.is_replayed_in_real_time) options.replay_pace = ReplayPace::RealTime;
   if (!options.replay_path.empty() && app.count("--scene") + app.count("--set") + app.count("--groom") > 0)

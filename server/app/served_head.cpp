@@ -48,7 +48,9 @@ Status ServedHead::load(OtherHeads others) {
   ASSIGN_OR_RETURN(sender_,
                    HeadSender::open(config_.sends, {static_cast<uint32_t>(number_), scene.step_rate_hz,
                                                     config_.clock, [this] { return told(); }}));
-  config_.shared = &shared_;
+  // Steps by commands depend on who watches only where the recording is to be of exact frames.
+  const bool is_exact = config_.record && config_.record->keyframe_s > 0.0;
+  config_.shared = config_.is_lockstep && !is_exact ? nullptr : &shared_;
   ASSIGN_OR_RETURN(source_, config_.make_source(config_, inputs_));
   if (const std::optional<SceneDesc> loaded = source_->scene()) scene.camera = loaded->camera;
   const std::shared_ptr<const SceneAsset> asset = source_->asset();
@@ -143,7 +145,7 @@ Status ServedHead::start(NetServer& net) {
   if (records_ != nullptr)
     RETURN_IF_ERROR(
         records_->attach({*hub_, *source_, [this] { return describe_recording(); },
-                          [this] { return desk_->asset(); }, config_.scene.name, !config_.is_lockstep}));
+                          [this] { return desk_->asset(); }, config_.scene.name, config_.shared != nullptr}));
   stages_.set_source_times([this](int64_t arrival_ns) { return inputs_.source_time_ns(arrival_ns); });
   if (!config_.trace_path.empty()) RETURN_IF_ERROR(stages_.open_trace(config_.trace_path));
   RETURN_IF_ERROR(source_->start(*hub_, config_.scene.stream));

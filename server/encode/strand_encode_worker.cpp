@@ -17,6 +17,9 @@ namespace {
 constexpr std::chrono::milliseconds kKeyframePatience{
     50};  // for a new state, before the present one is encoded again
 
+/// Simulated time in which joiners share a keyframe whose state everybody takes over: each moves the hair.
+constexpr int64_t kToldNs = 500'000'000;
+
 /// Returns whether the slot has a snapshot with the lattice step that the class announces.
 bool has_state(const SnapshotSlot::View& view, const StrandEncodeConfig& config) {
   if (view.snapshot == nullptr) return false;
@@ -163,7 +166,8 @@ void StrandEncodeWorker::serve(const SnapshotSlot::View& view, const StrandEncod
       listeners_ == StrandListeners::All && !has_work(view) && view.version != encoded_version_;
   const bool is_new = is_due(view) || is_overdue;
   // Requests up to here are served by one keyframe; later ones wake the thread again.
-  const bool is_wanted = is_keyframe_wanted_.exchange(false);
+  const bool is_early = is_new && told_ns_ && view.snapshot->sim_time_ns < *told_ns_ + kToldNs;
+  const bool is_wanted = !is_early && is_keyframe_wanted_.exchange(false);
   const bool is_restarting = is_restarting_.exchange(false);
   if (!is_new && keyframe_ != nullptr) {
     if (is_wanted || is_restarting) give(keyframe_);
@@ -200,7 +204,10 @@ JoinFrames StrandEncodeWorker::encode(const Snapshot& published, const StrandEnc
     if (is_keyframe) frames.keyframe = frames.frame;
   }
   if (shared_ != nullptr && config.coarsening == 1)
-    if (const auto update = encoder_->take_shared(shared_->wanted())) shared_->put(std::move(*update));
+    if (const auto update = encoder_->take_shared(shared_->wanted())) {
+      if (update->is_told) told_ns_ = snapshot.sim_time_ns;
+      shared_->put(std::move(*update));
+    }
   count(frames, static_cast<double>(now_ns() - begin_ns) * kMsPerNs, audience);
   return frames;
 }

@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "common/base/profile.h"
@@ -82,7 +83,7 @@ class StrandEncodeWorker {
   void change(const StrandEncodeConfig& config);
   /// Requests a keyframe and returns at once. It comes with the next state, or with the present one if no
   /// other is published soon. Requests made before it share it; later requests for the same state get the
-  /// same frame.
+  /// same frame. After one whose state everybody takes over the next comes half a second later.
   void request_keyframe();
   /// Requests one state newer than the last one: the newest from `not_before_ns` (now_ns()) on. Of several
   /// requests the earliest counts. Has no effect for listeners of all states.
@@ -128,7 +129,8 @@ class StrandEncodeWorker {
   // Of the worker's thread.
   uint64_t encoded_version_ = 0;
   uint64_t encoded_tick_ = 0;
-  EncodedFramePtr keyframe_;  // of the chain's present state, once one was made
+  EncodedFramePtr keyframe_;        // of the chain's present state, once one was made
+  std::optional<int64_t> told_ns_;  // simulated time of the last keyframe whose state everybody took over
 
   mutable std::mutex counters_mutex_;
   StrandEncodeCounters counters_;

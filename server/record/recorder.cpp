@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "common/base/hash.h"
@@ -237,7 +238,8 @@ void Recorder::write_frame(int64_t time_ns, const EncodedFramePtr& frame) {
   if (is_keyframe && held != nullptr && (*held)->header.sequence == header.sequence) held_frame_.reset();
   write_held_frame();
   if (is_keyframe) {
-    ++keyframes_;
+    // One comes once more for whoever joins meanwhile.
+    if (keyframes_ == 0 || header.sim_time_ns != keyframe_sim_ns_) ++keyframes_;
     is_chain_broken_ = false;
     keyframe_sim_ns_ = header.sim_time_ns;
     seek_cost_ = SeekCost(is_predicted_);
@@ -290,6 +292,8 @@ bool Recorder::is_keyframe_due(const EncodedFrame& delta) {
   const int64_t passed_ns = delta.header.sim_time_ns - keyframe_sim_ns_;
   const bool is_second_due =
       is_shared_ && keyframes_ == 1 && is_predicted_ && !is_exact(delta) && passed_ns >= kSecondKeyframeNs;
+  if (config_.keyframe_s > 0.0 && is_exact(delta))
+    return passed_ns >= std::llround(config_.keyframe_s * kNsPerS);
   return is_second_due || seek_cost_.is_keyframe_due(passed_ns);
 }
 

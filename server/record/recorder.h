@@ -65,6 +65,7 @@ class SeekCost {
 struct RecordConfig {
   std::filesystem::path path;
   IfPresent if_present = IfPresent::Refuse;
+  double keyframe_s = 0.0;  // of exact frames, from one to the next; 0: by what decoding takes
 };
 
 /// Totals since start.

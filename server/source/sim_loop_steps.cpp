@@ -79,11 +79,10 @@ void SimLoop::wake() {
                  has_path ? head_motion(head_path_.front(), head_path_.back(), passed_s) : HeadMotion{});
 }
 
-/// Returns whether the simulation goes on from the viewers' strands. Steps by commands must not depend on who
-/// watches.
+/// Returns whether the simulation goes on from the viewers' strands.
 bool SimLoop::shares() const {
-  return config_.shared != nullptr && config_.script == nullptr && !config_.is_lockstep &&
-         !solver_features_.is_carried && executor_->info().device == SimDevice::Lanes;
+  return config_.shared != nullptr && config_.script == nullptr && !solver_features_.is_carried &&
+         executor_->info().device == SimDevice::Lanes;
 }
 
 /// Before a step: takes over the viewers' strands if the encoder has handed them over.

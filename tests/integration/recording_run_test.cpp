@@ -126,6 +126,35 @@ TEST_F(RecordedRun, IsSimulatedAgainBitForBit) {
   EXPECT_TRUE(notes_.empty()) << testing::PrintToString(notes_);
 }
 
+/// In lockstep nothing depends on who watches, unless the recording asks for exact frames.
+TEST_F(RecordedRun, HasExactFramesInLockstepWhereItAsksForThem) {
+  for (const double keyframe_s : {0.0, 10.0}) {
+    ServerConfig recorded = config();
+    recorded.is_lockstep = true;
+    recorded.record->path = folder_.path() / (keyframe_s > 0.0 ? "exact.mcap" : "usual.mcap");
+    recorded.record->keyframe_s = keyframe_s;
+    ASSERT_TRUE(start(recorded));
+    for (int i = 0; i < 75; ++i)
+      ASSERT_EQ(run_command(ctl_target(), ControlCommand{Command::StepOnce, 2}), kDoneExit);
+    server_->stop();
+    server_.reset();
+
+    const auto reader = RecordingReader::open(recorded.record->path);
+    ASSERT_TRUE(reader) << reader.error().to_string();
+    int exact_frames = 0, keyframes = 0;
+    for (auto item = (*reader)->next(); item && *item; item = (*reader)->next())
+      if (const auto* frame = std::get_if<RecordedFrame>(&(*item)->what)) {
+        exact_frames += is_exact(*frame->frame) ? 1 : 0;
+        keyframes += frame->is_keyframe() ? 1 : 0;
+      }
+    EXPECT_EQ(exact_frames >= 20, keyframe_s > 0.0) << exact_frames;
+    EXPECT_EQ(exact_frames == 0, keyframe_s == 0.0);
+    EXPECT_LE(keyframes, 2) << keyframe_s;
+    const ReplayResult result = replay(recorded.record->path);
+    EXPECT_TRUE(result.is_equal()) << to_sentence(result);
+  }
+}
+
 /// Strands go on from those of viewers where a keyframe tells them: frames are exact, and the run can be
 /// simulated again for all that.
 TEST_F(RecordedRun, GoesOnFromWhatKeyframesTell) {

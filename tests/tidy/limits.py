@@ -16,7 +16,7 @@ WORDS = {
     "kMaxSessions": "256", "kMaxSessionsPerAddress": "64", "kSpareConnections": "64", "kSpareConnectionsPerAddress": "16 of one address",
     "kMaxProxyBytes": "2,048 bytes", "kMaxForwardedHops": "16", "kMaxHttpHeaderBytes": "8 KiB", "kMaxControlBytes": "64 KiB",
     "kMaxChainFrames": "240 frames", "kMaxChainBytes": "16 MiB", "kMaxWaitingMessages": "256 messages",
-    "kMaxBytesOfMessage": "1 MiB", "kControlsPerS": "60 a second", "kControlBurst": "120 at once", "kMaxPendingJobs": "32",
+    "kMaxBytesOfMessage": "1 MiB", "kControlsPerS": "60 a second", "kControlBurst": "120 at once", "kMaxPendingJobs": "32", "kMostSharedVertices": "400,000",
     "kStreamChangeNs": "500 ms", "kLookChangeNs": "100 ms",
     "kLongestStepsNs": "60 s", "kMaxHeldSamples": "65,536", "kMaxInFlightBytes": "4 MiB",
     "kMaxInFlightFrames": "512 frames", "kMaxQueuedControl": "64", "kMaxSessionMemoryBytes": "8 MiB", "kMaxSessionReadBytes": "68 KiB",

@@ -17,7 +17,7 @@ inline void tell(FieldTexts& told, const std::string& where, const TlsFiles& all
   OPTION_FIELDS(all, certificate, key);
 }
 inline void tell(FieldTexts& told, const std::string& where, const RecordConfig& all) {
-  OPTION_FIELDS(all, path, if_present);
+  OPTION_FIELDS(all, path, if_present, keyframe_s);
 }
 inline void tell(FieldTexts& told, const std::string& where, const RecordFolder& all) {
   OPTION_FIELDS(all, path, free_bytes, file_ending, beginning);
@@ -118,11 +118,13 @@ const OptionRow kSceneRows[] = {
      {"a.mcap"},
      {{"config.record", "some"},
       {"config.record.path", "a.mcap"},
-      {"config.record.if_present", text_of(IfPresent::Refuse)}}},
+      {"config.record.if_present", text_of(IfPresent::Refuse)},
+      {"config.record.keyframe_s", "0"}}},
     {"--record-replace",
      {},
      {{"config.record.if_present", text_of(IfPresent::Replace)}},
      {"--record", "a.mcap"}},
+    {"--record-exact", {"10"}, {{"config.record.keyframe_s", "10"}}, {"--record", "a.mcap", "--lockstep"}},
     {"--record-dir",
      {"takes"},
      {{"config.record_folder", "some"},

@@ -57,6 +57,7 @@ class FakeEncoder : public StrandEncoder {
     bool is_held = false;
     bool is_inside = false;
     bool is_refusing = false;
+    bool is_telling = false;  // keyframes tell what the simulation takes over
     std::vector<uint64_t> ticks;
 
     void hold() {
@@ -94,7 +95,14 @@ class FakeEncoder : public StrandEncoder {
   JoinFrames encode_for_join(const Snapshot& snapshot) override {
     const EncodedFramePtr encoded = encode(snapshot);
     const bool is_first = sequence_ == 1;
+    if (control_->is_telling) {
+      told_ = std::make_shared<SharedUpdate>();
+      told_->is_told = true;
+    }
     return {encoded, encoded == nullptr || is_first ? encoded : frame(Opcode::StrandKeyframe)};
+  }
+  std::shared_ptr<SharedUpdate> take_shared(SharedStates which) override {
+    return which == SharedStates::None ? nullptr : std::exchange(told_, nullptr);
   }
 
  private:
@@ -107,6 +115,7 @@ class FakeEncoder : public StrandEncoder {
   }
 
   std::shared_ptr<Control> control_;
+  std::shared_ptr<SharedUpdate> told_;
   uint64_t tick_ = 0;
   uint32_t sequence_ = 0;
 };
@@ -238,6 +247,35 @@ TEST_F(StrandEncoding, RequestsBetweenTwoTicksShareOneKeyframe) {
   EXPECT_EQ(worker->counters().keyframes, keyframes_before + 1);
   EXPECT_EQ(worker->counters().encodes, 3u) << "the keyframe comes with the next state's encode";
   EXPECT_EQ(list_.count(), 4u);
+}
+
+// Everybody takes a keyframe's state over, and each time hair moves a little.
+TEST_F(StrandEncoding, RequestsWithinHalfASecondShareAKeyframeThatIsTakenOver) {
+  constexpr uint64_t kFrames = 61, kPerHalfSecond = 30;
+  for (const bool is_telling : {false, true}) {
+    control_->is_telling = is_telling;
+    SharedSlot shared;
+    shared.set_wanted(SharedStates::All);
+    SnapshotSlot slot;
+    FrameList list;
+    StrandEncodeWorker worker(slot, std::make_unique<FakeEncoder>(control_), list.sink(), {}, &shared);
+    worker.set_listeners(StrandListeners::All);
+    for (uint64_t tick = 0; tick < kFrames; ++tick) {
+      const size_t before = worker.counters().encodes;
+      auto state = std::make_shared<Snapshot>(*make_state(tick + 1));
+      state->sim_time_ns = static_cast<int64_t>(tick) * 500'000'000 / kPerHalfSecond;
+      worker.request_keyframe();
+      slot.put(state);
+      ASSERT_TRUE(eventually([&] { return worker.counters().encodes > before; }));
+    }
+    const uint64_t keyframes = worker.counters().keyframes;
+    // A request may come while the keyframe before it is still the newest.
+    EXPECT_TRUE(is_telling ? keyframes == 3 : keyframes > kFrames / 2) << keyframes;
+    // One more comes where no states do.
+    const size_t count = list.count();
+    worker.request_keyframe();
+    EXPECT_TRUE(eventually([&] { return list.count() > count; }));
+  }
 }
 
 TEST_F(StrandEncoding, AJoinerOfAPausedSceneGetsThePresentStateEncodedAgain) {

@@ -43,6 +43,10 @@ constexpr size_t kMostChanges = 1;
 constexpr double kFittingShare = 0.7;             // of the rate
 constexpr int64_t kFirstPictureNs = 1'500 * kMs;  // and kRoundTrips
 constexpr int kRoundTrips = 3;
+// Until a frame is exact, as far as a viewer decodes by steps: the asset, few strands, then the keyframe of
+// all.
+constexpr double kBytesUntilExact = 300'000.0;
+constexpr int kRoundTripsUntilExact = 6;
 
 constexpr size_t kMostClasses = 16;
 constexpr size_t kToldChanges = 4;
@@ -56,6 +60,8 @@ struct Seen {
   size_t class_count = 0;
   int64_t first_picture_ns = 0;
   size_t first_bytes = 0;  // until then
+  int64_t exact_ns = 0;    // until the first frame without corrections; 0: none came
+  size_t exact_bytes = 0;
   size_t found_class = 0;
   size_t changes = 0;
   int64_t changed_ns[kToldChanges] = {};
@@ -188,6 +194,10 @@ void watch(const TestedLink& link, Seen& seen) {
       seen.first_picture_ns = since_ns;
       seen.first_bytes = totals_of(live->session()).received_bytes;
     }
+    if (seen.exact_ns == 0 && live->session().replay().stats().exact_frames > 0) {
+      seen.exact_ns = since_ns;
+      seen.exact_bytes = totals_of(live->session()).received_bytes;
+    }
     const size_t now = strand_stream_of(live->session().replay().stream_id()).strand_class;
     if (since_ns < kFoundNs) seen.found_class = now;
     if (since_ns >= kFoundNs && now != present) {
@@ -229,6 +239,10 @@ std::string broken_rules(const TestedLink& link, const Seen& seen, size_t fittin
   if (!seen.has_joined) return "no picture";
   std::string broken;
   if (seen.first_picture_ns > kFirstPictureNs + kRoundTrips * link.round_trip_ns) broken += " late";
+  const double load_ns = kBytesUntilExact * kMbitPerByte / link.mbit_per_s * kNsPerS;
+  const auto exact_until_ns =
+      kRoundTripsUntilExact * link.round_trip_ns + static_cast<int64_t>(load_ns) + kStallNs;
+  if (link.has_steps && (seen.exact_ns == 0 || seen.exact_ns > exact_until_ns)) broken += " inexact";
   if (seen.found_class > fitting) broken += " coarse";
   if (seen.changes > kMostChanges) broken += " restless";
   return broken;
@@ -248,7 +262,9 @@ int walk(const std::vector<TestedLink>& links) {
     const Seen costs = in_child({.has_steps = has_steps}, measure);
     fmt::print("{}, Mbit/s of each class:", has_steps ? "step" : "tangent");
     for (size_t i = 0; i < costs.class_count; ++i) fmt::print(" {:.2f}", costs.bytes_per_s[i] * kMbitPerByte);
-    fmt::print("\n  Mbit/s  ms  stalled  fitting  found  changes  first ms  first kB  oldest ms  Hz\n");
+    fmt::print(
+        "\n  Mbit/s  ms  stalled  fitting  found  changes  first ms  first kB  exact ms  exact kB  oldest ms "
+        " Hz\n");
     for (TestedLink link : links) {
       link.has_steps = has_steps;
       const Seen seen = in_child(link, watch);
@@ -258,9 +274,10 @@ int walk(const std::vector<TestedLink>& links) {
         ++fitting;
       const std::string broken = broken_rules(link, seen, fitting);
       broken_links += broken.empty() ? 0 : 1;
-      fmt::print("  {:6} {:3} {:6.0f} %  {:7}  {:5}  {:7}  {:8}  {:8}  {:9}  {:.1f}{}\n", link.mbit_per_s,
-                 link.round_trip_ns / kMs, link.stalled_share * 100.0, fitting, seen.found_class,
-                 seen.changes, seen.first_picture_ns / kMs, seen.first_bytes / 1000, seen.oldest_ns / kMs,
+      fmt::print("  {:6} {:3} {:6.0f} %  {:7}  {:5}  {:7}  {:8}  {:8}  {:8}  {:8}  {:9}  {:.1f}{}\n",
+                 link.mbit_per_s, link.round_trip_ns / kMs, link.stalled_share * 100.0, fitting,
+                 seen.found_class, seen.changes, seen.first_picture_ns / kMs, seen.first_bytes / 1000,
+                 seen.exact_ns / kMs, seen.exact_bytes / 1000, seen.oldest_ns / kMs,
                  static_cast<double>(seen.states) * kNsPerS / kSteadyNs,
                  broken.empty() ? "" : "  BROKEN:" + broken + change_times(seen));
       std::fflush(stdout);

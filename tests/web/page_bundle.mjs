@@ -46,6 +46,16 @@ const drop = (tab, name) => tab.evaluate(`(() => {
   const goes = (type) => dispatchEvent(new DragEvent(type, { dataTransfer, cancelable: true }));
   return [goes('dragover'), goes('drop'), document.getElementById('warnings').lastElementChild?.textContent];
 })()`);
+/** How many frames of the page are keyframes, and how many are exact. */
+function kindsOf(page) {
+  const tape = Buffer.from(fs.readFileSync(page, 'utf8').match(/ id="tape"[^>]*>([^<]*)/)[1], 'base64');
+  const kinds = { keyframes: 0, exact: 0 };
+  for (let at = 4; at < tape.length; at += 8 + tape.readUInt32LE(at + 4)) {
+    kinds.keyframes += tape[at + 8] === KEYFRAME ? 1 : 0;
+    kinds.exact += tape[at + 8] === DELTA && (tape[at + 8 + HEADER_BYTES] & 128) !== 0 ? 1 : 0;
+  }
+  return kinds;
+}
 /** Gives a delta of the page another hash. Returns how many frames stand before it. */
 function damage(page, delta) {
   const html = fs.readFileSync(page, 'utf8');
@@ -89,6 +99,9 @@ await runAll({
       'MOTION', 'Frames: 30', 'Frame Time: 0.033333', ...Array.from({ length: 30 }, (_, i) => `0 0 ${40 * Math.sin(i / 5)}`), ''].join('\n'));
     const { page, frames } = bundle('scene.html', ...SMALL, '--motion', motion, '--seconds', '1');
     assert.equal(frames, 61, 'every state has a frame');
+    const { keyframes, exact } = kindsOf(page);
+    assert.equal(keyframes, 2, 'at rest, and as soon as all can go on from one');
+    assert.ok(exact >= 40, `${exact} exact frames`);
     const right = damage(page, 50);
     const tab = await open(page);
     const state = await tab.until((now) => now.wrong > 0, 'a refusal');

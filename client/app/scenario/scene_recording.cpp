@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "client/app/scenario/scenario_run.h"
 #include "common/scene/scene_file.h"
@@ -10,8 +11,9 @@ namespace strandcast {
 namespace {
 
 constexpr double kStartLimitS = 120.0;
-constexpr double kPatienceS = 60.0;        // with a machine that is busy: no state is left out
-constexpr double kLimitPerSecond = 120.0;  // a scene that is simulated so much slower than in real time
+constexpr double kPatienceS = 60.0;            // with a machine that is busy: no state is left out
+constexpr std::string_view kKeyframeS = "10";  // a player steps so far to any moment
+constexpr double kLimitPerSecond = 120.0;      // a scene that is simulated so much slower than in real time
 
 bool is_scene_file(const std::filesystem::path& path) {
   return path.empty() || path.extension() == ".textproto";
@@ -21,7 +23,7 @@ Result<Scenario> scenario_of(const SceneRecordingOptions& options, const std::fi
   ScenarioStart start;
   start.is_lockstep = true;
   start.overrides = options.overrides;
-  start.options = {"--record", out.string()};
+  start.options = {"--record", out.string(), "--record-exact", std::string(kKeyframeS)};
   const bool has_scene_file = is_scene_file(options.scene) && !options.scene.empty();
   if (has_scene_file) start.scene = options.scene;
   if (!is_scene_file(options.scene))
