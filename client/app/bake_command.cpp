@@ -56,7 +56,29 @@ Result<std::optional<HairOrigin>> origin_of(const BakedStates& states) {
   return std::optional(std::move(origin));
 }
 
+/// Nobody's hair or clip is written over by a name that was forgotten.
+Status check_paths(const BakeCommand& command) {
+  std::vector<std::string> read = command.exported.paths;
+  const std::string out = read.back();
+  read.pop_back();
+  for (const std::string& path : read)
+    if (std::filesystem::path(path).extension() == ".bvh")
+      return make_error(ErrorCode::BadInput, "{} is no hair: --motion {} is how a clip is given", path, path);
+  std::error_code ignored;
+  if (read.empty() && std::filesystem::exists(out, ignored) &&
+      std::filesystem::path(out).extension() != ".csv")
+    return make_error(ErrorCode::BadInput,
+                      "{} is there already, and no hair is named before it: the file to write comes last",
+                      out);
+  read.insert(read.end(), {command.feed.motion, command.feed.wind});
+  for (const std::string& path : read)
+    if (std::filesystem::equivalent(path, out, ignored))
+      return make_error(ErrorCode::BadInput, "{} is read here: name another file to write, last", out);
+  return {};
+}
+
 Result<ExportReport> bake(const BakeCommand& command, const std::atomic<bool>& stop) {
+  RETURN_IF_ERROR(check_paths(command));
   ASSIGN_OR_RETURN(FeedPlan plan, bake_plan(command));
   std::optional<CurveMotion> curves;
   if (is_of_curves(command.feed.motion)) {
@@ -103,10 +125,10 @@ void declare_bake(CLI::App& app, BakeCommand& command) {
   FeedOptions& feed = command.feed;
   feed.motion = "none";
   feed.wind = kStillAir;
-  app.add_option(
-         "paths", command.exported.paths,
-         "HAIR.ply [MORE.ply ..] OUT.abc: hair files as for strandcast-server --groom (without: the "
-         "scene's hair), and the file to write: .usda, .usdc, .usdz, .abc, .ply or .csv; it is replaced")
+  app.add_option("paths", command.exported.paths,
+                 "HAIR.ply [MORE.ply ..] OUT.abc: hair files as for strandcast-server --groom (without: the "
+                 "scene's hair), and the file to write: .usda, .usdc, .usdz, .abc, .ply or .csv; it is "
+                 "replaced, where hair is named")
       ->required()
       ->expected(1, static_cast<int>(kMaxGroomFiles) + 1);
   app.add_option(
@@ -152,7 +174,7 @@ std::vector<std::string> server_words(const BakeCommand& command) {
 
 int run_bake(const BakeCommand& command, const std::atomic<bool>& stop) {
   const auto report = bake(command, stop);
-  if (!report) return ctl_failure(report.error(), stop ? kRefusedExit : kBadInputExit);
+  if (!report) return ctl_failure(report.error());
   print_export(*report);
   return kDoneExit;
 }
