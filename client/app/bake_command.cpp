@@ -57,12 +57,12 @@ Result<std::optional<HairOrigin>> origin_of(const BakedStates& states) {
   return std::optional(std::move(origin));
 }
 
-/// No file of a person's is written over: neither a hair file, nor one that stands where the file to write
-/// was left out.
+/// No file of a person's is written over: neither one that is read, nor one that stands where the file to
+/// write was left out.
 Status check_paths(const BakeCommand& command) {
-  std::vector<std::string> hair = command.exported.paths;
-  const std::string out = std::move(hair.back());
-  hair.pop_back();
+  const std::vector<std::string>& paths = command.exported.paths;
+  const std::string out = paths.back();
+  const std::vector<std::string> hair(paths.begin(), paths.end() - 1);
   const bool names_none =
       hair.empty() && command.scene.empty() &&
       std::none_of(command.overrides.begin(), command.overrides.end(),
@@ -73,7 +73,9 @@ Status check_paths(const BakeCommand& command) {
   });
   if (motion != hair.end())
     return make_error(ErrorCode::BadInput, "{} is motion, not hair: --motion {}", *motion, *motion);
-  for (const std::string& path : hair)
+  std::vector<std::string> read = hair;
+  read.insert(read.end(), {command.feed.motion, command.feed.wind});
+  for (const std::string& path : read)
     if (std::filesystem::equivalent(path, out, failure))
       return make_error(ErrorCode::BadInput,
                         "{} is read, and would be written over: name another file to write", out);
@@ -134,10 +136,10 @@ void declare_bake(CLI::App& app, BakeCommand& command) {
   FeedOptions& feed = command.feed;
   feed.motion = "none";
   feed.wind = kStillAir;
-  app.add_option(
-         "paths", command.exported.paths,
-         "HAIR.ply [MORE.ply ..] OUT.abc: hair files as for strandcast-server --groom (without: the "
-         "scene's hair), and the file to write: .usda, .usdc, .usdz, .abc, .ply or .csv; it is replaced")
+  app.add_option("paths", command.exported.paths,
+                 "HAIR.ply [MORE.ply ..] OUT.abc: hair files as for strandcast-server --groom (without: the "
+                 "scene's hair), and the file to write: .usda, .usdc, .usdz, .abc, .ply or .csv; it is "
+                 "replaced, where hair is named")
       ->required()
       ->expected(1, static_cast<int>(kMaxGroomFiles) + 1);
   app.add_option(
@@ -183,7 +185,7 @@ std::vector<std::string> server_words(const BakeCommand& command) {
 
 int run_bake(const BakeCommand& command, const std::atomic<bool>& stop) {
   const auto report = bake(command, stop);
-  if (!report) return ctl_failure(report.error(), stop ? kRefusedExit : kBadInputExit);
+  if (!report) return ctl_failure(report.error());
   print_export(*report);
   return kDoneExit;
 }

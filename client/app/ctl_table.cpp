@@ -6,6 +6,7 @@
 #include "client/app/recording_commands.h"
 #include "client/app/script_command.h"
 #include "client/app/step_command.h"
+#include "client/app/stop_signal.h"
 #include "common/base/command_line_error.h"
 #include "common/base/frame_rate.h"
 #include "common/motion/mocap_packet.h"
@@ -298,10 +299,14 @@ std::span<const CtlCommand> ctl_commands() {
 }
 
 int carry_out(const CtlCommand& command, const CtlCommandLine& line, const std::atomic<bool>& stop) {
-  if (command.run != nullptr) return command.run(line, stop);
-  const ClientMessage message = command.message(line);
-  const auto* order = std::get_if<AdminCommand>(&message);
-  return order != nullptr ? run_admin(line.target, *order) : run_command(line.target, message);
+  const auto run = [&] {
+    if (command.run != nullptr) return command.run(line, stop);
+    const ClientMessage message = command.message(line);
+    const auto* order = std::get_if<AdminCommand>(&message);
+    return order != nullptr ? run_admin(line.target, *order) : run_command(line.target, message);
+  };
+  const int code = run();
+  return stop && code != kDoneExit ? stopped_exit_code() : code;
 }
 
 }  // namespace strandcast

@@ -60,7 +60,7 @@ struct CtlCommand {
 /// Returns the commands in the order of --help; sub-commands follow their parent.
 std::span<const CtlCommand> ctl_commands();
 
-/// Runs a command that can be called, and returns the exit code.
+/// Runs a command that can be called, and returns the exit code: stopped_exit_code() where `stop` came first.
 int carry_out(const CtlCommand& command, const CtlCommandLine& line, const std::atomic<bool>& stop);
 
 }  // namespace strandcast

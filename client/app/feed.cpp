@@ -55,12 +55,15 @@ class Feeder {
       progress_.motion_s += (t_s - progress_.elapsed_s) * plan_.speed * progress_.pace;
       progress_.elapsed_s = t_s;
       if (plan_.duration_s > 0.0 && t_s >= plan_.duration_s) break;
-      if (plan_.motion_s > 0.0 && progress_.motion_s >= plan_.motion_s) break;
+      // The motion ends where it ends, not at the sample before.
+      const bool is_end = plan_.motion_s > 0.0 && progress_.motion_s >= plan_.motion_s;
+      if (is_end) progress_.motion_s = plan_.motion_s;
       if (!sleep_until_ns(sample_ns, stop)) break;
       const double lateness_ms = static_cast<double>(now_ns() - sample_ns) * 1e-6;
       progress_.worst_lateness_ms = std::max(progress_.worst_lateness_ms, lateness_ms);
       way_.send(plan_, sample_ns, progress_);
       RETURN_IF_ERROR(way_.read_events(plan_, progress_));
+      if (is_end) break;
       if (now_ns() < next_report_ns) continue;
       next_report_ns += kSInNs;
       if (listener) listener(progress_);

@@ -129,7 +129,12 @@ Result<SceneDesc> ask_scene(const CtlTarget& target) {
   while (now_ns() - begin_ns < std::chrono::nanoseconds(kCommandPatience).count())
     for (const ClientEvent& event : client->wait(kSceneWait)) {
       if (const auto* closed = std::get_if<ClosedEvent>(&event)) return closed->error;
-      if (const auto* text = std::get_if<SceneText>(&event)) return scene_of(*text);
+      if (const auto* text = std::get_if<SceneText>(&event)) {
+        ASSIGN_OR_RETURN(SceneDesc scene, scene_of(*text));
+        for (SceneDesc& head : scene.heads)
+          if (head.name == target.head) return std::move(head);
+        return scene;
+      }
     }
   return make_error(ErrorCode::Timeout, "the server did not say its scene");
 }

@@ -31,7 +31,7 @@ Result<HairOrigin> load_place(const FileGroomDesc& file);
 /// origin and unturned with the first sample.
 std::function<Pose(double t_s)> head_motion(CurveMotion motion, const HairOrigin& origin);
 
-/// Asks a server for its scene, as who controls it.
+/// Asks a server for the scene of the target's head, as who controls it.
 Result<SceneDesc> ask_scene(const CtlTarget& target);
 
 }  // namespace strandcast

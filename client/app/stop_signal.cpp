@@ -48,4 +48,9 @@ const std::atomic<bool>& catch_stop_signals() {
   return is_stop_wanted;
 }
 
+int stopped_exit_code() {
+  constexpr int kBySignal = 128;
+  return kBySignal + (first_signal != 0 ? first_signal : SIGINT);
+}
+
 }  // namespace strandcast

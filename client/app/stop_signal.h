@@ -13,4 +13,7 @@ inline constexpr std::chrono::milliseconds kStopGrace{750};
 /// program, and so does the first if the program is still running after kStopGrace.
 const std::atomic<bool>& catch_stop_signals();
 
+/// Returns what shells expect of a program that was stopped before it was done: 130 after Ctrl-C.
+int stopped_exit_code();
+
 }  // namespace strandcast

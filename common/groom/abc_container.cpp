@@ -43,6 +43,7 @@ Result<AbcContainer> AbcContainer::begin(std::shared_ptr<GroomSource> source) {
     return make_error(ErrorCode::Unsupported, "Ogawa version {}, known is version 1", version);
   AbcContainer container(std::move(source));
   std::memcpy(&container.root_, header.data() + kRootAt, sizeof(container.root_));
+  RETURN_IF_ERROR(container.source_->check_reaches(container.root_));
   return container;
 }
 

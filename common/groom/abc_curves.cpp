@@ -59,7 +59,7 @@ Status read_counts(const AbcSample& sample, uint64_t vertex_limit, AbcCurves& cu
     curves.vertex_counts.push_back(static_cast<uint32_t>(count));
     total += curves.vertex_counts.back();
   }
-  RETURN_IF_ERROR(fit_points(curves.points, total, "nVertices", curves.notes));
+  RETURN_IF_ERROR(fit_points(curves.points, curves.vertex_counts, "nVertices", curves.notes));
   if (total <= vertex_limit) return {};
   return make_error(ErrorCode::LimitExceeded, "nVertices need {} points, {} are allowed", total,
                     vertex_limit);

@@ -44,6 +44,14 @@ Status GroomSource::claim(uint64_t size_bytes) {
   return {};
 }
 
+Status GroomSource::check_reaches(uint64_t contents) const {
+  if (contents < size_bytes_) return {};
+  return make_error(ErrorCode::BadInput,
+                    "it is cut off at byte {}, before the list of what is in it: copy it again, or export it "
+                    "anew",
+                    size_bytes_);
+}
+
 Status GroomSource::check(uint64_t offset, uint64_t count, uint64_t item_bytes) {
   if (!has(offset, count, item_bytes))
     return make_error(ErrorCode::BadInput, "it ends at byte {}, within what is needed", size_bytes_);

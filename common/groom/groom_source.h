@@ -34,6 +34,8 @@ class GroomSource {
   bool has(uint64_t offset, uint64_t count, uint64_t item_bytes) const {
     return offset <= size_bytes_ && count <= (size_bytes_ - offset) / item_bytes;
   }
+  /// BadInput where the bytes end before the list of what they hold, which begins at `contents`.
+  Status check_reaches(uint64_t contents) const;
   /// Leaves nothing but a part, which has to lie inside; its first byte is byte 0 from now on.
   void narrow(uint64_t offset, uint64_t size_bytes);
   /// Counts bytes that are to be read or unpacked. LimitExceeded if that is too many.

@@ -43,10 +43,10 @@ constexpr double kQuarterTurnDeg = 90.0;
 /// sides by the hairline alone, which is up to 29 degrees off.
 constexpr double kSnapDeg = 8.0, kHairlineSnapDeg = 32.0;
 /// The mirror is looked for so far from where the hairline is highest.
-constexpr int kMirrorReachDeg = 45;
-/// Roots whose two sides differ more, 0 to 1, are no mirror images. Heads of hair and their parts have up to
-/// 0.1.
-constexpr double kMostSkew = 0.12;
+constexpr double kMirrorReachDeg = 45.0, kMirrorStepDeg = 0.25;
+/// Hair whose two sides differ more, 0 to 1, is no mirror image: whole heads of 143 strands and more have up
+/// to 0.04, those without a side or a patch 0.2 and more.
+constexpr double kMostSkew = 0.1;
 
 double angle_of(const glm::dvec3& direction) {
   return std::atan2(direction.x, direction.z);
@@ -67,35 +67,51 @@ std::vector<glm::dvec3> root_directions(const Groom& groom, RootReach reach) {
   return directions;
 }
 
-/// How roots lie around +Y: their first harmonics, in three weights of height.
-class RootHarmonics {
+/// Where around +Y hair grows: 1 on covered skin, 0 on bare, smooth over the spacing of roots, so that it
+/// makes no difference how closely they stand where. Kept as the first harmonics of rings around +Y.
+class HairCover {
  public:
-  explicit RootHarmonics(const std::vector<glm::dvec3>& directions) {
-    for (const glm::dvec3& direction : directions) {
-      const double across = std::hypot(direction.x, direction.z), angle = angle_of(direction),
-                   y = direction.y;
-      const std::array weights = {1.0, y, 2.0 * y * y - 1.0};  // Chebyshev's
-      for (size_t order = 0; order < kOrders; ++order)
-        for (size_t band = 0; band < weights.size(); ++band)
-          harmonic_[order][band] +=
-              std::polar(across, static_cast<double>(order + 1) * angle) * weights[band];
+  explicit HairCover(const std::vector<glm::dvec3>& directions) {
+    std::vector<glm::dvec3> roots;
+    const size_t stride = directions.size() / kMostRoots + 1;
+    for (size_t i = 0; i < directions.size(); i += stride) roots.push_back(directions[i]);
+    for (size_t ring = 0; ring < kRings; ++ring) {
+      const double y = kTopRing * (2.0 * static_cast<double>(ring) + 1.0 - kRings) / kRings;
+      for (size_t place = 0; place < kPlaces; ++place) {
+        const double angle = 2.0 * std::numbers::pi * static_cast<double>(place) / kPlaces;
+        const double across = std::sqrt(1.0 - y * y);
+        const double cover = cover_at(roots, {across * std::sin(angle), y, across * std::cos(angle)});
+        for (size_t i = 0; i < kOrders; ++i)
+          harmonic_[ring][i] += std::polar(cover, static_cast<double>(i + 1) * angle);
+      }
     }
   }
   /// Returns how unlike the two sides of the upright plane at this angle are: 0 = mirror images, at most 1.
   double skew(double angle) const {
     double odd = 0.0, all = 0.0;
-    for (size_t order = 0; order < kOrders; ++order)
-      for (const std::complex<double>& sum : harmonic_[order]) {
-        const double part = (sum * std::polar(1.0, -static_cast<double>(order + 1) * angle)).imag();
+    for (const auto& ring : harmonic_)
+      for (size_t i = 0; i < kOrders; ++i) {
+        const double part = (ring[i] * std::polar(1.0, -static_cast<double>(i + 1) * angle)).imag();
         odd += part * part;
-        all += std::norm(sum);
+        all += std::norm(ring[i]);
       }
     return all > 0.0 ? odd / all : 1.0;
   }
 
  private:
-  static constexpr size_t kOrders = 8;
-  std::array<std::array<std::complex<double>, 3>, kOrders> harmonic_{};
+  static constexpr size_t kOrders = 8, kRings = 12, kPlaces = 72, kMostRoots = 1500;
+  static constexpr double kTopRing = 0.95;
+  static constexpr double kUsualArea = 0.6;  // of the sphere that hair covers
+  static constexpr double kWhole = 3.0;      // evenly spread roots cover all but exp(-3) of their skin
+
+  static double cover_at(const std::vector<glm::dvec3>& roots, const glm::dvec3& place) {
+    const double root_area = 4.0 * std::numbers::pi * kUsualArea / static_cast<double>(roots.size());
+    double sum = 0.0;
+    for (const glm::dvec3& root : roots) sum += std::exp((glm::dot(root, place) - 1.0) / root_area);
+    return 1.0 - std::exp(-kWhole * sum / (2.0 * std::numbers::pi));
+  }
+
+  std::array<std::array<std::complex<double>, kOrders>, kRings> harmonic_{};
 };
 
 /// The angle of the face near that of the hairline, in degrees, and from where on it is taken as a quarter
@@ -105,12 +121,12 @@ struct FaceAngle {
 };
 
 FaceAngle face_by_mirror(const std::vector<glm::dvec3>& directions, double hairline_deg) {
-  const RootHarmonics roots(directions);
+  const HairCover cover(directions);
   FaceAngle best{hairline_deg};
   double least = kMostSkew;
-  for (int step = -kMirrorReachDeg; step <= kMirrorReachDeg; ++step) {
-    const double deg = std::round(hairline_deg) + step;
-    const double skew = roots.skew(deg * std::numbers::pi / 180.0);
+  for (double aside_deg = -kMirrorReachDeg; aside_deg <= kMirrorReachDeg; aside_deg += kMirrorStepDeg) {
+    const double deg = std::round(hairline_deg) + aside_deg;
+    const double skew = cover.skew(deg * std::numbers::pi / 180.0);
     if (skew >= least) continue;
     best = {std::remainder(deg, 360.0), kSnapDeg};
     least = skew;
@@ -236,8 +252,15 @@ Guess<float> guess_yaw_deg(const Groom& groom) {
 
 namespace {
 
+/// Why roots say nothing of how large a head is; nullptr where they do.
+const char* unlike_a_head(const Groom& groom) {
+  constexpr uint32_t kFewRoots = 16;
+  if (groom.strand_count() < kFewRoots) return "so few roots say nothing of a head";
+  return are_on_a_disc(roots_of(groom)) ? "its roots lie in a plane" : nullptr;
+}
+
 /// The first common unit in which hair is as long as on a head; no reason where there is none.
-Guess<float> unit_by_length(const Groom& groom) {
+Guess<float> unit_by_length(const Groom& groom, const char* why) {
   constexpr double kShortestM = 0.03, kLongestM = 1.2, kLongHair = 0.95;  // of strands
   std::vector<double> lengths;
   for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
@@ -250,8 +273,7 @@ Guess<float> unit_by_length(const Groom& groom) {
   for (const CommonUnit& unit : kCommonUnits) {
     const double length_m = length * static_cast<double>(unit.unit_m);
     if (length_m >= kShortestM && length_m <= kLongestM)
-      return {unit.unit_m, fmt::format("in {} its hair is {:.2g} m long, and its roots lie in a plane",
-                                       unit.name, length_m)};
+      return {unit.unit_m, fmt::format("in {} its hair is {:.2g} m long, and {}", unit.name, length_m, why)};
   }
   return {};
 }
@@ -259,8 +281,8 @@ Guess<float> unit_by_length(const Groom& groom) {
 }  // namespace
 
 Guess<float> guess_unit(const Groom& groom) {
-  if (are_on_a_disc(roots_of(groom))) {
-    if (Guess<float> by_length = unit_by_length(groom); !by_length.reason.empty()) return by_length;
+  if (const char* const why = unlike_a_head(groom)) {
+    if (Guess<float> by_length = unit_by_length(groom, why); !by_length.reason.empty()) return by_length;
   }
   const float radius = fit_head_sphere(groom).radius_m;
   if (!std::isfinite(radius) || radius <= 0.0f) return {1.0f, {}};

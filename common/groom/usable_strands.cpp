@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <numeric>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -42,14 +45,48 @@ std::string bridge_root_uv(Groom& groom) {
   return count + " those are as of the nearest root";
 }
 
+/// The first point that a broken export left at the origin, far from its strand; the end where none is.
+size_t lost_point(std::span<const glm::vec3> strand) {
+  constexpr float kFarTimes = 10.0f;  // half of the strand's segments
+  constexpr size_t kMinPoints = 4;    // fewer do not say how long a segment is
+  if (strand.size() < kMinPoints) return strand.size();
+  std::vector<float> lengths;
+  for (size_t i = 1; i < strand.size(); ++i)
+    if (const float length = glm::distance(strand[i - 1], strand[i]); length > 0.0f)
+      lengths.push_back(length);
+  if (lengths.empty()) return strand.size();
+  const float far = kFarTimes * median(lengths);
+  for (size_t i = 0; i < strand.size(); ++i) {
+    if (strand[i] != glm::vec3(0.0f)) continue;
+    if (i > 0 && glm::length(strand[i - 1]) > far) return i;
+    if (i + 1 < strand.size() && glm::length(strand[i + 1]) > far) return i;
+  }
+  return strand.size();
+}
+
+std::optional<Error> what_is_wrong(uint32_t strand, std::span<const glm::vec3> points) {
+  const auto bad = std::find_if_not(points.begin(), points.end(), is_finite);
+  if (bad != points.end())
+    return make_error(ErrorCode::BadInput, "strand {} vertex {} has the coordinates {}, {} and {}", strand,
+                      bad - points.begin(), bad->x, bad->y, bad->z);
+  const size_t lost = lost_point(points);
+  if (lost == points.size()) return std::nullopt;
+  return make_error(ErrorCode::BadInput, "strand {} vertex {} is at 0, 0, 0, far from its strand", strand,
+                    lost);
+}
+
 /// Strands that go further from the middle of the roots than so many times what half of them reach: a point
 /// of a broken export, and no hair.
 constexpr float kStrayReaches = 25.0f;
-constexpr size_t kMinJudgedStrands = 20;  // fewer do not say how far hair goes
+constexpr size_t kMinJudgedStrands = 20;  // fewer do not say how hair goes
 
-/// How far each strand goes from the middle of the roots; empty where that says nothing. Strands that are not
-/// kept go nowhere.
-std::vector<float> reaches_of(const Groom& groom, std::span<const uint8_t> is_kept) {
+/// How far each strand's root is from the middle of the roots, and how far the strand goes; empty where that
+/// says nothing. Strands that are not kept go nowhere.
+struct Reaches {
+  std::vector<float> root, all;
+};
+
+Reaches reaches_of(const Groom& groom, std::span<const uint8_t> is_kept) {
   std::array<std::vector<float>, 3> roots;
   for (uint32_t strand = 0; strand < groom.strand_count(); ++strand)
     for (int axis = 0; axis < 3 && is_kept[strand] != 0; ++axis)
@@ -57,38 +94,95 @@ std::vector<float> reaches_of(const Groom& groom, std::span<const uint8_t> is_ke
   if (roots[0].size() < kMinJudgedStrands) return {};
   glm::vec3 middle;
   for (int axis = 0; axis < 3; ++axis) middle[axis] = median(std::move(roots[static_cast<size_t>(axis)]));
-  std::vector<float> reaches(groom.strand_count(), 0.0f);
+  Reaches reaches{std::vector<float>(groom.strand_count()), std::vector<float>(groom.strand_count())};
   for (uint32_t strand = 0; strand < groom.strand_count(); ++strand)
-    for (uint32_t i = groom.offset[strand]; i < groom.offset[strand + 1] && is_kept[strand] != 0; ++i)
-      reaches[strand] = std::max(reaches[strand], glm::distance(groom.rest_position_m[i], middle));
+    for (uint32_t i = groom.offset[strand]; i < groom.offset[strand + 1] && is_kept[strand] != 0; ++i) {
+      const float reach = glm::distance(groom.rest_position_m[i], middle);
+      if (i == groom.offset[strand]) reaches.root[strand] = reach;
+      reaches.all[strand] = std::max(reaches.all[strand], reach);
+    }
   return reaches;
 }
 
-/// Takes out strands with a point where no hair is, if they are few: else the hair is like that.
-void find_strays(const Groom& groom, std::vector<uint8_t>& is_kept, BadItems& broken) {
-  const std::vector<float> reaches = reaches_of(groom, is_kept);
+/// What half of the strands that are kept have at most.
+float usual_of(const std::vector<float>& reaches, std::span<const uint8_t> is_kept) {
   std::vector<float> kept;
   for (size_t strand = 0; strand < reaches.size(); ++strand)
     if (is_kept[strand] != 0) kept.push_back(reaches[strand]);
-  if (kept.empty()) return;
-  const float usual = median(std::move(kept)), furthest = kStrayReaches * usual;
-  const auto is_stray = [&](float reach) { return usual > 0.0f && reach > furthest; };
+  return kept.empty() ? 0.0f : median(std::move(kept));
+}
+
+/// Takes out strands that reach further, if they are few: else the hair is like that.
+void leave_out_further(float furthest, const std::vector<float>& reaches, std::vector<uint8_t>& is_kept,
+                       BadItems& broken, const std::function<Error(size_t strand)>& why) {
+  const auto is_stray = [&](float reach) { return furthest > 0.0f && reach > furthest; };
   const auto count = static_cast<uint64_t>(std::count_if(reaches.begin(), reaches.end(), is_stray));
-  if (count * kMostBadShare > groom.strand_count()) return;
+  if (count * kMostBadShare > is_kept.size()) return;
   for (size_t strand = 0; strand < reaches.size(); ++strand) {
-    if (!is_stray(reaches[strand])) continue;
+    if (!is_stray(reaches[strand]) || is_kept[strand] == 0) continue;
     is_kept[strand] = 0;
-    broken.add(
-        make_error(ErrorCode::BadInput,
-                   "strand {} goes {:.4g} units from the middle of the roots, half of all at most {:.4g}",
-                   strand, reaches[strand], usual));
+    broken.add(why(strand));
   }
+}
+
+/// Takes out strands with a point where no hair is, and those whose root stands apart.
+void find_strays(const Groom& groom, std::vector<uint8_t>& is_kept, BadItems& broken) {
+  constexpr float kStrayRoots = 10.0f;  // times what half of the roots are off, or half of what hair reaches
+  const Reaches reaches = reaches_of(groom, is_kept);
+  const float usual = usual_of(reaches.all, is_kept), usual_root = usual_of(reaches.root, is_kept);
+  leave_out_further(kStrayReaches * usual, reaches.all, is_kept, broken, [&](size_t strand) {
+    return make_error(ErrorCode::BadInput,
+                      "strand {} goes {:.4g} units from the middle of the roots, half of all at most {:.4g}",
+                      strand, reaches.all[strand], usual);
+  });
+  const float furthest_root = kStrayRoots * std::max(usual_root, 0.5f * usual);
+  leave_out_further(furthest_root, reaches.root, is_kept, broken, [&](size_t strand) {
+    return make_error(ErrorCode::BadInput,
+                      "strand {} grows {:.4g} units from the middle of the roots, half of all at most {:.4g}",
+                      strand, reaches.root[strand], usual_root);
+  });
 }
 
 /// With what is said of coordinates of roots, which come last: roots are finite by then.
 StatedGroom with_usable_uv(StatedGroom stated) {
   if (std::string note = bridge_root_uv(stated.groom); !note.empty()) stated.notes.push_back(std::move(note));
   return stated;
+}
+
+/// Whether a strand ends or begins with a segment that leads to another.
+bool runs_on(std::span<const glm::vec3> strand) {
+  constexpr size_t kMinPoints = 5;  // fewer do not say how long a segment is
+  constexpr float kTimes = 3.0f;    // of the mean of the others
+  if (strand.size() < kMinPoints) return false;
+  float all = 0.0f;
+  for (size_t i = 1; i < strand.size(); ++i) all += glm::distance(strand[i - 1], strand[i]);
+  const float end =
+      std::max(glm::distance(strand[0], strand[1]), glm::distance(strand[strand.size() - 2], strand.back()));
+  return end * static_cast<float>(strand.size() - 2) > kTimes * (all - end);
+}
+
+/// How many strands run on to others, where they would not if all that follow one began so many points later
+/// or earlier as there are too many or too few.
+uint64_t strands_run_on(std::span<const glm::vec3> points, std::span<const uint32_t> counts,
+                        uint64_t needed) {
+  constexpr uint64_t kTimesBetter = 4;
+  if (counts.size() < kMinJudgedStrands) return 0;
+  const auto is_wrong = [&](uint64_t begin, uint32_t count) {
+    return begin <= points.size() && count <= points.size() - begin && runs_on(points.subspan(begin, count));
+  };
+  std::vector<int64_t> gain;  // by beginning elsewhere
+  int64_t wrong = 0, best = 0, after = 0;
+  uint64_t begin = 0;
+  for (const uint32_t count : counts) {
+    const bool is_wrong_here = is_wrong(begin, count);
+    wrong += is_wrong_here ? 1 : 0;
+    gain.push_back((is_wrong_here ? 1 : 0) - (is_wrong(begin + points.size() - needed, count) ? 1 : 0));
+    begin += count;
+  }
+  for (auto strand = gain.rbegin(); strand != gain.rend(); ++strand) best = std::max(best, after += *strand);
+  return static_cast<uint64_t>(wrong - best) * kTimesBetter <= static_cast<uint64_t>(wrong)
+             ? static_cast<uint64_t>(wrong)
+             : 0;
 }
 
 }  // namespace
@@ -119,6 +213,19 @@ Status fit_points(std::vector<glm::vec3>& points, uint64_t needed, const char* s
                                there < needed ? "since they are not there" : "and are left out", notes));
   points.resize(needed, glm::vec3(std::numeric_limits<float>::quiet_NaN()));
   return {};
+}
+
+Status fit_points(std::vector<glm::vec3>& points, std::span<const uint32_t> counts, const char* source,
+                  std::vector<std::string>& notes) {
+  const uint64_t there = points.size(), needed = std::accumulate(counts.begin(), counts.end(), uint64_t{0});
+  if (there == needed) return {};
+  const uint64_t wrong = strands_run_on(points, counts, needed);
+  if (wrong * kMostBadShare > counts.size())
+    return make_error(ErrorCode::BadInput,
+                      "{} need {} points, there are {}, and {} of {} strands lead on to the next: a count is "
+                      "wrong, export it anew",
+                      source, needed, there, wrong, counts.size());
+  return fit_points(points, needed, source, notes);
 }
 
 Error empty_strand(size_t strand) {
@@ -183,14 +290,11 @@ Result<StatedGroom> with_usable_strands(StatedGroom stated) {
   for (uint32_t strand = 0; strand < strand_count; ++strand) {
     const auto points =
         std::span(groom.rest_position_m).subspan(groom.offset[strand], groom.vertex_count(strand));
-    const auto bad = std::find_if_not(points.begin(), points.end(), is_finite);
-    const bool is_broken = bad != points.end();
-    if (is_broken)
-      broken.add(make_error(ErrorCode::BadInput, "strand {} vertex {} has the coordinates {}, {} and {}",
-                            strand, bad - points.begin(), bad->x, bad->y, bad->z));
-    const bool is_empty = !is_broken && (points.size() < kMinVertexCount || !(groom.length_m(strand) > 0.0f));
+    std::optional<Error> wrong = what_is_wrong(strand, points);
+    const bool is_empty = !wrong && (points.size() < kMinVertexCount || !(groom.length_m(strand) > 0.0f));
+    if (wrong || is_empty) is_kept[strand] = 0;
+    if (wrong) broken.add(std::move(*wrong));
     if (is_empty) empty.add(empty_strand(strand));
-    if (is_broken || is_empty) is_kept[strand] = 0;
   }
   find_strays(groom, is_kept, broken);
   RETURN_IF_ERROR(broken.settle(strand_count, "strands", "and are left out", stated.notes));

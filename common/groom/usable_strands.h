@@ -24,6 +24,10 @@ Result<StatedGroom> with_usable_strands(StatedGroom stated);
 /// who needs them. BadInput for more.
 Status fit_points(std::vector<glm::vec3>& points, uint64_t needed, const char* source,
                   std::vector<std::string>& notes);
+/// The same by the points of each strand. BadInput too where a count in the middle is wrong: strands behind
+/// it begin at a point of others.
+Status fit_points(std::vector<glm::vec3>& points, std::span<const uint32_t> counts, const char* source,
+                  std::vector<std::string>& notes);
 
 /// Says of a strand that it shows nothing, and what becomes of such: noted, refused where more than one and a
 /// tenth are so.

@@ -62,15 +62,11 @@ Result<CurveKind> kind_of(const UsdCurves& curves) {
 
 /// Checks counts, and makes points as many as they need.
 Status check_counts(UsdCurves& curves, std::vector<std::string>& notes) {
-  uint64_t total = 0;
-  for (size_t curve = 0; curve < curves.vertex_counts.size(); ++curve) {
-    const uint32_t count = curves.vertex_counts[curve];
-    if (count > kMaxSourceVertexCount)
+  for (size_t curve = 0; curve < curves.vertex_counts.size(); ++curve)
+    if (curves.vertex_counts[curve] > kMaxSourceVertexCount)
       return make_error(ErrorCode::LimitExceeded, "curve {} has {} vertices, at most {} are allowed", curve,
-                        count, kMaxSourceVertexCount);
-    total += count;
-  }
-  return fit_points(curves.points, total, "curveVertexCounts", notes);
+                        curves.vertex_counts[curve], kMaxSourceVertexCount);
+  return fit_points(curves.points, curves.vertex_counts, "curveVertexCounts", notes);
 }
 
 constexpr double kMostLabel = std::numeric_limits<int32_t>::max();  // of an id or a group
@@ -298,8 +294,10 @@ Result<Member> read_member(GroomSource& source, uint64_t offset) {
                       "{} in the package is not stored as it is: pack it anew as .usdz",
                       strandcast::quoted(member.name));
   if (!source.has(member.begin, member.size_bytes, 1))
-    return make_error(ErrorCode::BadInput, "{} in the package is cut off: it should have {} bytes",
-                      strandcast::quoted(member.name), member.size_bytes);
+    return make_error(
+        ErrorCode::BadInput,
+        "{} in the package is cut off: it should have {} bytes, copy it again or export it anew",
+        strandcast::quoted(member.name), member.size_bytes);
   return member;
 }
 

@@ -150,6 +150,7 @@ Status UsdcArchive::read_header() {
   uint64_t contents = 0;
   std::memcpy(&contents, header.data() + kUsdcContentsAt, sizeof(contents));
   if (contents == 0) return make_error(ErrorCode::BadInput, "its writer did not finish it: export it anew");
+  RETURN_IF_ERROR(source_->check_reaches(contents));
   Cursor cursor(*source_, contents, source_->size_bytes());
   ASSIGN_OR_RETURN(const auto count, cursor.number<uint64_t>());
   if (count > kMostSections)

@@ -356,6 +356,28 @@ void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) 
   add_limit_options(app, net.limits);
 }
 
+/// What a browser says of where a page comes from: anything else lets nobody in.
+Status check_origins(const std::vector<std::string>& origins) {
+  for (const std::string& origin : origins) {
+    const size_t scheme = origin.find("://");
+    const std::string host = scheme == std::string::npos ? "" : origin.substr(scheme + 3);
+    if (host.empty() || host.find_first_of("/?#@ ") != std::string::npos)
+      return make_error(
+          ErrorCode::BadInput,
+          "--allow-origin {} is no web origin: https://HOST or https://HOST:PORT is one, without "
+          "a path",
+          origin);
+  }
+  return {};
+}
+
+Status check_once(const char* option, std::vector<std::string> values) {
+  std::sort(values.begin(), values.end());
+  const auto twice = std::adjacent_find(values.begin(), values.end());
+  if (twice == values.end()) return {};
+  return make_error(ErrorCode::BadInput, "{} {} is given twice", option, *twice);
+}
+
 }  // namespace
 
 Result<ServerOptions> parse_options(int argc, const char* const* argv) {
@@ -375,6 +397,8 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
   } catch (const CLI::ParseError& error) {
     return make_error(ErrorCode::BadInput, "{} (--help lists the options)", command_line_error(error.what()));
   }
+  RETURN_IF_ERROR(check_origins(options.config.net.allowed_origins));
+  RETURN_IF_ERROR(check_once("--mocap", options.mocap.inputs));
   constexpr double kBytesPerMbit = 125e3;
   options.config.net.limits.viewer_bytes_per_s = raw.viewer_mbit * kBytesPerMbit;
   if (!raw.tls.certificate.empty()) options.config.net.tls = raw.tls;

@@ -243,7 +243,16 @@ void InputHub::forget(Stream<Value>& stream, uint64_t source_id) {
 void InputHub::remove_source(uint64_t source_id) {
   const std::lock_guard lock(mutex_);
   if (held_) return held_->leave(source_id);
-  has_left_ = has_left_ || motion_.owner == source_id;
+  forget(source_id);
+}
+
+void InputHub::forget(uint64_t source_id) {
+  const auto& samples = motion_.track.samples();
+  if (motion_.owner == source_id) {
+    has_left_ = true;
+    if (!samples.empty() && (motion_.is_cut || !shown_ns_ || samples.back().time_ns > *shown_ns_))
+      unseen_ = samples.back().value;
+  }
   forget(motion_, source_id);
   forget(wind_, source_id);
 }
@@ -252,7 +261,14 @@ void InputHub::remove_source(uint64_t source_id) {
 InputHub::SeenHead InputHub::see_head(int64_t server_time_ns) {
   const auto& samples = motion_.track.samples();
   SeenHead seen{frame_.world_from_head};
-  if (samples.empty()) return seen;
+  const std::optional<HeadSample> unseen = std::exchange(unseen_, std::nullopt);
+  if (samples.empty()) {
+    if (unseen) {
+      seen.pose = unseen->pose;
+      frame_.joints = joints_of(*unseen);
+    }
+    return seen;
+  }
   const auto delay = motion_.owner ? delays_ns_.find(*motion_.owner) : delays_ns_.end();
   const int64_t delay_ns = delay != delays_ns_.end() ? delay->second : 0;
   const int64_t asked_ns = motion_.clock.to_source_ns(server_time_ns) - delay_ns;
@@ -377,11 +393,7 @@ void InputHub::take_held(int64_t time_ns) {
     if (due.motion) take(due.source_id, *due.motion, due.arrival_ns);
     if (due.wind) take(due.source_id, *due.wind, due.arrival_ns);
   }
-  for (const uint64_t source_id : held_->take_left()) {
-    has_left_ = has_left_ || motion_.owner == source_id;
-    forget(motion_, source_id);
-    forget(wind_, source_id);
-  }
+  for (const uint64_t source_id : held_->take_left()) forget(source_id);
 }
 
 InputFrame InputHub::sample(int64_t server_time_ns) {
@@ -389,7 +401,7 @@ InputFrame InputHub::sample(int64_t server_time_ns) {
   const int64_t now_ns = bounded(server_time_ns);
   if (held_) take_held(now_ns);
   // The first pose replaces none: strands must not be dragged there from the origin.
-  const bool is_first = !frame_.has_motion && !motion_.track.samples().empty();
+  const bool is_first = !frame_.has_motion && (unseen_ || !motion_.track.samples().empty());
   SeenHead seen = see_head(now_ns);
   const bool has_left = std::exchange(has_left_, false);
   seen.has_jumped = seen.has_jumped || is_first || has_left;

@@ -23,9 +23,9 @@
 // * A jump beyond kTeleportSpeedMps or kTeleportTurnRadPerS between samples or frames is carried out in one
 //   frame, flagged as a teleport and never interpolated.
 // * Three changes are teleports however short they are. One is the first pose of another source, or of one
-//   whose clock stepped. Another is the first frame without the source that drove the head. The third is the
-//   return of a source that was silent: the frame then advances by more
-//   than kCatchUpNs beyond the elapsed time, and by more than kCatchUpSpacings of the usual sample spacing.
+//   whose clock stepped. Another is the first frame without the source that drove the head: it shows the last
+//   pose that came. The third is the return of a source that was silent: the frame then advances by more than
+//   kCatchUpNs beyond the elapsed time, and by more than kCatchUpSpacings of the usual sample spacing.
 #pragma once
 
 #include <cstddef>
@@ -171,7 +171,7 @@ class InputHub {
   /// Initially 0; lasts until the next call.
   void set_delay(uint64_t source_id, int64_t delay_ns);
 
-  /// Removes a source. The head keeps its last pose (stale at once); the scene's own wind returns.
+  /// Removes a source. The head goes to its last pose (stale at once); the scene's own wind returns.
   void remove_source(uint64_t source_id);
 
   /// Returns the inputs at a server time, for one simulation step. `motion_time_ns` is the server clock at
@@ -210,6 +210,7 @@ class InputHub {
   bool take_allowance(Stream<Value>& stream, uint64_t source_id, int64_t arrival_ns);
   template <class Value>
   void forget(Stream<Value>& stream, uint64_t source_id);
+  void forget(uint64_t source_id);
   template <class Value>
   void restart(Stream<Value>& stream);
   template <class Value>
@@ -251,6 +252,7 @@ class InputHub {
   std::optional<Timecode> heard_timecode_;  // likewise
   double steady_delay_ns_ = 0.0;            // by which uneven samples are shown later
   bool has_left_ = false;                   // the source that drove the head, since the last frame
+  std::optional<HeadSample> unseen_;        // its last, where no frame has shown that
   double motion_speed_ = 1.0;               // as the owner said last
   TimecodeClock timecodes_;                 // that came without motion
   InputFrame frame_;                        // the last one given out

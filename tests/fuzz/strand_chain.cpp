@@ -96,6 +96,10 @@ std::shared_ptr<const StepModel> with_passes(const StepModel& model) {
   auto with = std::make_shared<StepModel>(model);
   with->bend = BendAngles{.most_root_rad = 0.8, .most_tip_rad = 0.8};
   with->drag_along_share = 0.5;
+  if (with->rod_strand.empty()) {
+    with->pinned_tail_count = 1;
+    for (uint32_t s = 0; s < with->strand_count; ++s) with->has_tail.push_back(s % 3 == 0 ? 1 : 0);
+  }
   with->meets_body = true;
   ToldField field{{glm::vec3(-0.12f), 0.08f, glm::uvec3(4)}, {}};
   for (int node = 0; node < 64; ++node)

@@ -335,7 +335,7 @@ TEST_F(Bake, AStopEndsTheServerAndLeavesTheOldFile) {
       << "the old one, and the new one under another name";
   EXPECT_EQ(entries("strandcast-"), 1u);
   bake.send_signal(SIGINT);
-  EXPECT_EQ(bake.wait(), 1) << said();
+  EXPECT_EQ(bake.wait(), 130) << said();
   // The folder goes once the server has ended.
   EXPECT_EQ(entries("strandcast-"), 0u);
   EXPECT_EQ(entries("out.abc"), 1u);

@@ -14,6 +14,7 @@
 #include "server/app/head_files.h"
 #include "server/record/replay.h"
 #include "tests/support/live_packets.h"
+#include "tests/support/made_abc.h"
 #include "tests/support/metrics_text.h"
 #include "tests/support/raw_client.h"
 #include "tests/support/server_fixture.h"
@@ -241,6 +242,42 @@ TEST_F(Heads, AFeedThatNamesNoneMovesAllOfThem) {
   EXPECT_TRUE(is_head_at("ben", kBensPlace)) << "who was not named";
   ASSERT_EQ(run_feed(target_of(""), options, stop), kDoneExit);
   EXPECT_TRUE(eventually([&] { return is_high("anna") && is_high("ben"); }));
+}
+
+// A groom in centimetres that another program has put on a head, which leans aside and goes on by 0.1 m.
+TEST_F(Heads, CurvesThatMoveAsOneMoveTheHeadUnderTheServersHair) {
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder.path() / "moving.abc";
+  const glm::dvec3 head_in_file(0.0, 150.0, 0.0);
+  const glm::dquat lean = glm::angleAxis(0.1, glm::dvec3(0, 0, 1));
+  test::MadeCurves moving;
+  moving.counts.assign(9, 2);
+  for (int sample = 0; sample < 2; ++sample) {
+    std::vector<glm::vec3>& points = moving.sample.emplace_back();
+    for (int i = 0; i < 18; ++i) {
+      const glm::dvec3 point(i / 2 % 3 * 5, 160 - i % 2 * 10, i / 6 * 4);
+      points.emplace_back(sample == 0 ? point : lean * point + glm::dvec3(10, 0, 0));
+    }
+  }
+  test::MadeAbc made(path);
+  made.finish({made.curves(moving)});
+  SceneDesc scene = two_heads();
+  FileGroomDesc file;
+  file.path = path;
+  file.unit_m = 0.01f;
+  file.has_up_axis = file.has_yaw = file.has_origin = true;
+  file.origin = glm::vec3(head_in_file);
+  scene.groom = file;
+  if (!begin(scene)) return;
+  const std::atomic<bool> stop = false;
+  FeedOptions options;
+  options.wind = "none";
+  options.motion = path.string();
+  EXPECT_EQ(run_feed(target_of("ben"), options, stop), kBadInputExit) << "this hair is of no file";
+  ASSERT_EQ(run_feed(target_of("anna"), options, stop), kDoneExit);
+  const glm::dvec3 moved_m = 0.01 * (lean * head_in_file - head_in_file) + glm::dvec3(0.1, 0.0, 0.0);
+  EXPECT_TRUE(eventually([&] { return is_head_at("anna", kAnnasPlace + moved_m); }));
+  EXPECT_LT(angle_between_rad(published("anna").head.rotation, lean), 1e-4);
 }
 
 TEST_F(Heads, OnePortTellsOfSeveralSubjectsAndEachHeadFollowsItsOwn) {

@@ -5,6 +5,7 @@
 #include "client/app/bake_command.h"
 #include "client/app/baked_states.h"
 #include "common/math/turn.h"
+#include "tests/support/temporary_folder.h"
 
 namespace strandcast::bake_test {
 namespace {
@@ -74,6 +75,26 @@ TEST(BakeServer, GetsTheHairAndWhatThePersonSaysLast) {
   scene.scene = "s.textproto";
   EXPECT_THAT(server_words(scene),
               AllOf(Contains("s.textproto"), Not(Contains("--groom")), Not(Contains("quality=full"))));
+}
+
+// A forgotten name costs nobody a file. The counter-example is a name that nothing has.
+TEST(BakePaths, WhatIsReadAndWhatIsThereIsNotWrittenOver) {
+  const TemporaryFolder folder;
+  const std::string hair = folder.write("hair.ply", "hair").string(), same = hair.substr(0, hair.size() - 8);
+  const auto said = [](std::vector<std::string> paths, const std::string& motion = "none") {
+    BakeCommand command;
+    command.exported.paths = std::move(paths);
+    command.feed.motion = motion;
+    command.feed.wind = "none";
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(run_bake(command, false), kBadInputExit);
+    return testing::internal::GetCapturedStderr();
+  };
+  EXPECT_THAT(said({hair}), testing::HasSubstr("hair.ply is there already"));
+  EXPECT_THAT(said({hair, same + "./hair.ply"}), testing::HasSubstr("hair.ply is read here"));
+  EXPECT_THAT(said({"new.ply", hair}, hair), testing::HasSubstr("hair.ply is read here"));
+  EXPECT_THAT(said({"walk.bvh", "out.abc"}), testing::HasSubstr("--motion walk.bvh"));
+  EXPECT_THAT(said({(folder.path() / "new.abc").string()}), testing::HasSubstr("this motion has no end"));
 }
 
 }  // namespace

@@ -297,6 +297,13 @@ TEST(CtlOptionTable, ACommandThatOnlySendsAMessageSaysAllOfIt) {
   }
 }
 
+TEST(CtlCommandLine, WhatIsStoppedBeforeItIsDoneEndsAsShellsExpect) {
+  const CtlChoice choice = parse({"bundle", "hair.txt"});
+  ASSERT_NE(choice.command, nullptr);
+  EXPECT_EQ(carry_out(*choice.command, choice.line, false), kBadInputExit);
+  EXPECT_EQ(carry_out(*choice.command, choice.line, true), 130);
+}
+
 /// Wind of 1 m/s, then of 3 m/s for the rest of a second.
 class FedWind : public testing::Test {
  protected:

@@ -10,6 +10,7 @@
 #include "common/groom/abc_loader.h"
 #include "common/groom/abc_tree.h"
 #include "tests/fuzz/groom_checks.h"
+#include "tests/support/bounded_work.h"
 #include "tests/support/groom_files.h"
 #include "tests/support/json_value.h"
 #include "tests/support/largest_allocation.h"
@@ -314,6 +315,7 @@ TEST(AbcSamples, DamagedOnesEndInASentenceOrASoundGroom) {
   for (const std::filesystem::path& path : files) {
     const std::string name = path.filename().string();
     SCOPED_TRACE(name);
+    ASSERT_EQ(test::beyond_bounds([&] { (void)load_abc(path); }), "");
     test::reset_largest_allocation();
     const auto groom = load_abc(path);
     EXPECT_LE(test::largest_allocation_bytes(), kMostBytes);

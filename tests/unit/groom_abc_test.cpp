@@ -406,6 +406,11 @@ TEST_F(AbcTest, AFileThatIsNotFinishedIsRecognised) {
   EXPECT_THAT(refusal(load_abc(part)), HasSubstr("did not finish"));
   (void)file_.finish({curves});
   EXPECT_EQ(refusal(load_abc(path())), "accepted");
+  const auto whole = load_file(path(), 1 << 22);
+  ASSERT_TRUE(whole);
+  for (const size_t size : {whole->size() - 60, whole->size() / 2, size_t{20}})
+    EXPECT_THAT(refusal(read_abc(std::span(*whole).first(size))),
+                AllOf(HasSubstr(fmt::format("cut off at byte {}", size)), HasSubstr("copy it again")));
   EXPECT_THAT(refusal(load_abc(folder_.path() / "none.abc")), HasSubstr("no such file"));
   EXPECT_THAT(refusal(load_abc(folder_.path())), HasSubstr("not a regular file"));
 }

@@ -1,6 +1,7 @@
 // Broken groom files: whatever is wrong, the loader says so in one sentence that names the file and the
 // value, and no allocation is larger than what the file's real size explains.
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -12,6 +13,7 @@
 #include "common/groom/hair_loader.h"
 #include "common/groom/tfx_loader.h"
 #include "common/groom/usable_strands.h"
+#include "tests/support/bounded_work.h"
 #include "tests/support/groom_files.h"
 #include "tests/support/largest_allocation.h"
 #include "tests/support/temporary_folder.h"
@@ -290,6 +292,37 @@ TEST(BrokenTfx, RandomHeadersNeverGiveAGroomLargerThanTheFile) {
   }
 }
 
+// The counter-example: work that never ends, and work that takes all memory, are seen to.
+TEST(BrokenTfx, NoRealFileThatIsBrokenCostsMuch) {
+  constexpr test::WorkBounds kLittle{64 << 20, 1};
+  const auto run_away = [] {
+    for (std::atomic<uint64_t> count = 0;;) ++count;
+  };
+  EXPECT_THAT(test::beyond_bounds(run_away, kLittle), HasSubstr("1 s of processor time"));
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  const auto take_all = [] { EXPECT_EQ(std::vector<char>(1 << 30, 'x').back(), 'x'); };
+  EXPECT_THAT(test::beyond_bounds(take_all, kLittle), HasSubstr("67108864 bytes"));
+#endif
+  REQUIRE_SHARED_DATA();
+  const TemporaryFolder folder;
+  uint32_t random = 1;
+  for (const char* name : {"Ratboy_mohawk.tfx", "TestHair1.tfx", "ponytail_side.tfx"}) {
+    const ByteFile whole = read_real(name);
+    for (int trial = 0; trial < 8; ++trial) {
+      ByteFile broken = whole;
+      for (int i = 0; i < 8; ++i) {
+        random = mix_u32(random + 1);
+        const bool is_in_header = i < 2;
+        const size_t at = random % (is_in_header ? 296 : broken.bytes.size() - 4) / 4 * 4;
+        broken.patch(at, mix_u32(random));
+      }
+      GroomFileOptions options;
+      options.path = folder.write(name, broken.text());
+      EXPECT_EQ(test::beyond_bounds([&] { (void)load_placed_groom(options); }), "") << name << trial;
+    }
+  }
+}
+
 TEST(GroomFile, NamesTheKnownExtensionsAndWrongOptions) {
   const TemporaryFolder folder;
   const ByteFile file = small_v4();
@@ -490,6 +523,68 @@ TEST(BrokenStrands, OfAFileThatIsCutOffWhatIsWholeComesIn) {
     }
     EXPECT_GT(accepted, 50u) << name;
   }
+}
+
+// A count in the middle that is wrong makes criss-cross of all that follows. The counter-example is cut off.
+TEST(BrokenStrands, ACountThatIsWrongIsNoPointThatIsLeftOver) {
+  constexpr uint32_t kPoints = 8;
+  std::vector<glm::vec3> points;
+  for (uint32_t i = 0; i < 40 * kPoints; ++i)
+    points.emplace_back(i / kPoints % 8, 0.25f * static_cast<float>(i % kPoints), i / kPoints / 8);
+  std::vector<uint32_t> counts(40, kPoints);
+  std::vector<std::string> notes;
+  std::vector<glm::vec3> cut(points.begin(), points.end() - 2), fit = points;
+  EXPECT_TRUE(fit_points(cut, counts, "counts", notes));
+  for (const uint32_t wrong : {kPoints - 1, kPoints + 1}) {
+    counts[15] = wrong;
+    const Status status = fit_points(fit, counts, "counts", notes);
+    ASSERT_FALSE(status) << wrong;
+    EXPECT_THAT(status.error().to_string(), HasSubstr("of 40 strands lead on to the next: a count is wrong"));
+  }
+  EXPECT_EQ(fit, points);
+}
+
+// The counter-example is hair that begins at the origin.
+TEST(BrokenStrands, APointThatWasLeftAtTheOriginCostsItsStrand) {
+  StatedGroom stated;
+  stated.groom.offset = {0};
+  for (uint32_t strand = 0; strand < 40; ++strand) {
+    for (uint32_t i = 0; i < 8; ++i)
+      stated.groom.rest_position_m.emplace_back(0.01f * static_cast<float>(strand),
+                                                1.5f - 0.02f * static_cast<float>(i), 0.0f);
+    stated.groom.offset.push_back(8 * strand + 8);
+  }
+  stated.groom.pinned.assign(320, 0);
+  StatedGroom at_origin = stated;
+  for (glm::vec3& point : at_origin.groom.rest_position_m) point.y -= 1.5f;
+  EXPECT_EQ(with_usable_strands(at_origin)->groom.strand_count(), 40u);
+  stated.groom.rest_position_m[8 * 5 + 3] = glm::vec3(0.0f);
+  std::fill_n(stated.groom.rest_position_m.begin() + 8 * 9 + 4, 4, glm::vec3(0.0f));
+  const auto usable = with_usable_strands(stated);
+  ASSERT_TRUE(usable) << usable.error().to_string();
+  EXPECT_EQ(usable->groom.strand_count(), 38u);
+  EXPECT_THAT(usable->notes, Contains(HasSubstr("strand 5 vertex 3 is at 0, 0, 0, far from its strand")));
+}
+
+// As one that a program left where it was made. The counter-example is half of the hair elsewhere.
+TEST(BrokenStrands, AStrandThatGrowsApartIsNoHairOfThisHead) {
+  const auto usable = [](uint32_t apart_count) {
+    StatedGroom stated;
+    stated.groom.offset = {0};
+    for (uint32_t strand = 0; strand < 40; ++strand) {
+      const float height_m = strand < apart_count ? 0.1f : 1.5f;
+      for (uint32_t i = 0; i < 8; ++i)
+        stated.groom.rest_position_m.emplace_back(0.01f * static_cast<float>(strand),
+                                                  height_m - 0.02f * static_cast<float>(i), 0.0f);
+      stated.groom.offset.push_back(8 * strand + 8);
+    }
+    stated.groom.pinned.assign(320, 0);
+    return with_usable_strands(std::move(stated));
+  };
+  EXPECT_EQ(usable(0)->groom.strand_count(), 40u);
+  EXPECT_EQ(usable(1)->groom.strand_count(), 39u);
+  EXPECT_THAT(usable(1)->notes, Contains(HasSubstr("strand 0 grows 1.41")));
+  EXPECT_EQ(usable(20)->groom.strand_count(), 40u);
 }
 
 TEST(BrokenStrands, APointFarFromAllHairCostsItsStrandAlone) {

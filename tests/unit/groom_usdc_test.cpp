@@ -464,9 +464,13 @@ TEST(Usdc, APackageIsItsFirstLayerInEitherForm) {
     EXPECT_TRUE(groom) << name << groom.error().to_string();
   }
   GroomFileOptions options;
+  const std::string whole = package({{"x.usdc", binary}});
+  options.path = folder.write("g.usdz", whole.substr(0, whole.size() - 100));
+  EXPECT_THAT(load_groom(options).error().to_string(),
+              AllOf(HasSubstr("x.usdc"), HasSubstr("copy it again")));
   options.path = folder.write("f.usdc", binary.substr(0, 300));
   EXPECT_THAT(load_groom(options).error().to_string(),
-              AllOf(HasSubstr("f.usdc"), HasSubstr("cut off or damaged")));
+              AllOf(HasSubstr("f.usdc"), HasSubstr("cut off at byte 300"), HasSubstr("copy it again")));
 }
 
 std::string with_number(std::string file, size_t at, uint64_t number) {

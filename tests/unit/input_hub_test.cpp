@@ -256,6 +256,28 @@ TEST(InputHub, AHeadWithoutItsSourceIsCutOnce) {
   EXPECT_FALSE(hub.sample(kStart + 66 * kMsInNs).has_teleported);
 }
 
+// The counter-example: a frame has shown the last pose, and the head rests where that frame had it.
+TEST(InputHub, WhatASourceSaidLastIsShownThoughItLeftBeforeTheNextFrame) {
+  for (const bool is_held : {false, true}) {
+    InputHub hub;
+    if (is_held) hub.hold_samples();
+    hub.push(1, motion(0, pose_at(0.0)), kStart);
+    hub.sample(kStart);
+    hub.push(1, motion(8 * kMsInNs, pose_at(0.01)), kStart + 8 * kMsInNs);
+    hub.push(1, motion(15 * kMsInNs, pose_at(0.02)), kStart + 15 * kMsInNs);
+    hub.remove_source(1);
+    const InputFrame left = hub.sample(kStart + 16 * kMsInNs);
+    EXPECT_EQ(left.world_from_head, pose_at(0.02));
+    EXPECT_TRUE(left.is_motion_stale);
+    EXPECT_EQ(hub.sample(kStart + 33 * kMsInNs).world_from_head, pose_at(0.02));
+  }
+  InputHub hub;
+  hub.push(1, motion(0, pose_at(0.5)), kStart);
+  hub.remove_source(1);
+  EXPECT_TRUE(hub.sample(kStart).has_motion) << "the only one that ever came";
+  EXPECT_EQ(hub.sample(kStart).world_from_head, pose_at(0.5));
+}
+
 /// What 60 frames a second show of a head at 1 m/s whose samples come so far apart, and in bursts of so many;
 /// for 300 ms in the middle none come.
 struct Shown {

@@ -223,6 +223,18 @@ TEST(ServerOptionTable, NumbersEndWhereTheyAreSaidTo) {
   test::expect_ranges(kRanges, [](const test::Arguments& arguments) { return parse(arguments).ok(); });
 }
 
+// Taken in silence, each would do nothing.
+TEST(ServerOptionTable, WhatLetsNobodyInAndWhatIsGivenTwiceIsTold) {
+  for (const char* origin : {"foo", "https://", "https://a.example/page", "https://a b", "://"})
+    EXPECT_FALSE(parse({"--allow-origin", origin})) << origin;
+  for (const char* origin : {"https://a.example", "http://[::1]:8080"})
+    EXPECT_TRUE(parse({"--allow-origin", origin})) << origin;
+  const auto twice = parse({"--mocap", "vmc", "--mocap", "freed", "--mocap", "vmc"});
+  ASSERT_FALSE(twice);
+  EXPECT_EQ(twice.error().message, "--mocap vmc is given twice");
+  EXPECT_TRUE(parse({"--mocap", "vmc:1", "--mocap", "vmc:2"}));
+}
+
 // A word of a fixed list that says what goes without it changes nothing: the other words do, as above.
 TEST(ServerOptionTable, WhatIsSaidAnywayChangesNothing) {
   for (const auto& said : {test::Arguments{"--log-format", "text"},
