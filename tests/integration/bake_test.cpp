@@ -310,21 +310,6 @@ TEST_F(Bake, WhatCannotBeDoneIsExitCodeTwoAndASentence) {
   EXPECT_FALSE(std::filesystem::exists(path("out.abc")));
 }
 
-TEST_F(Bake, WritesOverNoHair) {
-  const std::string before = *load_text(path("hair.usda"), 1 << 20);
-  const auto refusal = [&](std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), "bake");
-    EXPECT_EQ(test::ChildProcess(STRANDCAST_CTL_PROGRAM, arguments, path("said")).wait(), 2);
-    return said();
-  };
-  EXPECT_THAT(refusal({path("hair.usda"), "--motion", path("walk.bvh")}),
-              HasSubstr("is there already, and no file to write stands after it"));
-  EXPECT_THAT(refusal({path("hair.usda"), (folder_.path() / "." / "hair.usda").string()}),
-              HasSubstr("would be written over"));
-  EXPECT_THAT(refusal({path("walk.bvh"), path("hair.usda"), path("out.abc")}), HasSubstr("--motion"));
-  EXPECT_EQ(*load_text(path("hair.usda"), 1 << 20), before);
-}
-
 TEST_F(Bake, AStopEndsTheServerAndLeavesTheOldFile) {
   const std::string old = "of yesterday";
   ASSERT_TRUE(save_file(path("out.abc"), std::as_bytes(std::span(old))));

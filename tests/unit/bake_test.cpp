@@ -91,8 +91,8 @@ TEST(BakePaths, WhatIsReadAndWhatIsThereIsNotWrittenOver) {
     return testing::internal::GetCapturedStderr();
   };
   EXPECT_THAT(said({hair}), testing::HasSubstr("hair.ply is there already"));
-  EXPECT_THAT(said({hair, same + "./hair.ply"}), testing::HasSubstr("hair.ply is read here"));
-  EXPECT_THAT(said({"new.ply", hair}, hair), testing::HasSubstr("hair.ply is read here"));
+  EXPECT_THAT(said({hair, same + "./hair.ply"}), testing::HasSubstr("hair.ply is read, and would"));
+  EXPECT_THAT(said({"new.ply", hair}, hair), testing::HasSubstr("hair.ply is read, and would"));
   EXPECT_THAT(said({"walk.bvh", "out.abc"}), testing::HasSubstr("--motion walk.bvh"));
   EXPECT_THAT(said({(folder.path() / "new.abc").string()}), testing::HasSubstr("this motion has no end"));
 }
