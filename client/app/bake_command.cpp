@@ -42,6 +42,8 @@ Result<ExportOptions> bake_export(const BakeCommand& command, double motion_s) {
   if (!exported.space && is_of_curves(command.feed.motion)) exported.space = "world";
   ASSIGN_OR_RETURN(ExportOptions options, export_options(exported));
   options.is_whole = true;
+  // A clip's frames are numbered files of .ply.
+  if (!exported.at_s && motion_s > 0.0) options.is_one_frame = false;
   if (options.is_one_frame) options.to_s = options.from_s;
   if (!options.to_s && motion_s > 0.0) options.to_s = std::max(motion_s, options.from_s);
   if (!options.to_s)

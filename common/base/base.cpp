@@ -88,9 +88,13 @@ Result<std::vector<std::byte>> load_file(const std::filesystem::path& path, uint
   return bytes;
 }
 
+/// Without the mark that some editors begin a text with.
 Result<std::string> load_text(const std::filesystem::path& path, uint64_t limit_bytes) {
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   ASSIGN_OR_RETURN(const auto bytes, load_file(path, limit_bytes));
-  return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  return std::string(text);
 }
 
 Status save_file(const std::filesystem::path& path, std::span<const std::byte> bytes) {

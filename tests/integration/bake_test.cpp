@@ -287,6 +287,11 @@ TEST_F(Bake, FramesAreAtTheTimesOfTheClip) {
   EXPECT_GT(largest_lag_m, 100.0 * kBoundM) << "half a frame too late would show";
 }
 
+TEST_F(Bake, AClipIsNumberedFilesOfPly) {
+  ASSERT_EQ(run({"--motion", path("walk.bvh"), "--motion-unit", "1", path("out.ply")}), 0) << said();
+  EXPECT_GT(entries("out"), 15u) << said();
+}
+
 TEST_F(Bake, WhatWasLeftOutAndAssumedOfTheHairIsSaidFirst) {
   std::string text = *load_text(path("hair.usda"), 1 << 20);
   const std::string points = "point3f[] points = [(";

@@ -433,7 +433,8 @@ TEST(SceneFile, RelativePathsStartAtTheScenesFolder) {
   const auto folder = std::filesystem::temp_directory_path() / fmt::format("strandcast_scene_{}", getpid());
   std::filesystem::create_directories(folder);
   const auto path = folder / "s.textproto";
-  std::ofstream(path) << "groom { file { path: '../hair.tfx' more_paths: 'x.tfx' } } "
+  std::ofstream(path) << "\xEF\xBB\xBF"  // as some editors begin a text
+                         "groom { file { path: '../hair.tfx' more_paths: 'x.tfx' } } "
                          "head { mesh_path: '/abs/head.obj' more_mesh_paths: 'eyes.obj' }";
   const auto scene = load_scene(path, {});
   ASSERT_TRUE(scene) << scene.error().to_string();
