@@ -393,7 +393,7 @@ int run_feed(const CtlTarget& target, const FeedOptions& options, const std::ato
     std::cout << slow << '\n';
   std::cout << fmt::format(
       "fed {:.1f} s: {} motion and {} wind samples, at most {:.1f} ms late, {} skipped, {} unsent, {} "
-      "rejected of all sources\n",
+      "rejected of all sources since the server began\n",
       done->elapsed_s, done->motion_samples, done->wind_samples, done->worst_lateness_ms,
       done->skipped_samples, done->unsent_samples, done->rejected_samples);
   if (done->reconnects > 0)

@@ -272,6 +272,9 @@ std::vector<std::string> settle_pins(Groom& groom) {
     tied += tip > 0 ? 1 : 0;
   }
   std::vector<std::string> said;
+  if (held.root + held.tip >= count)
+    said.push_back(
+        "the file holds every vertex: nothing of this hair moves (groom.file.pinning=ROOT lets go of it)");
   if (changed > 0)
     said.push_back(
         fmt::format("{} of {} strands hold other vertices than most: {} at the root and {} at held "
@@ -347,8 +350,8 @@ void turn_up(StatedGroom& stated, const GroomFileOptions& options, PlacedGroom& 
     const Guess<UpSide> guess = guess_up(stated.groom);
     upright.is_z_up = guess.value.is_z_up;
     upright.is_upside_down = guess.value.is_upside_down;
-    if (!guess.reason.empty())
-      note_guess(placed, fmt::format("{} of the file is up", name_of(guess.value)), guess.reason, "up_axis");
+    note_guess(placed, fmt::format("{} of the file is up", name_of(guess.value)),
+               guess.reason.empty() ? "the hair speaks for no other side" : guess.reason, "up_axis");
   }
   if (!options.is_z_up) {
     const UpSide side{upright.is_z_up, upright.is_upside_down};
@@ -438,7 +441,10 @@ Result<PlacedGroom> load_placed_groom(const GroomFileOptions& options) {
   ASSIGN_OR_RETURN(StatedGroom loaded, load_parts(options));
   PlacedGroom placed = place(std::move(loaded), options);
   // Before resampling, so that overflown coordinates never enter its sums.
-  if (const Status checked = validate(placed.groom); !checked) return at(place_name, checked.error());
+  if (const Status checked = validate(placed.groom); !checked)
+    return at(place_name, placed.unlikely.empty() ? checked.error()
+                                                  : make_error(ErrorCode::BadInput, "{}; {}",
+                                                               checked.error().message, placed.unlikely));
   const uint32_t vertex_count = target_vertex_count(placed.groom, options.vertex_count);
   if (placed.groom.uniform_vertex_count() != vertex_count) {
     placed.labels.width = resample(placed.groom, placed.labels.width, vertex_count);

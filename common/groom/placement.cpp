@@ -157,8 +157,9 @@ Uprightness uprightness(const Groom& groom) {
   return result;
 }
 
+/// Hair that stands speaks against no side: it may be combed up.
 double score_of(const Uprightness& up) {
-  return up.top + up.fall;
+  return up.top + std::max(up.fall, 0.0);
 }
 
 Groom upright_by(Groom groom, const UpSide& side) {

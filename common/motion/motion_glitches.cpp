@@ -62,7 +62,11 @@ FirstFrames find_first_frames(const MotionClip& clip) {
   const auto frames_in = [&](double time_s) {
     return static_cast<size_t>(std::lround(time_s / clip.frame_s));
   };
-  const size_t judged = std::max<size_t>(frames_in(kFirstFramesS), 1);
+  // A calibration pose may be held for long: frames that are the first one again.
+  const auto moves =
+      std::find_if(poses.begin(), poses.end(), [&](const Pose& pose) { return pose != poses[0]; });
+  const auto held = static_cast<size_t>(moves - poses.begin());
+  const size_t judged = std::max({frames_in(kFirstFramesS), held, size_t{1}});
   const size_t after = std::max(frames_in(kFirstFramesAfterS), kFewestAfter);
   FirstFrames first;
   if (poses.size() <= judged + after) return first;

@@ -43,8 +43,8 @@ struct FirstFrames {
   double jump_deg = 0.0;  // the widest
 };
 
-/// Finds wrong first frames by comparing their steps with those of later frames; none if the clip is too
-/// short for that.
+/// Finds wrong first frames, however long the first is held, by comparing their steps with those of later
+/// frames; none if the clip is too short for that.
 FirstFrames find_first_frames(const MotionClip& clip);
 
 /// Removes `count` frames from the beginning of a longer clip; time then begins with the next frame.

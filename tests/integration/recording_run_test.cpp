@@ -6,6 +6,7 @@
 #include "common/record/recording_check.h"
 #include "common/record/recording_reader.h"
 #include "server/record/replay.h"
+#include "server/scene/scene_content.h"
 #include "server/source/scene_change.h"
 #include "tests/support/server_fixture.h"
 #include "tests/support/stepped_hair.h"
@@ -153,6 +154,48 @@ TEST_F(RecordedRun, HasExactFramesInLockstepWhereItAsksForThem) {
     const ReplayResult result = replay(recorded.record->path);
     EXPECT_TRUE(result.is_equal()) << to_sentence(result);
   }
+}
+
+/// Tied tips and free ones beside each other, with volume and body: each kind runs on its own.
+TEST_F(RecordedRun, TipsOfBothKindsAreSimulatedAgain) {
+  constexpr int kStrands = 20, kVertices = 8;
+  FileGroomDesc hair;
+  for (const int is_tied : {0, 1}) {
+    std::string text = fmt::format(
+        "version 2.0\nscale 1.0\nbothEndsImmovable {}\nmaxNumVerticesInStrand 16\nnumStrands {}\nis sorted "
+        "1\n",
+        is_tied, kStrands);
+    for (int strand = 0; strand < kStrands; ++strand) {
+      text += fmt::format("strand {} numVerts {} texcoord 0 0\n", strand, kVertices);
+      for (int i = 0; i < kVertices; ++i)
+        text += fmt::format("{} {} {}\n", 0.005 * strand - 0.05, 0.12 - 0.01 * i, 0.01 * is_tied - 0.11);
+    }
+    const std::filesystem::path path = folder_.write(is_tied != 0 ? "tied.tfx" : "free.tfx", text);
+    if (is_tied == 0) hair.path = path;
+    if (is_tied != 0) hair.more_paths = {path};
+  }
+  hair.unit_m = 1.0f;
+  hair.has_up_axis = hair.has_yaw = hair.has_origin = true;
+  ServerConfig both = config();
+  both.scene.groom = hair;
+  for (const char* const assignment : {"quality=full", "body.preset=upper_body"}) {
+    const auto scene = change_scene(both.scene, assignment);
+    ASSERT_TRUE(scene) << scene.error().to_string();
+    both.scene = *scene;
+  }
+  const auto content = load_scene_content(both.scene);
+  ASSERT_TRUE(content) << content.error().to_string();
+  uint32_t tied = 0;
+  for (uint32_t strand = 0; strand < content->groom.strand_count(); ++strand)
+    tied += content->groom.pinned[content->groom.offset[strand + 1] - 1];
+  ASSERT_EQ(tied, static_cast<uint32_t>(kStrands));
+  ASSERT_TRUE(start(both));
+  run_steps(40);
+  server_->stop();
+  server_.reset();
+  const ReplayResult result = replay(path_);
+  EXPECT_TRUE(result.is_equal()) << to_sentence(result);
+  EXPECT_GT(result.compared, 40u);
 }
 
 /// Strands go on from those of viewers where a keyframe tells them: frames are exact, and the run can be

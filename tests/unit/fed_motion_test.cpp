@@ -297,6 +297,9 @@ TEST(FirstFrames, AreNoneOfAMotionThatIsItself) {
   EXPECT_EQ(find_first_frames(clip).count, 1u);
   clip.world_from_head[3].position_m.x = -0.1;
   EXPECT_EQ(find_first_frames(clip).count, 4u) << "up to the last jump";
+  MotionClip held = clip;
+  held.world_from_head.insert(held.world_from_head.begin(), 60, clip.world_from_head.front());
+  EXPECT_EQ(find_first_frames(held).count, 61u) << "held for 0.6 s";
   clip.world_from_head.resize(20);
   EXPECT_EQ(find_first_frames(clip).count, 0u) << "too short to judge";
 }

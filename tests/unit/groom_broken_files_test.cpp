@@ -27,6 +27,7 @@ using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr size_t kSmallAllocations = 64 << 10;  // messages, streams, paths
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -290,6 +291,22 @@ TEST(BrokenTfx, RandomHeadersNeverGiveAGroomLargerThanTheFile) {
     ASSERT_LE(test::largest_allocation_bytes(), file.bytes.size() + kSmallAllocations);
     ASSERT_LE(groom ? groom->groom.rest_position_m.size() * 12 : 0, file.bytes.size());
   }
+}
+
+TEST(BrokenTfx, AFileThatHoldsAllItsHairIsTold) {
+  const TemporaryFolder folder;
+  ByteFile file = small_v4();
+  GroomFileOptions options;
+  options.unit_m = 0.01f;
+  const auto notes = [&] {
+    options.path = folder.write("a.tfx", file.text());
+    return load_placed_groom(options)->notes;
+  };
+  EXPECT_THAT(notes(), Not(Contains(HasSubstr("holds every vertex"))));
+  for (size_t vertex = 0; vertex < 8; ++vertex) file.patch(160 + 16 * vertex + 12, 0.0f);
+  EXPECT_THAT(notes(), Contains(HasSubstr("holds every vertex")));
+  options.unit_m = 1000.0f;
+  EXPECT_THAT(load_placed_groom(options).error().to_string(), HasSubstr("groom.file.unit_m="));
 }
 
 // The counter-example: work that never ends, and work that takes all memory, are seen to.

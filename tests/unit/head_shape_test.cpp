@@ -314,6 +314,22 @@ TEST(Placement, EverySideThatIsUpIsFoundAndTurnedUp) {
   }
 }
 
+/// Combed up, it would hang from the back of the head or an ear if that were up. As loaded it is.
+TEST(Placement, HairThatStandsTurnsNoHead) {
+  Groom punk = full_head();
+  for (uint32_t strand = 0; strand < punk.strand_count(); ++strand)
+    for (uint32_t i = punk.offset[strand]; i < punk.offset[strand + 1]; ++i)
+      punk.rest_position_m[i] = punk.rest_position_m[punk.offset[strand]] +
+                                glm::vec3(0.0f, 0.015f * static_cast<float>(i - punk.offset[strand]), 0.0f);
+  for (const float yaw_deg : {0.0f, 90.0f}) {
+    GroomPlacement turn;
+    turn.yaw_deg = yaw_deg;
+    const Groom turned = moved(punk, [&](const glm::vec3& p) { return turn.place(p); });
+    EXPECT_STREQ(name_of(guess_up(turned).value), "+Y") << yaw_deg;
+    EXPECT_EQ(lies_aside(turned, {}), nullptr) << yaw_deg;
+  }
+}
+
 // Hair alike on both sides says where its face is, however few guides. The counter-example has no left side.
 TEST(Placement, AFaceBetweenTwoQuarterTurnsIsFound) {
   const auto off_deg = [](const Groom& groom, float yaw_deg) {

@@ -241,10 +241,12 @@ TEST(SceneContent, WhatWasGuessedIsSaid) {
   scene.head.radius_m = 0.0f;
   const auto guessed = load_scene_content(scene);
   ASSERT_TRUE(guessed) << guessed.error().to_string();
-  ASSERT_GE(guessed->notes.size(), 2u);
+  ASSERT_GE(guessed->notes.size(), 3u);
   EXPECT_EQ(guessed->notes[0],
+            "+Y of the file is up: the hair speaks for no other side (groom.file.up_axis states it)");
+  EXPECT_EQ(guessed->notes[1],
             "turned by 180 degrees to face +Z: the hairline is highest at -Z (groom.file.yaw_deg states it)");
-  EXPECT_EQ(guessed->notes[1].find("1 unit = 3.3"), 0u) << guessed->notes[1];
+  EXPECT_EQ(guessed->notes[2].find("1 unit = 3.3"), 0u) << guessed->notes[2];
   // Stated, it is done and not said.
   file.yaw_deg = 180.0f;
   file.has_yaw = true;
@@ -253,7 +255,7 @@ TEST(SceneContent, WhatWasGuessedIsSaid) {
   scene.groom = file;
   const auto stated = load_scene_content(scene);
   ASSERT_TRUE(stated);
-  EXPECT_EQ(stated->notes.size(), guessed->notes.size() - 2);
+  EXPECT_EQ(stated->notes.size(), guessed->notes.size() - 3);
   EXPECT_EQ(stated->groom.rest_position_m, guessed->groom.rest_position_m);
 }
 
