@@ -123,6 +123,12 @@ Result<MotionClip> clip_of_file(const FeedOptions& options, glm::dquat& turn) {
     file.fps = fps.hz();
   }
   ASSIGN_OR_RETURN(MotionFile loaded, load_motion_file(options.motion, file));
+  constexpr double kSameRate = 1e-3;
+  const double own_hz = 1.0 / loaded.clip.frame_s;
+  if (file.fps > 0.0 && options.timecode.empty() && options.ltc.empty() &&
+      std::abs(own_hz / file.fps - 1.0) > kSameRate)
+    std::cerr << fmt::format("{}: it has {} frames per second, and --fps {} is left out\n", options.motion,
+                             frame_rate_text(own_hz), options.fps);
   for (const std::string& note : loaded.notes) std::cerr << note << '\n';
   if (!options.is_keeping_facing) turn = turned_ahead(loaded.clip);
   if (turn.w < 1.0)
@@ -330,6 +336,10 @@ Result<HairOrigin> hair_of(const CtlTarget& target) {
   return load_place(*files);
 }
 
+std::string timecode_line(const FeedOptions& options) {
+  return options.timecode.empty() ? "" : fmt::format("timecode from {} on\n", options.timecode);
+}
+
 /// As a program of motion capture would.
 int run_mocap_feed(const FeedOptions& options, const FeedPlan& plan, const std::atomic<bool>& stop) {
   const auto encoding = find_mocap_encoding(options.as);
@@ -345,7 +355,8 @@ int run_mocap_feed(const FeedOptions& options, const FeedPlan& plan, const std::
   auto sender = DatagramSender::open(*to);
   if (!sender) return ctl_failure(sender.error());
   std::cerr << fmt::format("sending {} to {}: motion {}, {} packets per second\n", encoding->name,
-                           to->to_string(), options.motion, options.rate_hz);
+                           to->to_string(), options.motion, options.rate_hz)
+            << timecode_line(options);
   uint32_t number = 0;
   const auto send = [&](MocapMoment moment) {
     moment.number = number++;
@@ -385,7 +396,7 @@ int run_feed(const CtlTarget& target, const FeedOptions& options, const std::ato
   std::cerr << fmt::format("feeding {}{}: motion {}, wind {}, {} samples per second\n", target.connect,
                            heads->size() > 1 ? fmt::format(" ({})", fmt::join(names, ", ")) : "",
                            options.motion, options.wind, options.rate_hz)
-            << (options.timecode.empty() ? "" : fmt::format("timecode from {} on\n", options.timecode));
+            << timecode_line(options);
   const auto done = feed(*heads, *plan, stop, progress_listener());
   if (isatty(STDERR_FILENO) != 0) std::cerr << '\n';
   if (!done) return ctl_failure(done.error(), kRefusedExit);

@@ -30,9 +30,14 @@ constexpr uint32_t kMaxWavRateHz = 768'000;
 constexpr size_t kChunkSamples = 1024;
 constexpr size_t kMaxLtcFrames = 24 * 3600 * 60;
 constexpr int64_t kLiveStaleNs = 1'000'000'000;
-constexpr FrameRate kMostFrames{30, 1};    // of linear timecode: all numbers are read so
-constexpr double kOtherRate = 0.1;         // a tape runs at another speed by less
-constexpr uint32_t kMeasuredPairs = 10;    // of sound as it comes
+constexpr FrameRate kMostFrames{30, 1};  // of linear timecode: all numbers are read so
+constexpr double kOtherRate = 0.1;       // a tape runs at another speed by less
+constexpr uint32_t kMeasuredPairs = 40;  // of sound as it comes, where no second ended meanwhile
+constexpr uint32_t kSettledPairs = 10;   // after which it is known how late sound comes
+constexpr double kSpeeds[] = {1.0, 2.0, 0.5};
+constexpr double kClockError = 5e-4;       // of who made sound, at most
+constexpr double kClockDrift = 1e-3;       // of who plays sound, at most
+constexpr double kHeldUpS = 0.5;           // of sound that comes: it was held up
 constexpr int64_t kSilentNs = 5 * kSInNs;  // without timecode, until that is said
 
 template <class T>
@@ -66,8 +71,10 @@ std::optional<Timecode> timecode_of_word(const std::array<bool, kWordBits>& bits
 
 }  // namespace
 
-LtcDecoder::LtcDecoder(double sample_rate_hz, const FrameRate& fps)
-    : sample_rate_hz_(sample_rate_hz), fps_(fps), bit_samples_(sample_rate_hz / fps.hz() / kWordBits) {}
+LtcDecoder::LtcDecoder(double sample_rate_hz, const FrameRate& fps, double speed)
+    : sample_rate_hz_(sample_rate_hz),
+      fps_(fps),
+      bit_samples_(sample_rate_hz / fps.hz() / speed / kWordBits) {}
 
 std::optional<LtcFrame> LtcDecoder::add(std::span<const float> samples) {
   newest_.reset();
@@ -121,18 +128,32 @@ void LtcDecoder::note_bit(bool bit, double at) {
 void LtcRateMeter::add(const LtcFrame& frame) {
   const std::optional<LtcFrame> before = std::exchange(last_, frame);
   drops_ = drops_ || frame.has_drop_flag;
-  // Not where seconds begin: there the number depends on the rate.
-  if (!before || std::abs(frames_between(before->timecode, frame.timecode)) != 1.0) return;
-  sum_s_ += frame.end_s - before->end_s;
+  if (!before) return;
+  const double passed_s = frame.end_s - before->end_s;
+  // Where a second begins the numbers tell how many one has.
+  TimecodeFields end = fields_of(before->timecode), begin = fields_of(frame.timecode);
+  if (frame.is_backwards) std::swap(end, begin);
+  const bool are_neighbours = pair_count_ > 0 && passed_s < 1.5 * sum_s_ / pair_count_;
+  const bool is_next_second = begin.frames == 0 && begin.seconds == (end.seconds + 1) % 60;
+  const uint32_t count = end.frames + 1;
+  if (are_neighbours && is_next_second && (count == 24 || count == 25 || count == 30)) counted_ = count;
+  if (std::abs(frames_between(before->timecode, frame.timecode)) != 1.0) return;
+  sum_s_ += passed_s;
   ++pair_count_;
 }
 
-FrameRate LtcRateMeter::nearest() const {
+FrameRate LtcRateMeter::rate() const {
   constexpr FrameRate kRates[] = {{24000, 1001}, {24, 1}, {25, 1}, {30000, 1001}, {30, 1}};
   if (drops_) return kRates[3];
-  return *std::min_element(std::begin(kRates), std::end(kRates), [this](const auto& a, const auto& b) {
-    return std::abs(a.hz() - hz()) < std::abs(b.hz() - hz());
-  });
+  const auto distance = [this](const FrameRate& rate) {
+    // A tape at another speed is none of television.
+    const bool is_at_speed = pair_count_ > 0 && std::abs(hz() / rate.hz() - 1.0) < kClockError;
+    const bool is_counted_so =
+        counted_ == 0 || (std::lround(rate.hz()) == counted_ && (rate.denominator == 1 || is_at_speed));
+    return (is_counted_so ? 0.0 : kMostFrames.hz()) + (pair_count_ > 0 ? std::abs(rate.hz() - hz()) : 0.0);
+  };
+  return *std::min_element(std::begin(kRates), std::end(kRates),
+                           [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
 }
 
 Result<WavReader> WavReader::open(std::istream& in) {
@@ -207,10 +228,11 @@ namespace {
 
 std::string other_rate_text(const LtcRateMeter& meter, const FrameRate& fps) {
   return fmt::format("its timecode counts {} frames per second, and --fps says {}: leave --fps out",
-                     frame_rate_text(meter.nearest().hz()), frame_rate_text(fps.hz()));
+                     frame_rate_text(meter.rate().hz()), frame_rate_text(fps.hz()));
 }
 
 bool is_other_rate(const LtcRateMeter& meter, const FrameRate& fps) {
+  if (meter.is_counted()) return std::lround(meter.rate().hz()) != std::lround(fps.hz());
   return meter.pair_count() > 0 && std::abs(meter.hz() / fps.hz() - 1.0) > kOtherRate;
 }
 
@@ -221,34 +243,40 @@ std::string count_text(const Timecode& timecode) {
 
 using LtcFrames = std::vector<LtcFrame>;
 
-Result<LtcFrames> frames_of_file(const std::string& path, const FrameRate& fps) {
+Result<LtcFrames> frames_of_file(const std::string& path, const FrameRate& fps, double speed) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return at(path, make_error(ErrorCode::NotFound, "cannot be read"));
   auto reader = WavReader::open(file);
   if (!reader) return at(path, reader.error());
-  LtcDecoder decoder(reader->sample_rate_hz(), fps);
+  LtcDecoder decoder(reader->sample_rate_hz(), fps, speed);
   LtcFrames frames;
   std::vector<float> samples(kChunkSamples);
   while (const size_t count = reader->read(samples))
     if (const auto frame = decoder.add(std::span(samples).first(count));
         frame && frames.size() < kMaxLtcFrames)
       frames.push_back(*frame);
-  if (frames.empty())
-    return at(path, make_error(ErrorCode::BadInput, "has no timecode in its first channel"));
   return frames;
 }
 
 Result<TimecodeAt> read_ltc_file(const std::string& path, const std::optional<FrameRate>& fps,
                                  const LtcListener& listener) {
-  ASSIGN_OR_RETURN(const LtcFrames counted, frames_of_file(path, kMostFrames));
+  LtcFrames counted;
+  double speed = 1.0;
+  for (const double tried : kSpeeds) {
+    ASSIGN_OR_RETURN(LtcFrames frames, frames_of_file(path, kMostFrames, tried));
+    if (frames.size() <= counted.size()) continue;
+    counted = std::move(frames);
+    speed = tried;
+  }
+  if (counted.empty())
+    return at(path, make_error(ErrorCode::BadInput,
+                               "has no timecode of 24 to 30 frames per second in its first channel"));
   LtcRateMeter meter;
   for (const LtcFrame& frame : counted) meter.add(frame);
   if (fps && is_other_rate(meter, *fps))
     return at(path, make_error(ErrorCode::BadInput, "{}", other_rate_text(meter, *fps)));
-  const FrameRate rate = fps                      ? *fps
-                         : meter.pair_count() > 0 ? meter.nearest()
-                                                  : counted.front().timecode.rate;
-  ASSIGN_OR_RETURN(LtcFrames read, frames_of_file(path, rate));
+  const FrameRate rate = fps ? *fps : meter.pair_count() > 0 ? meter.rate() : counted.front().timecode.rate;
+  ASSIGN_OR_RETURN(LtcFrames read, frames_of_file(path, rate, speed));
   const auto frames = std::make_shared<const LtcFrames>(std::move(read));
   listener(fmt::format("{}: timecode from {} on", path, count_text(frames->front().timecode)));
   return TimecodeAt([frames](double time_s) -> std::optional<Timecode> {
@@ -276,18 +304,19 @@ class LiveLtc {
     while (const size_t count = reader_.read(samples)) {
       const auto frame = decoder.add(std::span(samples).first(count));
       read_s += static_cast<double>(count) / rate_hz;
+      note_arrival(read_s);
       if (!frame) continue;
-      if (is_counted || fps_) put(*frame, read_s);
+      if (is_counted || (fps_ && meter.pair_count() > kSettledPairs)) put(*frame);
       if (is_counted) continue;
       meter.add(*frame);
-      if (meter.pair_count() < kMeasuredPairs) continue;
+      if (!meter.is_counted() && meter.pair_count() < kMeasuredPairs) continue;
       is_counted = true;
       if (fps_ && is_other_rate(meter, *fps_))
         listener_("standard input: " + other_rate_text(meter, *fps_));
       else
         listener_(fmt::format("standard input: timecode of {} frames per second",
-                              frame_rate_text(fps_.value_or(meter.nearest()).hz())));
-      if (!fps_) decoder.set_fps(meter.nearest());
+                              frame_rate_text(fps_.value_or(meter.rate()).hz())));
+      if (!fps_) decoder.set_fps(meter.rate());
     }
   }
 
@@ -301,9 +330,18 @@ class LiveLtc {
   }
 
  private:
-  void put(const LtcFrame& frame, double read_s) {
+  /// Sound comes in pieces: what was the least late tells when it is played.
+  void note_arrival(double read_s) {
+    const double now_s = static_cast<double>(now_ns()) * kSPerNs - read_s;
+    const double allowed_s = offset_s_ + kClockDrift * (read_s - read_s_);
+    const bool begins = read_s_ == 0.0 || now_s > allowed_s + kHeldUpS;
+    offset_s_ = begins ? now_s : std::min(allowed_s, now_s);
+    read_s_ = read_s;
+  }
+
+  void put(const LtcFrame& frame) {
     const std::lock_guard lock(mutex_);
-    end_ns_ = now_ns() - static_cast<int64_t>((read_s - frame.end_s) * kNsPerS);
+    end_ns_ = static_cast<int64_t>((offset_s_ + frame.end_s) * kNsPerS);
     frame_ = frame;
   }
 
@@ -315,6 +353,9 @@ class LiveLtc {
   bool was_silent_ = false;
   std::optional<LtcFrame> frame_;
   int64_t end_ns_ = 0;  // of its word
+  // Of the reading thread.
+  double offset_s_ = 0.0;  // from sound that was read to the clock, s
+  double read_s_ = 0.0;    // of the newest sound
 };
 
 Result<TimecodeAt> read_live_ltc(const std::optional<FrameRate>& fps, const LtcListener& listener) {

@@ -31,8 +31,9 @@ struct LtcFrame {
 
 class LtcDecoder {
  public:
-  /// Makes a decoder for samples at `sample_rate_hz`; the words do not tell their `fps`.
-  LtcDecoder(double sample_rate_hz, const FrameRate& fps);
+  /// Makes a decoder for samples at `sample_rate_hz`; the words do not tell their `fps`. The tape's speed may
+  /// differ from `speed` by a fifth at first.
+  LtcDecoder(double sample_rate_hz, const FrameRate& fps, double speed = 1.0);
 
   /// Reads further samples, and returns the newest frame that ended within them. Words that are no time of
   /// day are left out.
@@ -66,13 +67,16 @@ class LtcRateMeter {
   uint32_t pair_count() const { return pair_count_; }
   /// Returns frames per second as they come, at the tape's speed; call it after the first pair.
   double hz() const { return pair_count_ / sum_s_; }
-  /// Returns the rate of linear timecode that is nearest; 29.97 where words say that they drop numbers.
-  FrameRate nearest() const;
+  /// Returns true once the last frame of a second was seen, which tells how many there are at any speed.
+  bool is_counted() const { return counted_ > 0; }
+  /// Returns the rate that is counted, else the nearest; 29.97 where words say that they drop numbers.
+  FrameRate rate() const;
 
  private:
   std::optional<LtcFrame> last_;
   double sum_s_ = 0.0;
   uint32_t pair_count_ = 0;
+  uint32_t counted_ = 0;  // frames a second, whole; 0 = not yet seen
   bool drops_ = false;
 };
 

@@ -74,6 +74,10 @@ Status plan_by_timecode(const TimecodeTrack& track, const FrameRate& rate, Frame
   plan.options.fps = plan.range.fps = rate;
   plan.options.first_number = frames.first.frame;
   plan.first_timecode = timecode_text(frames.first);
+  const auto count = static_cast<double>(frames.time_ns.size());
+  if (to && is_same_count(*to, frames.first) && frames_between(frames.first, *to) + 1.0 > count + 0.5)
+    plan.remark = fmt::format("it ends at {}, where timecode jumps or the states end",
+                              timecode_text(advanced(frames.first, count - 1.0)));
   plan.range.time_ns = std::move(frames.time_ns);
   return {};
 }
@@ -128,8 +132,10 @@ Result<FramePlan> plan_frames(ExportSource& source, const ExportOptions& options
   if (!is_by_timecode && track.first() && !options.has_fps)
     plan.options.fps = plan.range.fps = track.first()->rate;
   if (!is_by_timecode && track.first() && !options.is_one_frame)
-    plan.remark = fmt::format("frames count from 1, not by timecode ({}): --from and --to name a part of it",
-                              track.text());
+    plan.remark = fmt::format("frames count from 1, not by timecode ({}): {}", track.text(),
+                              options.has_fps && options.fps != track.first()->rate
+                                  ? "leave --fps out"
+                                  : "--from and --to name a part of it");
   if (is_by_timecode && plan.range.first_ns)
     plan.options.from_s =
         std::max(0.0, static_cast<double>(plan.range.time_ns.front() - *plan.range.first_ns) / kNsPerS);

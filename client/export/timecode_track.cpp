@@ -51,6 +51,9 @@ std::string TimecodeTrack::text() const {
   if (jumps > 0)
     text += fmt::format(", with {} jump{}{} to {}", jumps, jumps == 1 ? "" : "s",
                         jumps == 1 ? "" : ", the first", timecode_text(stretches_[1].first));
+  if (!std::all_of(stretches_.begin(), stretches_.end(),
+                   [&](const Stretch& one) { return is_same_count(one.first, first); }))
+    text += ", and other rates";
   return text;
 }
 

@@ -21,6 +21,13 @@ glm::dvec3 HeadEasing::Part::slowed(double silent_s) const {
   return seen_per_s * t_s * (1.0 - 0.5 * t_s / slowing_s);
 }
 
+/// Learns the speed from a way of the source.
+void HeadEasing::Part::see(const glm::dvec3& way, double passed_s) {
+  const glm::dvec3 change = way / passed_s - seen_per_s;
+  const double most = believed_per_s2 * passed_s, size = glm::length(change);
+  seen_per_s += size > most ? change * (most / size) : change;
+}
+
 /// As a spring does that is damped critically, of a rate w with w^2 away + 2 w away_per_s = easy: that is its
 /// greatest acceleration. So the rate grows as the head comes near.
 void HeadEasing::Part::approach(double passed_s) {
@@ -60,8 +67,8 @@ Pose HeadEasing::follow(const Pose& seen, double since_s, double passed_s) {
   if (silent_s_ > 0.0) {
     hear_again(seen, since_s, passed_s);
   } else if (passed_s > 0.0) {
-    place_.seen_per_s = (seen.position_m - heard_.position_m) / passed_s;
-    turn_.seen_per_s = turn_between(heard_.rotation, seen.rotation) / passed_s;
+    place_.see(seen.position_m - heard_.position_m, passed_s);
+    turn_.see(turn_between(heard_.rotation, seen.rotation), passed_s);
     time_.seen_per_s.x = since_s / passed_s;
     knows_speed_ = true;
   }
@@ -76,6 +83,12 @@ Pose HeadEasing::coast(double passed_s) {
   reached_.rotation = turned(heard_.rotation, turn_.slowed(silent_s_));
   reached_s_ = time_.slowed(silent_s_).x;
   return show(passed_s, 0.0);
+}
+
+Pose HeadEasing::hold(double passed_s) {
+  if (silent_s_ == 0.0)
+    for (Part* part : {&place_, &turn_, &time_}) part->seen_per_s = glm::dvec3(0.0);
+  return coast(passed_s);
 }
 
 /// `heard_s`: by which the source's time went on since the frame before, as it was heard.

@@ -267,6 +267,7 @@ InputHub::SeenHead InputHub::see_head(int64_t server_time_ns) {
       seen.pose = unseen->pose;
       frame_.joints = joints_of(*unseen);
     }
+    seen.is_absent = !unseen;
     return seen;
   }
   const auto delay = motion_.owner ? delays_ns_.find(*motion_.owner) : delays_ns_.end();
@@ -366,11 +367,17 @@ void InputHub::show_head(const SeenHead& seen, int64_t server_time_ns) {
       last_frame_ns_ ? static_cast<double>(server_time_ns - *last_frame_ns_) * kSPerNs : kTeleportShortestS;
   const double travel_s = std::clamp(passed_s, kTeleportShortestS, kTeleportLongestS);
   Pose& head = frame_.world_from_head;
-  const bool is_silent = seen.is_silent && easing_.knows_speed();
+  const bool is_absent = seen.is_absent && easing_.knows_speed();
+  const bool is_silent = (seen.is_silent && easing_.knows_speed()) || is_absent;
   const bool has_jumped = seen.has_jumped || (!is_silent && is_teleport(head, seen.pose, travel_s));
-  const double since_s = static_cast<double>(seen.time_ns - heard_ns_) * kSPerNs;
+  double since_s = static_cast<double>(seen.time_ns - heard_ns_) * kSPerNs;
+  // Another source has a clock of its own.
+  if (absent_s_ > 0.0) since_s = std::max(absent_s_, kShortestEasingS);
+  absent_s_ = is_absent ? absent_s_ + std::max(passed_s, 0.0) : 0.0;
   if (has_jumped)
     easing_.restart(head = seen.pose);
+  else if (is_absent)
+    head = easing_.hold(std::clamp(passed_s, 0.0, kTeleportLongestS));
   else if (is_silent)
     head = easing_.coast(std::clamp(passed_s, 0.0, kTeleportLongestS));
   else

@@ -220,6 +220,7 @@ class InputHub {
     Pose pose;
     int64_t time_ns = 0;         // of the pose, by its source's clock
     bool is_silent = false;      // nothing of this time
+    bool is_absent = false;      // there is no source
     bool has_jumped = false;     // strands are carried there
     bool has_caught_up = false;  // of more motion than time passed
   };
@@ -249,6 +250,7 @@ class InputHub {
   std::optional<int64_t> shown_ns_;  // time of the head's source that the last frame shows
   HeadEasing easing_;
   int64_t heard_ns_ = 0;                    // SeenHead::time_ns of the last that was not silent
+  double absent_s_ = 0.0;                   // without a source, until now
   std::optional<Timecode> heard_timecode_;  // likewise
   double steady_delay_ns_ = 0.0;            // by which uneven samples are shown later
   bool has_left_ = false;                   // the source that drove the head, since the last frame

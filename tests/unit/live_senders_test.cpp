@@ -312,6 +312,64 @@ TEST(LiveSenders, ZerosAreNotBelievedOfAHeadThatIsTurnedByLittle) {
   }
 }
 
+/// The yaw of each step, degrees.
+std::vector<double> yaw_deg(const Stage& stage) {
+  std::vector<double> found;
+  for (const InputFrame& step : stage.steps) {
+    const glm::dvec3 ahead = step.world_from_head.rotation * glm::dvec3(0, 0, 1);
+    found.push_back(std::atan2(ahead.x, ahead.z) * 180.0 / std::numbers::pi);
+  }
+  return found;
+}
+
+// The head goes from one turn to the other, and nowhere else.
+TEST(LiveSenders, ATurnInOnePacketIsNotOvershot) {
+  for (const double rate_hz : {30.0, 50.0, 100.0})
+    for (const double to_deg : {24.0, 10.0, -8.0, -15.0, -20.0, -60.0}) {
+      SCOPED_TRACE(fmt::format("{} Hz, to {}", rate_hz, to_deg));
+      Stage stage({.protocol = "opentrack"});
+      for (double t_s = 0.0; t_s < 3.0; t_s += 1.0 / rate_hz)
+        stage.send(test::opentrack({0, 0, 0, t_s < 1.0 ? 25.0 : to_deg, 0, 0}),
+                   kStart + static_cast<int64_t>(t_s * kNsPerS));
+      const std::vector<double> yaw = yaw_deg(stage);
+      const double sign = yaw[20] < 0.0 ? -1.0 : 1.0;
+      for (size_t i = 10; i < yaw.size(); ++i) {
+        EXPECT_LT(sign * yaw[i], 25.5) << i;
+        EXPECT_GT(sign * yaw[i], to_deg - 0.5) << i;
+      }
+      EXPECT_NEAR(sign * yaw.back(), to_deg, 0.1);
+    }
+}
+
+// Time that counts poses stands still where they do, and a clock that is set back by little is late for good.
+TEST(LiveSenders, AClockThatFallsBehindIsFollowed) {
+  for (const double behind_s : {0.05, 0.3, 0.8}) {
+    SCOPED_TRACE(behind_s);
+    Stage stage({.protocol = "vmc"});
+    const auto place = [](double t_s) { return static_cast<float>(0.3 * std::sin(std::numbers::pi * t_s)); };
+    for (int i = 0; i < 360; ++i) {
+      const double told_s = i / 90.0, t_s = told_s + (i < 180 ? 0.0 : behind_s);
+      stage.send(test::vmc_head({place(t_s), 1.6f, 0}, {0, 0, 0, 1}, static_cast<float>(told_s)),
+                 kStart + static_cast<int64_t>(t_s * kNsPerS));
+    }
+    // A second after it fell behind, the head is again where its sender is.
+    const double end_s = 359.0 / 90.0 + behind_s;
+    EXPECT_NEAR(stage.head().position_m.x, -place(end_s), 0.03);
+  }
+}
+
+TEST(LiveSenders, AHeadThatWasLostComesBackGentlyWhateverItsTurn) {
+  for (const double lost_s : {0.3, 3.0}) {
+    SCOPED_TRACE(lost_s);
+    Stage stage({.protocol = "opentrack"});
+    for (double t_s = 0.0; t_s < 4.0; t_s += 1.0 / 60.0)
+      stage.send(test::opentrack({0, 0, 0, t_s < 1.0 ? 0.0 : 55.0, 0, 0}),
+                 kStart + static_cast<int64_t>((t_s + (t_s < 1.0 ? 0.0 : lost_s)) * kNsPerS));
+    EXPECT_LT(stage.fastest_turn_rad_per_s(), 10.0);
+    EXPECT_NEAR(std::abs(yaw_deg(stage).back()), 55.0, 0.5);
+  }
+}
+
 // As people turn their heads when they are in a hurry: 600 degrees a second, at the rates of trackers.
 TEST(LiveSenders, AHeadThatTurnsAsFastAsPeopleDoIsBelieved) {
   for (const double rate_hz : {10.0, 30.0, 60.0, 250.0}) {

@@ -208,7 +208,21 @@ TEST(Ltc, TheRateOfAFileIsMeasured) {
                           fmt::format("of {} frames per second{} on", frame_rate_text(fps.hz()),
                                       first.is_drop ? ", drop-frame" : ""))));
   }
-  // The last one counts 30 a second.
+  // At any speed of the tape the last frame of a second tells how many it has.
+  for (const double speed : {0.5, 0.96, 1.0417, 2.0})
+    for (const uint32_t fps : {24u, 25u, 30u}) {
+      const FrameRate rate{fps, 1};
+      const Sound sound{48'000.0, speed, 0.5, 0.0};
+      std::ofstream(path, std::ios::binary)
+          << wav_of(sound_of(*parse_timecode("01:00:00:00", rate), 70, sound), 16, 1);
+      const auto at = open_ltc(path, std::nullopt, kSilence);
+      ASSERT_TRUE(at) << at.error().to_string();
+      EXPECT_EQ((*at)(1.0)->rate, rate) << speed;
+      const FrameRate other{fps == 24 ? 25u : 24u, 1};
+      EXPECT_THAT(open_ltc(path, other, kSilence).error().to_string(), HasSubstr("leave --fps out"));
+    }
+  std::ofstream(path, std::ios::binary)
+      << wav_of(sound_of(*parse_timecode("01:00:00:00", {30, 1}), 60, {}), 16, 1);
   EXPECT_THAT(open_ltc(path, FrameRate{24, 1}, kSilence).error().to_string(),
               HasSubstr("counts 30 frames per second, and --fps says 24"));
 }
@@ -227,7 +241,7 @@ TEST(Ltc, SaysWhatIsWrongWithAFile) {
   EXPECT_THAT(refusal(silent.substr(0, 40)), HasSubstr("cut off"));
   EXPECT_THAT(refusal(wav_of({}, 8, 1)), HasSubstr("16, 24 or 32 bits"));
   EXPECT_THAT(refusal(wav_of({}, 16, 0)), HasSubstr("are possible"));
-  EXPECT_THAT(refusal(silent), HasSubstr("no timecode in its first channel"));
+  EXPECT_THAT(refusal(silent), HasSubstr("no timecode of 24 to 30 frames per second in its first channel"));
   EXPECT_THAT(refusal(silent, {15, 1}), HasSubstr("no timecode counts 15"));
   EXPECT_THAT(open_ltc((folder.path() / "none.wav").string(), FrameRate{25, 1}, kSilence).error().to_string(),
               HasSubstr("cannot be read"));

@@ -25,6 +25,7 @@ constexpr int64_t kOnItsWayNs = 150'000'000;                // for a picture
 constexpr size_t kMaxExpectedChars = 300;
 constexpr double kRefusalTimeoutS = 10.0;
 constexpr size_t kHashChars = 16;
+constexpr const char* kNoState = "is unknown: steps alone tell it (start { lockstep: true }, then step)";
 
 std::string wanted_text(const ScenarioMetric& metric) {
   std::string text;
@@ -279,8 +280,9 @@ void ScenarioRun::expect_stretch(const std::string& name, const MeasuredSpan::Se
     const StretchPlace& place = seen.after.stretch_place;
     detail = fmt::format("at strand {}, from vertex {} to {}, {:.3f} s (state {}): {}", place.strand,
                          place.vertex, place.vertex + 1, place.time_s, place.tick,
-                         is_too_fine ? hint_of_bound(seen.after.bound_m, grain, limit)
-                                     : std::string("more substeps, or quality=full, stretch hair less"));
+                         is_too_fine && stretch <= grain
+                             ? hint_of_bound(seen.after.bound_m, grain, limit)
+                             : std::string("more substeps, or quality=full, stretch hair less"));
   }
   report("stretch of " + name, fmt::format("below {:g}", limit), measured, has_passed, detail);
 }
@@ -322,7 +324,8 @@ void ScenarioRun::expect_kept_state(const std::filesystem::path& path) {
   if (!kept)
     return report(what, "as in " + path.string(), kept.error().to_string() + " (--renew writes it)", false);
   const std::string wanted(trimmed(std::string_view(*kept).substr(0, kept->find('\n'))));
-  const bool is_same = hash_ && wanted == hash_text(hash_);
+  if (!hash_) return report(what, "as in " + path.string(), kNoState, false);
+  const bool is_same = wanted == hash_text(hash_);
   report(what, fmt::format("{} of {}", excerpt(wanted, kHashChars), path.filename().string()), measured,
          is_same, is_same ? "" : "solver, groom, inputs or compiler are others than when it was written");
 }
@@ -333,8 +336,8 @@ void ScenarioRun::expect_state(const ScenarioExpect& expect) {
   std::optional<uint64_t> wanted = expect.hash;
   if (const auto found = remembered_.find(expect.same_as); found != remembered_.end()) wanted = found->second;
   const std::string from = expect.same_as.empty() ? std::string() : fmt::format(" of '{}'", expect.same_as);
-  report(fmt::format("state at step {}", tick_), hash_text(wanted) + from, "is " + hash_text(hash_),
-         wanted.has_value() && hash_ == wanted);
+  report(fmt::format("state at step {}", tick_), hash_text(wanted) + from,
+         hash_ ? "is " + hash_text(hash_) : kNoState, wanted.has_value() && hash_ == wanted);
 }
 
 void ScenarioRun::expect_back(const ScenarioExpect& expect) {
@@ -354,7 +357,9 @@ void ScenarioRun::expect_back(const ScenarioExpect& expect) {
   report(name + " comes back", fmt::format("within {:g} s", *expect.back_within_s),
          !was_away  ? std::string("neither its server was restarted nor its link changed")
          : is_there ? fmt::format("was back after {:.1f} s", since_s)
-                    : fmt::format("is away: {}", who.look().trouble),
+                    : fmt::format("is away: {}", who.look().trouble.empty()
+                                                     ? std::string("connected, and no frame has come since")
+                                                     : who.look().trouble),
          is_there);
 }
 

@@ -334,8 +334,10 @@ int64_t LivePolicy::time_of(const LivePose& pose, int64_t arrival_ns) {
   if (has_time) {
     clock_.add(*pose.source_time_ns, arrival_ns);
     time_ns = std::min(*pose.source_time_ns + clock_.offset_ns(), arrival_ns);
-    // The source's clock was set: a new mapping.
-    if (arrival_ns - time_ns > kClockJumpNs) {
+    if (arrival_ns - time_ns <= kLateNs) timely_ns_ = arrival_ns;
+    // The source's clock was set, or stood still while its poses did: a new mapping.
+    if (arrival_ns - time_ns > kClockJumpNs || arrival_ns - timely_ns_ > kLateForNs) {
+      timely_ns_ = arrival_ns;
       clock_ = {};
       clock_.add(*pose.source_time_ns, arrival_ns);
       time_ns = arrival_ns;

@@ -48,6 +48,9 @@ inline constexpr double kZerosJumpM = 0.02;
 inline constexpr uint32_t kGatePoses = 5;
 inline constexpr int64_t kGateNs = 100'000'000;
 inline constexpr int64_t kEaseNs = 250'000'000;
+/// A source whose poses are this late for so long has another clock than before.
+inline constexpr int64_t kLateNs = 30'000'000;
+inline constexpr int64_t kLateForNs = 150'000'000;
 inline constexpr size_t kResequenceFrames = 3;
 inline constexpr int64_t kResequenceNs = 20'000'000;
 /// Frame numbers that differ by more than this belong to a new count.
@@ -153,6 +156,7 @@ class LivePolicy {
   double period_ns_ = 0.0;       // of a source that has times only
   uint32_t steady_periods_ = 0;  // in a row, counted up to a few
   ClockMap clock_;
+  int64_t timely_ns_ = 0;  // arrival of the newest pose that was not late
 
   // Whether times are those of the poses.
   std::optional<LivePose> told_;  // the newest that came
