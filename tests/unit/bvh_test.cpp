@@ -463,10 +463,9 @@ TEST(MotionFile, SaysWhatWasAssumedAndFound) {
   ASSERT_EQ(filtered->notes.size(), 2u) << "the unit was stated";
   EXPECT_THAT(filtered->notes[1], HasSubstr("1 frames replaced"));
   EXPECT_EQ(filtered->clip.world_from_head[2], filtered->clip.world_from_head[1]);
-  const std::string more = text + "0 0 0 0 0 0 0 0 0 0 0 0\n";
-  ASSERT_TRUE(save_file(path, std::as_bytes(std::span(more))));
-  EXPECT_THAT(load_motion_file(path, {})->notes,
-              testing::Contains(path.string() + ": 5 frames are announced, 6 are there"));
+  text += "0 0 0 0 0 0 0 0 0 0 0 0\n";
+  ASSERT_TRUE(save_file(path, std::as_bytes(std::span(text))));
+  EXPECT_THAT(load_motion_file(path, {})->notes, testing::Contains(HasSubstr("5 frames are announced")));
   const auto axis =
       load_motion_file(path, {.unit_m = 1.0, .up = "x", .joint = "", .is_filtering_glitches = false});
   ASSERT_FALSE(axis);

@@ -40,7 +40,8 @@ constexpr const char* kUsage =
     "  --show            prints every line as it comes\n"
     "  --links GRID      one viewer at links of every rate, delay and share of stalls: ends with 1 where one "
     "finds\n"
-    "                    no class that fits, does not keep it, or has its first picture or exact frame late\n";
+    "                    no class that fits, does not keep it, or has its first picture or exact frame "
+    "late\n";
 
 struct Options {
   uint64_t first = 1, last = 1;

@@ -119,7 +119,7 @@ await runAll({
     while (!fs.readdirSync(folder, { recursive: true }).some((name) => name.endsWith('scene.mcap'))) await sleep(20);
     await sleep(300); // steps are under way
     child.kill('SIGINT');
-    assert.equal(await ended, 2);
+    assert.equal(await ended, 130);
     assert.deepEqual([fs.readdirSync(folder), fs.existsSync(page)], [[], false]);
   },
 }, browser, server);

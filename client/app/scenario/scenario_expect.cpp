@@ -278,11 +278,12 @@ void ScenarioRun::expect_stretch(const std::string& name, const MeasuredSpan::Se
   std::string detail;
   if (has_seen && !has_passed) {
     const StretchPlace& place = seen.after.stretch_place;
+    std::vector<std::string> hints;
+    if (stretch >= std::max(limit, grain))
+      hints.emplace_back("more substeps, or quality=full, stretch hair less");
+    if (is_too_fine) hints.push_back(hint_of_bound(seen.after.bound_m, grain, limit));
     detail = fmt::format("at strand {}, from vertex {} to {}, {:.3f} s (state {}): {}", place.strand,
-                         place.vertex, place.vertex + 1, place.time_s, place.tick,
-                         is_too_fine && stretch <= grain
-                             ? hint_of_bound(seen.after.bound_m, grain, limit)
-                             : std::string("more substeps, or quality=full, stretch hair less"));
+                         place.vertex, place.vertex + 1, place.time_s, place.tick, fmt::join(hints, "; "));
   }
   report("stretch of " + name, fmt::format("below {:g}", limit), measured, has_passed, detail);
 }
