@@ -166,7 +166,8 @@ void StrandEncodeWorker::serve(const SnapshotSlot::View& view, const StrandEncod
       listeners_ == StrandListeners::All && !has_work(view) && view.version != encoded_version_;
   const bool is_new = is_due(view) || is_overdue;
   // Requests up to here are served by one keyframe; later ones wake the thread again.
-  const bool is_early = is_new && told_ns_ && view.snapshot->sim_time_ns < *told_ns_ + kToldNs;
+  const int64_t since_told_ns = view.snapshot->sim_time_ns - told_ns_.value_or(0);
+  const bool is_early = is_new && told_ns_ && since_told_ns >= 0 && since_told_ns < kToldNs;
   const bool is_wanted = !is_early && is_keyframe_wanted_.exchange(false);
   const bool is_restarting = is_restarting_.exchange(false);
   if (!is_new && keyframe_ != nullptr) {
