@@ -6,6 +6,10 @@
 namespace strandcast::frame_sampler_test {
 namespace {
 
+using export_test::kStepNs;
+using export_test::positions_at;
+using export_test::state_at;
+
 TEST(NumberText, IsShortAndRoundsToTheStep) {
   const auto text = [](double value, int decimals) {
     char digits[kMostDecimalChars];
