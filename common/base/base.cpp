@@ -88,7 +88,6 @@ Result<std::vector<std::byte>> load_file(const std::filesystem::path& path, uint
   return bytes;
 }
 
-/// Without the mark that some editors begin a text with.
 Result<std::string> load_text(const std::filesystem::path& path, uint64_t limit_bytes) {
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   ASSIGN_OR_RETURN(const auto bytes, load_file(path, limit_bytes));

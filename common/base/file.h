@@ -16,7 +16,7 @@ namespace strandcast {
 /// file.
 Result<std::vector<std::byte>> load_file(const std::filesystem::path& path, uint64_t limit_bytes);
 
-/// Reads a file like load_file() and returns it as text; no encoding is assumed.
+/// Reads a file like load_file() and returns it as text, without a byte order mark at its beginning.
 Result<std::string> load_text(const std::filesystem::path& path, uint64_t limit_bytes);
 
 /// Writes a temporary file beside the target and renames it, so that a reader never sees half a file.
