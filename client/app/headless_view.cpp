@@ -160,6 +160,7 @@ class Collector {
     ViewerReport now;
     now.decode_ms = std::min(session().replay().decode_timer().median_ms(), kMaxReportedMs);
     now.picture_decode_ms = std::min(session().picture_decode_timer().median_ms(), kMaxReportedMs);
+    now.wrong_states = static_cast<uint32_t>(session().replay().stats().wrong_states);
     // One that is lost is followed by the next.
     (void)session().client().send(now);
   }

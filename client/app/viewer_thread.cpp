@@ -108,6 +108,7 @@ void ViewerThread::describe(ViewerState& state) {
   state.exact_share = strands.decoded_frames == 0 ? 0.0
                                                   : static_cast<double>(strands.exact_frames) /
                                                         static_cast<double>(strands.decoded_frames);
+  state.wrong_states = strands.wrong_states;
   state.missed_frames = session.replay().stats().missed_frames + session.picture_stats().missed_frames;
   state.strand_decode_ms = session.replay().decode_timer().median_ms();
   state.picture_decode_ms = session.picture_decode_timer().median_ms();

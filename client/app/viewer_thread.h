@@ -45,6 +45,7 @@ struct ViewerState {
   uint64_t decoded_frames = 0;
   double exact_share = 0.0;  // of the strand frames: without corrections
   uint64_t missed_frames = 0;
+  uint64_t wrong_states = 0;
   double strand_decode_ms = 0.0;  // medians
   double picture_decode_ms = 0.0;
   double motion_to_decoded_ms = 0.0;

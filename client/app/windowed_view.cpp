@@ -335,6 +335,7 @@ class WindowedView {
     reported_hair_px_ = hair_px_now;
     ViewerReport now;
     now.decode_ms = std::min(state_->strand_decode_ms, kMaxReportedMs);
+    now.wrong_states = static_cast<uint32_t>(state_->wrong_states);
     now.draw_ms = std::min(drawn_.fair_ms, kMaxReportedMs);
     now.picture_decode_ms = std::min(state_->picture_decode_ms, kMaxReportedMs);
     now.shown_hz = std::min(hud_.shown_hz(), kMaxReportedHz);

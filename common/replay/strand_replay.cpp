@@ -62,7 +62,7 @@ std::shared_ptr<const Snapshot> StrandReplay::receive(std::span<const std::byte>
     return nullptr;
   }
   const bool is_other_stream = last_sequence_ != 0 && header->stream_id != stream_id_;
-  if (is_other_stream) last_sequence_ = 0;
+  if (is_other_stream) last_sequence_ = decoded_sequence_ = 0;
   note_sequence(*header);
 
   // Streams of two codecs have no number in common, so what is still on its way by the old one decodes.
@@ -70,6 +70,9 @@ std::shared_ptr<const Snapshot> StrandReplay::receive(std::span<const std::byte>
   const int64_t begin_ns = now_ns();
   auto decoded = (is_next ? *next_ : now_).decoder->decode(message);
   if (!decoded) {
+    const bool has_base = header->opcode == Opcode::StrandKeyframe ||
+                          (decoded_sequence_ != 0 && header->sequence == decoded_sequence_ + 1);
+    if (has_base) ++stats_.wrong_states;
     reject(decoded.error(), receive_time_ns);
     return nullptr;
   }
@@ -79,6 +82,7 @@ std::shared_ptr<const Snapshot> StrandReplay::receive(std::span<const std::byte>
   decode_timer_.add_ms(static_cast<double>(decoded_ns - begin_ns) * 1e-6);
   ++stats_.decoded_frames;
   stream_id_ = header->stream_id;
+  decoded_sequence_ = header->sequence;
   if (header->opcode == Opcode::StrandKeyframe) ++stats_.keyframes;
   if (is_exact(message)) ++stats_.exact_frames;
   newest_send_time_ns_ = header->send_time_ns;

@@ -90,6 +90,7 @@ struct ReplayStats {
   uint64_t received_frames = 0;
   uint64_t received_bytes = 0;
   uint64_t rejected_frames = 0;  // malformed, or their base was missing
+  uint64_t wrong_states = 0;     // of those: keyframes, and deltas whose base was there
   uint64_t gaps = 0;             // places where the sequence jumped
   uint64_t missed_frames = 0;    // frames the server numbered and this client never saw
   uint64_t keyframe_requests = 0;
@@ -174,6 +175,7 @@ class StrandReplay {
   StageTimer motion_latency_timer_;
   uint16_t stream_id_ = 0;  // of the newest keyframe
   uint32_t last_sequence_ = 0;
+  uint32_t decoded_sequence_ = 0;  // of this stream; 0 = none yet
   int64_t last_motion_time_ns_ = 0;
   int64_t newest_send_time_ns_ = 0;
   std::optional<int64_t> last_keyframe_request_ns_;

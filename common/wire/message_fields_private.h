@@ -158,6 +158,7 @@ void visit(Visitor& v, ViewerReport& m) {
   v.choice("device", m.device, DrawingDevice::Hardware);
   v.number("hair_px", m.hair_px, Range{0, kMaxReportedPx, "pixels"});
   v.number("step_ns", m.step_ns, Range{0, kMaxStepNs, "ns"});
+  v.value("wrong_states", m.wrong_states);
 }
 template <>
 inline constexpr const char* kKind<ModeRequest> = "mode_request";

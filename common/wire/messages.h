@@ -165,6 +165,8 @@ struct ViewerReport {
   DrawingDevice device = DrawingDevice::Unknown;
   double hair_px = 0.0;  // of strands: how high the hair is on the screen; 0 = not told
   double step_ns = 0.0;  // as in Hello, of who could not predict then; 0 = as in Hello
+  // since the Welcome: frames of strands, none missing before them, whose state was not the server's
+  uint32_t wrong_states = 0;
   bool operator==(const ViewerReport&) const = default;
 };
 /// Asks for strands, pictures or the server's choice; answered by a ModeChange.

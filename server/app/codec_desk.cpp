@@ -41,6 +41,7 @@ std::optional<CodecAnswer> CodecDesk::consider(SessionId session, const Look& lo
   ViewerCodecWatch& watch = found->second;
   DecodeLoad load;
   load.decode_ms = look.report.decode_ms;
+  load.wrong_states = look.report.wrong_states;
   if (look.link.mode == StreamMode::Strands && !look.model.is_paused)
     load.states_hz = look.states_hz * std::min(look.model.realtime_factor, 1.0);
   const double step_ns = look.report.step_ns > 0.0 ? look.report.step_ns : watch.facts().step_ns;

@@ -117,14 +117,27 @@ std::optional<ViewerCodec> ViewerCodecWatch::look(const std::vector<StrandCodecI
   }
   const StrandCodecInfo& present = served[codec_];
   const size_t fallback = codec_ + 1;
-  if (!present.predicts || fallback >= served.size() || present.name == facts.wish) return std::nullopt;
-  if (!is_too_slow(load, time_ns)) return std::nullopt;
+  if (!present.predicts || fallback >= served.size()) return std::nullopt;
+  if (is_wrong(load, time_ns)) {
+    codec_ = fallback;
+    return ViewerCodec{fallback, fmt::format("{}: by {} this viewer's states are not the server's",
+                                             served[fallback].name, present.name)};
+  }
+  if (present.name == facts.wish || !is_too_slow(load, time_ns)) return std::nullopt;
   codec_ = fallback;
   return ViewerCodec{
       fallback,
       fmt::format("{}: {} takes {:.1f} ms a state here, {:.0f} % of the time between two; {:.0f} % may be",
                   served[fallback].name, present.name, load.decode_ms,
                   load.decode_ms * kSPerMs * load.states_hz * 1e2, kSlowDecodeShare * 1e2)};
+}
+
+bool ViewerCodecWatch::is_wrong(const DecodeLoad& load, int64_t time_ns) {
+  if (time_ns >= wrong_until_ns_) wrong_before_ = wrong_seen_;
+  if (load.wrong_states != wrong_seen_ && wrong_seen_ == wrong_before_)
+    wrong_until_ns_ = time_ns + kWrongStatesNs;
+  wrong_seen_ = load.wrong_states;
+  return wrong_seen_ - wrong_before_ > kMostWrongStates;
 }
 
 bool ViewerCodecWatch::is_too_slow(const DecodeLoad& load, int64_t time_ns) {

@@ -33,6 +33,10 @@ inline constexpr int64_t kSettledDecodeNs = 10'000'000'000;
 /// state is published for both. At most kMaxServedCodecs. NotFound for an unknown name.
 Result<std::vector<StrandCodecInfo>> served_codecs(const StrandCodecInfo& codec, float bound_m);
 
+/// Decoded states that may differ from the server's within kWrongStatesNs; then the viewer gets the fallback.
+inline constexpr uint32_t kMostWrongStates = 1;
+inline constexpr int64_t kWrongStatesNs = 10'000'000'000;
+
 /// Facts that decide the choice; 0 means unknown.
 struct ViewerCodecFacts {
   std::string wish;               // as in Hello
@@ -53,18 +57,19 @@ struct ViewerCodec {
 /// Chooses a viewer's codec; `served` must come from served_codecs().
 ViewerCodec choose_viewer_codec(const std::vector<StrandCodecInfo>& served, const ViewerCodecFacts& facts);
 
-/// A viewer's decoding cost with its codec; 0 means unknown.
+/// What a viewer's decoding with its codec costs, and whether it succeeds; 0 means unknown.
 struct DecodeLoad {
-  double decode_ms = 0.0;  // of a state, as in its newest ViewerReport
-  double states_hz = 0.0;  // that come; 0 = it gets no strands now
+  double decode_ms = 0.0;     // of a state, as in its newest ViewerReport
+  double states_hz = 0.0;     // that come; 0 = it gets no strands now
+  uint32_t wrong_states = 0;  // so far, as in its newest ViewerReport
 };
 
 /// Returns a sentence for --explain about which viewers get which of the `served` codecs.
 std::string explain_viewer_codecs(const std::vector<StrandCodecInfo>& served);
 
 /// Follows one viewer. If a predicting codec decodes too slowly, the viewer goes to the fallback, unless it
-/// asked for that codec. It is chosen anew only when another solver or another number of substeps is
-/// simulated, or when the viewer has become able to predict.
+/// asked for that codec; also if its states are other ones than the server's. It is chosen anew only when
+/// another solver or another number of substeps is simulated, or when the viewer has become able to predict.
 class ViewerCodecWatch {
  public:
   /// Starts with the choice that was made when the viewer joined, and its facts.
@@ -78,10 +83,14 @@ class ViewerCodecWatch {
 
  private:
   bool is_too_slow(const DecodeLoad& load, int64_t time_ns);
+  bool is_wrong(const DecodeLoad& load, int64_t time_ns);
 
   ViewerCodecFacts facts_;
   size_t codec_;
   std::optional<int64_t> slow_since_ns_;
+  uint32_t wrong_seen_ = 0;    // states so far
+  uint32_t wrong_before_ = 0;  // of these, not counted any more
+  int64_t wrong_until_ns_ = 0;
   int64_t settled_ns_ = 0;  // reports from then on are of what is simulated now
 };
 

@@ -79,6 +79,7 @@ TEST_F(StrandReplayTest, ALostFrameIsAGapAndAsksOnceASecond) {
   EXPECT_EQ(replay_->stats().gaps, 1u);
   EXPECT_EQ(replay_->stats().missed_frames, 1u);
   EXPECT_EQ(replay_->stats().rejected_frames, 10u);
+  EXPECT_EQ(replay_->stats().wrong_states, 0u);
   EXPECT_EQ(requests_, 2) << "at 0 and at 1.05 s of 1.35 s";
   ASSERT_TRUE(receive(encoder_->encode_for_join(truth_).keyframe));
   ASSERT_TRUE(receive(next()));
@@ -96,6 +97,27 @@ TEST_F(StrandReplayTest, AMalformedFrameChangesNothing) {
   EXPECT_EQ(requests_, 1);
   ASSERT_TRUE(receive(good)) << "the chain goes on where it was";
   EXPECT_EQ(state_hash(*replay_->newest()), state_hash(truth_));
+}
+
+// Whoever computes other states than the server's says how often; what follows a refused frame tells nothing.
+TEST_F(StrandReplayTest, CountsStatesThatAreNotTheServers) {
+  constexpr size_t kHashByte = 32 + 88;  // proto/WIRE.md: header, then the fixed part
+  const auto receive_wrong = [&](const EncodedFramePtr& frame) {
+    auto wrong = frame->message;
+    wrong[kHashByte] ^= std::byte{1};
+    EXPECT_EQ(replay_->receive(wrong, 0, clock_), nullptr);
+  };
+  receive(next());
+  receive_wrong(next());
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(receive(next()), nullptr);
+  EXPECT_EQ(replay_->stats().wrong_states, 1u);
+  EXPECT_THAT(replay_->stats().last_error, testing::Not(testing::IsEmpty()));
+  receive_wrong(encoder_->encode_for_join(truth_).keyframe);
+  EXPECT_EQ(replay_->stats().wrong_states, 2u);
+  ASSERT_TRUE(receive(encoder_->encode_for_join(truth_).keyframe));
+  ASSERT_TRUE(receive(next()));
+  receive_wrong(next());
+  EXPECT_EQ(replay_->stats().wrong_states, 3u);
 }
 
 TEST_F(StrandReplayTest, RefusesAnUnknownCodec) {

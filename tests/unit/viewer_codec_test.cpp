@@ -171,6 +171,28 @@ TEST(ViewerCodecWatch, WhoDecodesTooSlowlyForLongGetsTheFallback) {
             "plain: oracle takes 15.0 ms a state here, 90 % of the time between two; 60 % may be");
 }
 
+// One wrong state may be a fault that passes; a second soon after is how this machine computes.
+TEST(ViewerCodecWatch, WhoseStatesAreWrongTwiceInARowGetsTheFallback) {
+  const auto look = [](ViewerCodecWatch& watch, uint32_t wrong_states, int64_t time_ns) {
+    ViewerCodecFacts facts = able_viewer();
+    facts.wish = "oracle";
+    return watch.look(predicting_and_plain(), facts,
+                      {.decode_ms = 1.0, .states_hz = 60.0, .wrong_states = wrong_states}, time_ns);
+  };
+  ViewerCodecWatch rare(able_viewer(), kPredicting);
+  for (uint32_t i = 0; i < 10; ++i) EXPECT_FALSE(look(rare, i, i * (kWrongStatesNs + kSInNs)));
+
+  ViewerCodecWatch wrong(able_viewer(), kPredicting);
+  EXPECT_FALSE(look(wrong, 0, 0));
+  EXPECT_FALSE(look(wrong, 1, 20 * kSInNs));
+  EXPECT_FALSE(look(wrong, 1, 21 * kSInNs)) << "the same one";
+  const auto chosen = look(wrong, 2, 20 * kSInNs + kWrongStatesNs - 1);
+  ASSERT_TRUE(chosen);
+  EXPECT_EQ(chosen->codec, kFallback);
+  EXPECT_EQ(chosen->reason, "plain: by oracle this viewer's states are not the server's");
+  EXPECT_FALSE(look(wrong, 900, 60 * kSInNs)) << "told once";
+}
+
 // A moment is not for long, a viewer of pictures decodes no strands, and rarer states leave more time.
 TEST(ViewerCodecWatch, OnlyTimeInARowCounts) {
   ViewerCodecWatch watch(able_viewer(), kPredicting);

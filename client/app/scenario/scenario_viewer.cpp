@@ -93,6 +93,7 @@ void ScenarioViewer::run(LiveConnection& live) {
     ViewerReport report;
     report.decode_ms = std::min(live.session().replay().decode_timer().median_ms(), kMaxReportedMs);
     report.picture_decode_ms = std::min(live.session().picture_decode_timer().median_ms(), kMaxReportedMs);
+    report.wrong_states = static_cast<uint32_t>(live.session().replay().stats().wrong_states);
     report.draw_ms = view_.draw_ms;
     report.device = device_of(view_.draws);
     // One that is lost is followed by the next.

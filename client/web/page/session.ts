@@ -318,6 +318,8 @@ class Connection {
   private assetPayload?: Uint8Array;
   private strandStream = -1;
   private lastSequence = 0;
+  private decodedSequence = -1; // of this stream's strands
+  private wrongStates = 0; // since the welcome, as in a ViewerReport
   private hasState = false;
   private isStateFresh = false;
   private stateHash = 0n;
@@ -575,18 +577,24 @@ class Connection {
     // The module that can decode its keyframe is on its way, and a session of its own follows.
     if (this.net.changesModule) return;
     if (isOther && !isKeyframe) return this.reject(new Error(`delta ${header.sequence} is of stream ${header.streamId}`));
-    if (isOther) this.lastSequence = 0;
+    if (isOther) {
+      this.lastSequence = 0;
+      this.decodedSequence = -1;
+    }
     if (this.lastSequence && header.sequence > this.lastSequence + 1)
       this.figures.missedFrames += header.sequence - this.lastSequence - 1;
     this.lastSequence = header.sequence;
+    const hasBase = isKeyframe || (!isOther && header.sequence === this.decodedSequence + 1);
     const isNext = this.next !== undefined && isKeyframe && isOther;
     const begin = performance.now();
     try {
       (isNext ? this.next! : this.now!).decode(message);
     } catch (error) {
       if (this.net.changesCore(error as Error)) return;
+      if (hasBase) ++this.wrongStates;
       return this.reject(error as Error);
     }
+    this.decodedSequence = header.sequence;
     this.acknowledge(header, received);
     if (isNext) this.beginNext();
     this.strandMs.add(performance.now() - begin);
@@ -699,7 +707,7 @@ class Connection {
       viewer_report: {
         decode_ms: Math.min(this.strandMs.median, 60_000), draw_ms: Math.min(drawMs, 60_000),
         picture_decode_ms: Math.min(this.pictureMs.median, 60_000), shown_hz: Math.min(shownHz, 1000), device,
-        step_ns: this.net.stepNs,
+        step_ns: this.net.stepNs, wrong_states: this.wrongStates,
       },
     });
   }

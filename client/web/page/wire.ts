@@ -40,7 +40,7 @@ export const SetParameter = { assignment: [1, 'string'] } as const;
 export const AdminCommand = { action: [1, 'enum'], session: [2, 'uint64'], ban_s: [3, 'double'] } as const;
 export const ViewerReport = {
   decode_ms: [1, 'double'], draw_ms: [2, 'double'], picture_decode_ms: [3, 'double'], shown_hz: [4, 'double'],
-  device: [5, 'enum'], hair_px: [6, 'double'], step_ns: [7, 'double'],
+  device: [5, 'enum'], hair_px: [6, 'double'], step_ns: [7, 'double'], wrong_states: [8, 'uint32'],
 } as const;
 export const ModeRequest = { mode: [1, 'enum'] } as const;
 export const SceneRequest = {} as const;
