@@ -137,13 +137,16 @@ class FreedParser : public LiveParser {
     const int64_t passed_ns = arrival_ns - window_->begin_ns;
     if (passed_ns < kCountWindowNs) return;
     const double said_hz = count_->begin.rate.hz();
-    const double hz = (frame - window_->begin) / (static_cast<double>(passed_ns) * kSPerNs);
+    const double hz =
+        (static_cast<double>(frame) - window_->begin) / (static_cast<double>(passed_ns) * kSPerNs);
     const auto differ = [](double a, double b) { return std::abs(a - b) > kOtherRate * b; };
     const bool is_other = hz > 0.0 && differ(hz, said_hz) && !differ(window_->hz_before, hz);
+    const double mean_hz = 0.5 * (hz + window_->hz_before);
     window_ = CountWindow{frame, arrival_ns, hz};
     if (!is_other || std::exchange(has_told_rate_, true)) return;
-    notes_.push_back(fmt::format("the spare word counts about {:.0f} frames a second, and --mocap-timecode says {}",
-                                 hz, frame_rate_text(said_hz)));
+    notes_.push_back(
+        fmt::format("the spare word counts about {:.0f} frames a second, and --mocap-timecode says {}",
+                    mean_hz, frame_rate_text(said_hz)));
   }
 
   FreedPose last_pose() const {
