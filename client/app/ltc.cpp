@@ -1,6 +1,7 @@
 #include "client/app/ltc.h"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -37,6 +38,7 @@ constexpr uint32_t kSettledPairs = 10;   // after which it is known how late sou
 constexpr double kSpeeds[] = {1.0, 2.0, 0.5};
 constexpr double kClockError = 5e-4;       // of who made sound, at most
 constexpr double kClockDrift = 1e-3;       // of who plays sound, at most
+constexpr double kOverS = 0.1;             // behind the last word: sound has ended
 constexpr double kHeldUpS = 0.5;           // of sound that comes: it was held up
 constexpr int64_t kSilentNs = 5 * kSInNs;  // without timecode, until that is said
 
@@ -56,6 +58,12 @@ uint32_t value_of(const std::array<bool, kWordBits>& bits, size_t begin, size_t 
 
 constexpr size_t kDropAt = 10;
 
+/// Nothing for what is no time of day.
+std::optional<Timecode> counted_as(const FrameRate& fps, const TimecodeFields& fields, bool has_drop_flag) {
+  const auto timecode = make_timecode(fields, fps, has_drop_flag && is_timecode_rate(fps, true));
+  return timecode ? std::optional(*timecode) : std::nullopt;
+}
+
 std::optional<Timecode> timecode_of_word(const std::array<bool, kWordBits>& bits, const FrameRate& fps) {
   constexpr size_t kSyncAt = 64;
   constexpr uint32_t kSync = 0xBFFC;  // 0011 1111 1111 1101, the first bit lowest
@@ -65,8 +73,7 @@ std::optional<Timecode> timecode_of_word(const std::array<bool, kWordBits>& bits
   };
   const TimecodeFields fields{two_digits(48, 56, 2), two_digits(32, 40, 3), two_digits(16, 24, 3),
                               two_digits(0, 8, 2)};
-  const auto timecode = make_timecode(fields, fps, bits[kDropAt] && is_timecode_rate(fps, true));
-  return timecode ? std::optional(*timecode) : std::nullopt;
+  return counted_as(fps, fields, bits[kDropAt]);
 }
 
 }  // namespace
@@ -243,12 +250,12 @@ std::string count_text(const Timecode& timecode) {
 
 using LtcFrames = std::vector<LtcFrame>;
 
-Result<LtcFrames> frames_of_file(const std::string& path, const FrameRate& fps, double speed) {
+Result<LtcFrames> frames_of_file(const std::string& path, double speed) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return at(path, make_error(ErrorCode::NotFound, "cannot be read"));
   auto reader = WavReader::open(file);
   if (!reader) return at(path, reader.error());
-  LtcDecoder decoder(reader->sample_rate_hz(), fps, speed);
+  LtcDecoder decoder(reader->sample_rate_hz(), kMostFrames, speed);
   LtcFrames frames;
   std::vector<float> samples(kChunkSamples);
   while (const size_t count = reader->read(samples))
@@ -261,12 +268,9 @@ Result<LtcFrames> frames_of_file(const std::string& path, const FrameRate& fps, 
 Result<TimecodeAt> read_ltc_file(const std::string& path, const std::optional<FrameRate>& fps,
                                  const LtcListener& listener) {
   LtcFrames counted;
-  double speed = 1.0;
-  for (const double tried : kSpeeds) {
-    ASSIGN_OR_RETURN(LtcFrames frames, frames_of_file(path, kMostFrames, tried));
-    if (frames.size() <= counted.size()) continue;
-    counted = std::move(frames);
-    speed = tried;
+  for (const double speed : kSpeeds) {
+    ASSIGN_OR_RETURN(LtcFrames frames, frames_of_file(path, speed));
+    if (frames.size() > counted.size()) counted = std::move(frames);
   }
   if (counted.empty())
     return at(path, make_error(ErrorCode::BadInput,
@@ -276,10 +280,22 @@ Result<TimecodeAt> read_ltc_file(const std::string& path, const std::optional<Fr
   if (fps && is_other_rate(meter, *fps))
     return at(path, make_error(ErrorCode::BadInput, "{}", other_rate_text(meter, *fps)));
   const FrameRate rate = fps ? *fps : meter.pair_count() > 0 ? meter.rate() : counted.front().timecode.rate;
-  ASSIGN_OR_RETURN(LtcFrames read, frames_of_file(path, rate, speed));
-  const auto frames = std::make_shared<const LtcFrames>(std::move(read));
+  LtcFrames kept;
+  for (LtcFrame& frame : counted) {
+    const auto timecode = counted_as(rate, fields_of(frame.timecode), frame.has_drop_flag);
+    if (!timecode) continue;
+    frame.timecode = *timecode;
+    kept.push_back(frame);
+  }
+  if (kept.empty()) return at(path, make_error(ErrorCode::BadInput, "{}", other_rate_text(meter, rate)));
+  const auto frames = std::make_shared<const LtcFrames>(std::move(kept));
   listener(fmt::format("{}: timecode from {} on", path, count_text(frames->front().timecode)));
-  return TimecodeAt([frames](double time_s) -> std::optional<Timecode> {
+  const auto was_over = std::make_shared<std::atomic<bool>>(false);
+  return TimecodeAt([frames, was_over, path, listener](double time_s) -> std::optional<Timecode> {
+    const LtcFrame& last = frames->back();
+    if (time_s > last.end_s + kOverS && !was_over->exchange(true))
+      listener(fmt::format("{}: its timecode ends at {}, and is counted on from there", path,
+                           timecode_text(last.timecode)));
     const auto later = std::upper_bound(frames->begin(), frames->end(), time_s,
                                         [](double t_s, const LtcFrame& frame) { return t_s < frame.end_s; });
     if (later == frames->begin()) return std::nullopt;
@@ -318,6 +334,7 @@ class LiveLtc {
                               frame_rate_text(fps_.value_or(meter.rate()).hz())));
       if (!fps_) decoder.set_fps(meter.rate());
     }
+    end();
   }
 
   std::optional<Timecode> now() {
@@ -325,7 +342,7 @@ class LiveLtc {
     if (!frame_ && now_ns() - begin_ns_ > kSilentNs && !std::exchange(was_silent_, true))
       listener_("standard input: no timecode yet in the first channel of the sound");
     const int64_t passed_ns = now_ns() - end_ns_;
-    if (!frame_ || passed_ns > kLiveStaleNs) return std::nullopt;
+    if (!frame_ || (!has_ended_ && passed_ns > kLiveStaleNs)) return std::nullopt;
     return frame_->after(static_cast<double>(passed_ns) * kSPerNs);
   }
 
@@ -345,12 +362,22 @@ class LiveLtc {
     frame_ = frame;
   }
 
+  /// What played when sound ended goes on.
+  void end() {
+    const std::lock_guard lock(mutex_);
+    has_ended_ = frame_ && now_ns() - end_ns_ <= kLiveStaleNs;
+    if (has_ended_)
+      listener_(fmt::format("standard input: the sound has ended at {}, and its timecode is counted on",
+                            timecode_text(frame_->timecode)));
+  }
+
   WavReader reader_;
   const std::optional<FrameRate> fps_;
   const LtcListener listener_;
   const int64_t begin_ns_ = now_ns();
   std::mutex mutex_;  // guards the block below
   bool was_silent_ = false;
+  bool has_ended_ = false;
   std::optional<LtcFrame> frame_;
   int64_t end_ns_ = 0;  // of its word
   // Of the reading thread.

@@ -22,19 +22,6 @@ const auto& at_time(const Items& items, int64_t time_ns) {
 
 }  // namespace
 
-TimecodeTrack recorded_timecodes(const std::filesystem::path& path) {
-  TimecodeTrack track;
-  const auto messages = RecordingReader::open(path, RecordedPart::Messages);
-  while (messages) {
-    const auto item = (*messages)->next();
-    if (!item || !*item) break;
-    const auto* message = std::get_if<RecordedMessage>(&(*item)->what);
-    const auto* state = message != nullptr ? std::get_if<RecordedState>(message) : nullptr;
-    if (state != nullptr && state->timecode) track.add(state->sim_time_ns, *state->timecode);
-  }
-  return track;
-}
-
 Result<std::unique_ptr<RecordedStates>> RecordedStates::open(const std::filesystem::path& path) {
   ASSIGN_OR_RETURN(auto reader, RecordingReader::open(path, RecordedPart::Frames));
   ASSIGN_OR_RETURN(SceneAsset asset, reader->asset());

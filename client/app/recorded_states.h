@@ -15,9 +15,6 @@
 
 namespace strandcast {
 
-/// Reads the timecodes of a recording's states, as far as they can be read.
-TimecodeTrack recorded_timecodes(const std::filesystem::path& path);
-
 class RecordedStates : public ExportSource {
  public:
   /// Opens a recording. Returns the errors of RecordingReader::open(), and errors for an unknown scene or

@@ -5,7 +5,7 @@
 #include <iostream>
 
 #include "client/app/ctl_commands.h"
-#include "client/app/recorded_states.h"
+#include "client/export/timecode_track.h"
 #include "common/base/units.h"
 #include "common/record/recording_check.h"
 #include "common/record/recording_reader.h"
@@ -85,6 +85,23 @@ void print_contents(const RecordingContents& contents, const RecordingInfo& info
                            "schemas and indexes");
 }
 
+struct RecordedCounts {
+  std::optional<uint64_t> first_tick;
+  TimecodeTrack timecodes;
+};
+
+/// Of all states, as far as they can be read.
+RecordedCounts read_counts(RecordingReader& reader) {
+  RecordedCounts counts;
+  for (auto item = reader.next(); item && *item; item = reader.next()) {
+    const auto* state = std::get_if<RecordedState>(&std::get<RecordedMessage>((*item)->what));
+    if (state == nullptr) continue;
+    if (!counts.first_tick) counts.first_tick = state->tick;
+    if (state->timecode) counts.timecodes.add(state->sim_time_ns, *state->timecode);
+  }
+  return counts;
+}
+
 }  // namespace
 
 int run_recording_info(const std::filesystem::path& path) {
@@ -99,11 +116,12 @@ int run_recording_info(const std::filesystem::path& path) {
   print_line("recorded", fmt::format("{} by {} {}, {:.1f} s of simulation", date_text(start.unix_time_ns),
                                      "strandcast-server", start.server_version,
                                      static_cast<double>(length_ns) / kNsPerS));
-  if (const auto tick = first_recorded_tick(path); tick && *tick > 0)
-    print_line("began",
-               fmt::format("at step {}, while the simulation ran: --replay cannot simulate it again", *tick));
+  const RecordedCounts counts = read_counts(**reader);
+  if (counts.first_tick.value_or(0) > 0)
+    print_line("began", fmt::format("at step {}, while the simulation ran: --replay cannot simulate it again",
+                                    *counts.first_tick));
   if (const std::string take = take_text(start.slate, start.take); !take.empty()) print_line("take", take);
-  if (const std::string timecode = recorded_timecodes(path).text(); !timecode.empty())
+  if (const std::string timecode = counts.timecodes.text(); !timecode.empty())
     print_line("timecode", timecode);
   print_line("simulated", start.sim_device_name);
   if (scene)

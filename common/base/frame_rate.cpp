@@ -54,6 +54,14 @@ std::optional<Decimal> read_decimal(std::string_view text) {
   return number;
 }
 
+/// The number before what a rate of cameras has behind it: "df", "nd" or "ndf". Empty for all else.
+std::string_view counted_rate(std::string_view text) {
+  for (const std::string_view ending : {"ndf", "nd", "df"})
+    if (text.ends_with(ending) && read_decimal(text.substr(0, text.size() - ending.size())))
+      return text.substr(0, text.size() - ending.size());
+  return {};
+}
+
 /// Of numbers above 0.
 std::optional<FrameRate> quotient_of(const Decimal& first, const Decimal& second) {
   const int64_t across = std::gcd(first.count, second.count), below = std::gcd(first.in_one, second.in_one);
@@ -70,6 +78,12 @@ std::optional<FrameRate> quotient_of(const Decimal& first, const Decimal& second
 Result<FrameRate> parse_frame_rate(std::string_view text, double least, double most) {
   const std::string shown = excerpt(std::string(text), kMaxShownRateChars);
   const auto no_rate = [&] {
+    if (const std::string_view counted = counted_rate(text); !counted.empty())
+      return make_error(
+          ErrorCode::BadInput,
+          "'{}' is no rate: write {}; a timecode's ; counts drop-frame (01:00:00;00), and its : "
+          "does not",
+          shown, counted);
     return make_error(ErrorCode::BadInput, "'{}' is no rate: write 24, 23.976 or 24000/1001", shown);
   };
   const size_t slash = text.find('/');

@@ -419,6 +419,7 @@ Scenario ScenarioReader::read(const Part& file) const {
   scenario.about = file.text("about", "", kMaxTextBytes);
   scenario.limit_s = file.number("limit_s", scenario.limit_s, kLimit);
   scenario.repeat = file.count("repeat", 1, kRepeat);
+  bool records = false;  // the server that was started
   const int count = file.size("do");
   if (static_cast<size_t>(count) > kMaxScenarioActions)
     file.fail("do", fmt::format("has {} entries, the limit is {}", count, kMaxScenarioActions));
@@ -426,6 +427,13 @@ Scenario ScenarioReader::read(const Part& file) const {
     ScenarioAction action = read_action(file.element("do", i));
     if (action.line < 0) file.fail("do", fmt::format("number {} says nothing to do", i + 1), i);
     action.line = file.line("do", i);
+    if (std::holds_alternative<ScenarioDisk>(action.work) && !records)
+      file.fail("do",
+                fmt::format("number {} is about a disk that nothing is written to: begin with start "
+                            "{{ record: true }}",
+                            i + 1),
+                i);
+    if (const auto* start = std::get_if<ScenarioStart>(&action.work)) records = start->records;
     scenario.actions.push_back(std::move(action));
   }
   return scenario;

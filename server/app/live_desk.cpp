@@ -11,7 +11,6 @@
 namespace strandcast {
 namespace {
 
-constexpr LogLimits kLiveLines{20, 120, 60'000'000'000};
 constexpr LogLimits kRefusalLines{1, 30, 60'000'000'000};
 constexpr size_t kMaxShownChars = 100;
 
@@ -73,7 +72,7 @@ Result<std::vector<std::string>> explain_live(const std::vector<LiveDesc>& live,
 LiveDesk::LiveDesk(std::vector<Target> targets, std::vector<Input> inputs)
     : targets_(std::move(targets)),
       inputs_(std::move(inputs)),
-      lines_(kLiveLines),
+      lines_(RepeatLimits()),
       refusal_lines_(kRefusalLines),
       troubles_(inputs_.size()) {}
 
@@ -203,9 +202,11 @@ bool LiveDesk::on_bytes(size_t socket, const std::string& sender, std::span<cons
 void LiveDesk::on_refused(size_t socket, const std::string& sender, const std::string& remedy) {
   const std::lock_guard lock(mutex_);
   for_socket(socket, [](const Input& input) { input.source->refuse(); });
-  write(refusal_lines_, address_of(sender),
-        {true, fmt::format("{}: {} may not send: {}", first_of(socket).describe(), sender, remedy)},
-        now_ns());
+  const LogBudget::Verdict verdict = refusal_lines_.take(address_of(sender), now_ns());
+  if (verdict.left_out > 0)
+    log_warn("mocap", "{} lines about others that may not send were left out", verdict.left_out);
+  if (verdict.is_written)
+    log_warn("mocap", "{}: {} may not send: {}", first_of(socket).describe(), sender, remedy);
 }
 
 void LiveDesk::on_connection(size_t socket) {
@@ -220,10 +221,10 @@ void LiveDesk::on_no_connection(size_t socket, const std::string& why) {
   // Tried every few seconds, told once.
   if (std::exchange(troubles_[socket], why) == why) return;
   const std::string what = first_of(socket).describe();
-  write(lines_, what,
-        {true, fmt::format("{}: {}; tried again every {:g} s", what, one_line(why, kMaxShownChars),
-                           static_cast<double>(kLiveRetryMs) * 1e-3)},
-        now_ns());
+  write(what, {true,
+               fmt::format("{}: {}; tried again every {:g} s", what, one_line(why, kMaxShownChars),
+                           static_cast<double>(kLiveRetryMs) * 1e-3),
+               LiveNoteKind::Connection});
 }
 
 std::vector<std::byte> LiveDesk::greeting(size_t socket) {
@@ -243,6 +244,8 @@ bool LiveDesk::on_tick(int64_t now_ns) {
     pass_on(input, now_ns);
     is_active = is_active || input.source->is_active();
   }
+  for (const RepeatBudget::Sum& sum : lines_.take_sums(now_ns))
+    log_warn("mocap", "{} ({} more like it)", sum.newest, sum.count);
   return is_active;
 }
 
@@ -262,14 +265,14 @@ void LiveDesk::pass_on(const Input& input, int64_t now_ns) {
     if (target.listener.on_record)
       target.listener.on_record(*due.recording);
     else
-      write(lines_, name_of(input),
-            {true, fmt::format("{}: a sender wants to record: that needs --record-dir", name_of(input))},
-            now_ns);
+      write(name_of(input),
+            {true, fmt::format("{}: a sender wants to record: that needs --record-dir", name_of(input)),
+             LiveNoteKind::Recording});
   }
   if (due.has_ended) target.inputs->remove_source(input.id);
   for (LiveNote& note : input.source->take_notes()) {
     if (!target.head.empty()) note.text = fmt::format("{}: {}", target.head, note.text);
-    write(lines_, name_of(input), note, now_ns);
+    write(name_of(input), note);
   }
 }
 
@@ -279,10 +282,8 @@ std::string LiveDesk::name_of(const Input& input) const {
   return head.empty() ? input.source->describe() : fmt::format("{}: {}", head, input.source->describe());
 }
 
-void LiveDesk::write(LogBudget& budget, const std::string& key, const LiveNote& note, int64_t now_ns) {
-  const LogBudget::Verdict verdict = budget.take(key, now_ns);
-  if (verdict.left_out > 0) log_warn("mocap", "{} lines were left out", verdict.left_out);
-  if (!verdict.is_written) return;
+void LiveDesk::write(const std::string& name, const LiveNote& note) {
+  if (!lines_.take(fmt::format("{} {}", static_cast<int>(note.kind), name), note.text)) return;
   if (note.is_warning)
     log_warn("mocap", "{}", note.text);
   else

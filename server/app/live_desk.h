@@ -86,13 +86,13 @@ class LiveDesk : public LiveHandler {
   LiveSource& first_of(size_t socket) const;
   void pass_on(const Input& input, int64_t now_ns);
   std::string name_of(const Input& input) const;
-  void write(LogBudget& budget, const std::string& key, const LiveNote& note, int64_t now_ns);
+  void write(const std::string& name, const LiveNote& note);
   Notice choose_subject(const std::string& subject, size_t head);
 
   mutable std::mutex mutex_;  // guards what is in the sources
   const std::vector<Target> targets_;
   const std::vector<Input> inputs_;
-  LogBudget lines_;
+  RepeatBudget lines_;
   LogBudget refusal_lines_;
   std::vector<std::string> troubles_;  // of connections, as told last, by socket
   std::unique_ptr<LiveReceiver> receiver_;

@@ -78,4 +78,31 @@ LogBudget::Verdict LogBudget::take(const std::string& address, int64_t time_ns) 
   return verdict;
 }
 
+bool RepeatBudget::take(const std::string& kind, const std::string& line) {
+  Kind& one = kinds_[kind];
+  if (one.lines < limits_.lines_per_kind && lines_ < limits_.lines) {
+    ++one.lines;
+    ++lines_;
+    return true;
+  }
+  one.sum.newest = line;
+  ++one.sum.count;
+  return false;
+}
+
+std::vector<RepeatBudget::Sum> RepeatBudget::take_sums(int64_t time_ns) {
+  std::vector<Sum> sums;
+  if (time_ns < window_end_ns_) return sums;
+  window_end_ns_ = time_ns + limits_.window_ns;
+  lines_ = 0;
+  std::erase_if(kinds_, [](const auto& kind) { return kind.second.sum.count == 0; });
+  for (auto& [name, kind] : kinds_) {
+    sums.push_back(std::exchange(kind.sum, {}));
+    // What goes on is summed up, and not written again, until a window without it.
+    kind.lines = limits_.lines_per_kind;
+    ++lines_;
+  }
+  return sums;
+}
+
 }  // namespace strandcast

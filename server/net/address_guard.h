@@ -1,5 +1,6 @@
 // Limits of each address: connections, requests and wrong tokens (AddressGuard), and lines in the log
-// (LogBudget), in tables of bounded size. Plain logic without a clock; one thread.
+// (LogBudget), in tables of bounded size; and lines of each kind (RepeatBudget). Plain logic without a clock;
+// one thread.
 #pragma once
 
 #include <cstdint>
@@ -81,6 +82,39 @@ class LogBudget {
   uint32_t lines_ = 0;  // written in this window
   uint64_t left_out_ = 0;
   std::map<std::string, uint32_t> lines_of_;
+};
+
+struct RepeatLimits {
+  uint32_t lines_per_kind = 4;  // in a window
+  uint32_t lines = 20;
+  int64_t window_ns = 10'000'000'000;
+};
+
+/// How many lines that come again and again go into the log: a few of each kind, then sums of them. The
+/// caller's kinds are few.
+class RepeatBudget {
+ public:
+  explicit RepeatBudget(const RepeatLimits& limits) : limits_(limits) {}
+
+  /// The lines of a kind that were not written.
+  struct Sum {
+    std::string newest;
+    uint64_t count = 0;
+  };
+  /// Returns whether a line is written; else it is counted.
+  bool take(const std::string& kind, const std::string& line);
+  /// Returns at the end of each window what was counted; call it now and then.
+  std::vector<Sum> take_sums(int64_t time_ns);
+
+ private:
+  struct Kind {
+    uint32_t lines = 0;  // written in this window
+    Sum sum;
+  };
+  const RepeatLimits limits_;
+  int64_t window_end_ns_ = 0;
+  uint32_t lines_ = 0;  // written in this window
+  std::map<std::string, Kind> kinds_;
 };
 
 }  // namespace strandcast

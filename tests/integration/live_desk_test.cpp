@@ -164,6 +164,27 @@ TEST_F(LiveDesks, MotiveIsAskedAndAloneMayAnswer) {
   EXPECT_EQ(log.count("127.0.0.9 alone was asked"), 1u) << "once, however often";
 }
 
+TEST_F(LiveDesks, WhatIsMalformedHidesNothingElseAndIsSummedUp) {
+  test::LogCapture log;
+  const uint16_t port = test::free_udp_port();
+  if (!open({.protocol = "opentrack", .port = port})) return;
+  UdpSocket broken, tracker;
+  for (uint64_t sent = 1; sent <= 100; ++sent) {
+    broken.send(test::PacketBytes(5), port);
+    ASSERT_TRUE(eventually([&] { return status().malformed == sent; }));
+  }
+  EXPECT_TRUE(eventually([&] {
+    tracker.send(test::opentrack({10, 0, 0, 0, 0, 0}), port);
+    std::this_thread::sleep_for(std::chrono::milliseconds(4));
+    return is_head_at({0.1, 0.0, 0.0});
+  }));
+  EXPECT_EQ(log.count(tracker.name() + " sends"), 1u);
+  EXPECT_EQ(log.count("malformed packet"), 4u);
+  (void)desk_->on_tick(now_ns() + 10 * kSInNs);
+  EXPECT_EQ(log.count("malformed packet"), 5u);
+  EXPECT_EQ(log.count("(96 more like it)"), 1u);
+}
+
 TEST_F(LiveDesks, WhoIsNotAllowedIsNotRead) {
   // This machine's own address in the network counts as a stranger's.
   const std::string address = test::own_network_address();

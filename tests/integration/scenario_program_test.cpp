@@ -88,20 +88,34 @@ TEST_F(ScenarioProgram, RunsAFolderAtTheSameTimeWithTheLinesOfEachTogether) {
   EXPECT_THAT(text_of("said"), HasSubstr("one scenario at a time"));
 }
 
-TEST_F(ScenarioProgram, WatchesItsFile) {
+TEST_F(ScenarioProgram, WatchesWhatItReadsAndTheServersProgram) {
+  const auto server = write("server", "#!/bin/sh\nexec " STRANDCAST_SERVER_PROGRAM " \"$@\"\n");
+  std::filesystem::permissions(server, std::filesystem::perms::owner_all);
   const auto path = write("mine.textproto", std::string("name: \"mine\"\n") + kStart +
                                                 "do { step: 3 }\ndo { expect { hash: \"1\" } }\n");
   test::ChildProcess program(STRANDCAST_CTL_PROGRAM,
-                             {"test", "--scenario", path.string(), "--watch", "--server",
-                              STRANDCAST_SERVER_PROGRAM, "--out", (folder_.path() / "out").string()},
+                             {"test", "--scenario", path.string(), "--watch", "--server", server.string(),
+                              "--out", (folder_.path() / "out").string()},
                              folder_.path() / "said");
   const auto says = [&](const char* what) { return text_of("said").find(what) != std::string::npos; };
   ASSERT_TRUE(eventually([&] { return says("waiting for a change"); })) << text_of("said");
   EXPECT_TRUE(says("mine: 0 of 1 checks hold"));
-  write("mine.textproto", std::string("name: \"mine\"\n") + kStart +
-                              "do { step: 3 }\n"
-                              "do { expect { no_quarantine: true } }\n");
+  write("scene.textproto", "groom { procedural { strand_count: 20 } }\n");
+  write("mine.textproto",
+        "name: \"mine\"\ndo { start { scene: \"scene.textproto\" lockstep: true } }\n"
+        "do { step: 3 }\ndo { expect { no_quarantine: true } }\n");
   EXPECT_TRUE(eventually([&] { return says("mine: 2 of 2 checks hold"); })) << text_of("said");
+  const auto rounds = [&] {
+    const std::string said = text_of("said"), end = "waiting for a change";
+    size_t count = 0;
+    for (size_t at = said.find(end); at != std::string::npos; at = said.find(end, at + 1)) ++count;
+    return count;
+  };
+  ASSERT_TRUE(eventually([&] { return rounds() == 2; })) << text_of("said");
+  std::filesystem::last_write_time(server, std::filesystem::file_time_type::clock::now());
+  EXPECT_TRUE(eventually([&] { return rounds() == 3; })) << text_of("said");
+  write("scene.textproto", "groom { procedural { strand_count: 30 } }\n");
+  EXPECT_TRUE(eventually([&] { return rounds() == 4; })) << text_of("said");
   program.send_signal(SIGTERM);
   EXPECT_EQ(program.wait(), 0) << "the last round holds";
 }
@@ -254,6 +268,17 @@ TEST_F(ScenarioProgram, WhatIsWrongWithALineIsSeen) {
             HasSubstr("FAIL  line 8    frames per second of a: measured 0.0, wanted above 0, it sees"),
             HasSubstr("ok    line 10   a comes back: wanted within 5 s, was back after"),
             HasSubstr("FAIL  line 11"), HasSubstr("relay: true")));
+}
+
+// In lockstep nothing goes by itself: what is then asked about states would be told wrongly.
+TEST_F(ScenarioProgram, WaitingInLockstepMeasuresNoStates) {
+  const std::string begin = std::string("name: \"waits\"\n") + kStart +
+                            "do { view { name: \"a\" } } do { step: 6 } do { run_s: 0.2 }\n";
+  const auto wrong = write("wrong.textproto", begin + "do { expect { realtime_below: 0.5 } }\n");
+  EXPECT_EQ(run({"--scenario", wrong.string()}), 1) << text_of("said");
+  EXPECT_THAT(text_of("said"), HasSubstr("in lockstep run_s only waits, and step goes on"));
+  const auto right = write("right.textproto", begin + "do { expect { cpu_share_below: 9 } }\n");
+  EXPECT_EQ(run({"--scenario", right.string()}), 0) << text_of("said");
 }
 
 // What is needed for the rest is not there: the rest is not done, and the limit ends what would take for

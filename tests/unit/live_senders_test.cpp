@@ -523,6 +523,50 @@ TEST(LiveSenders, OfTwoOfOneNameTheFirstIsUsed) {
   EXPECT_EQ(vmc.count("two subjects are called head"), 1u);
 }
 
+// Nothing says where a frame of VMC ends. A frame that lacks a bone is told when the next one begins, as of
+// its own time; and a datagram of two frames tells the newer.
+TEST(LiveSenders, AFrameOfVmcThatLacksABoneIsNoSecondSubject) {
+  const auto swaying_body = [](const test::Quad& head_turn) {
+    Stage stage({.protocol = "vmc"});
+    for (int i = 0; i < 450; ++i) {
+      const double t_s = i / 90.0;
+      const auto frame_at = [&](double at_s) {
+        const auto x_m = static_cast<float>(0.3 * std::sin(std::numbers::pi * at_s));
+        return std::vector<PacketBytes>{test::vmc_bone("Hips", {x_m, 0.9f, 0}, {0, 0, 0, 1}),
+                                        test::vmc_bone("Head", {0, 0.7f, 0}, head_turn)};
+      };
+      std::vector<PacketBytes> bundle = {test::osc("/VMC/Ext/T", {static_cast<float>(t_s)})};
+      for (const double before_s : {0.5 / 90.0, 0.0})
+        if (before_s == 0.0 || i % 7 == 0)
+          for (PacketBytes& bone : frame_at(t_s - before_s)) bundle.push_back(std::move(bone));
+      if (i % 3 > 0) bundle.push_back(test::vmc_bone("UpperChest", {0, 0, 0}, {0, 0, 0, 1}));
+      stage.send(test::osc_bundle(bundle), kStart + static_cast<int64_t>(t_s * kNsPerS));
+    }
+    return stage;
+  };
+  const Stage whole = swaying_body({0, 0, 0, 1});
+  EXPECT_EQ(whole.count("two subjects"), 0u);
+  EXPECT_EQ(whole.source->status(kStart).late, 0u);
+  EXPECT_LE(whole.fastest_mps(), 2.0 * kMostSwayMps);
+  for (size_t i = 60; i < whole.steps.size(); ++i) EXPECT_FALSE(whole.steps[i].has_teleported) << i;
+  const Stage zeroed = swaying_body({0, 0, 0, 0});
+  EXPECT_EQ(zeroed.count("two subjects"), 0u);
+  EXPECT_EQ(zeroed.count("no head's pose"), 1u);
+}
+
+// Whose packets come in by the port of another protocol hears which option takes them.
+TEST(LiveSenders, OscForAnotherPortIsKnown) {
+  Stage vmc({.protocol = "vmc"}), vrchat({.protocol = "vrchat"});
+  for (int i = 0; i < 100; ++i) {
+    vmc.send(test::vrchat({0, 1.6f, 0}, {0, 0, 0}), kStart + i * 10 * kMsInNs);
+    vrchat.send(test::vmc_head({0, 1.6f, 0}, {0, 0, 0, 1}, 0.01f * static_cast<float>(i)),
+                kStart + i * 10 * kMsInNs);
+  }
+  EXPECT_EQ(vmc.count("VRChat's OSC: --mocap vrchat:PORT takes them"), 1u);
+  EXPECT_EQ(vrchat.count("as VMC: --mocap vmc:PORT takes it"), 1u);
+  for (Stage* stage : {&vmc, &vrchat}) EXPECT_EQ(stage->notes.size(), 1u);
+}
+
 // ---- damage
 
 /// A right packet of a protocol, numbered, of a head near (0, 1.6, 0).

@@ -382,6 +382,13 @@ TEST(LiveSource, WishesToRecordComeFromWhoeverMaySendAndOneByOne) {
   EXPECT_EQ(source->advance(now_ns).recording,
             (RecordCommand{true, {}, std::string(kMaxSlateChars, 'x'), 0}));
   now_ns += 10 * kRecordPauseNs;
+  (void)source->take_notes();
+  EXPECT_TRUE(source->take(
+      kSecond, test::osc("/strandcast/record/start", {std::string("12A"), int32_t{12'345}}), now_ns));
+  EXPECT_EQ(source->advance(now_ns).recording, (RecordCommand{true, {}, "12A", kMaxTake}));
+  EXPECT_THAT(texts(source->take_notes()),
+              testing::ElementsAre(HasSubstr("take 12345: takes go up to 9999")));
+  now_ns += 10 * kRecordPauseNs;
   for (const auto& packet : {test::osc("/strandcast/record/pause", {}), test::osc("/strandcast/record/", {}),
                              test::osc("/strandcast/record/start", {1.0f})})
     (void)source->take(kFirst, packet, now_ns);

@@ -3,6 +3,7 @@
 // its crown points.
 #include <cmath>
 
+#include "common/base/units.h"
 #include "common/motion/mocap_packet.h"
 #include "server/input/live/live_parser.h"
 #include "tests/support/live_packets.h"
@@ -161,6 +162,9 @@ TEST(FreedParser, TheSpareWordCountsFramesWhereItIsSaid) {
   EXPECT_EQ(timecode_of(*parser, 65'534), at({0, 43, 41, 9})) << "one that was late";
   EXPECT_EQ(timecode_of(*live_parser_of("freed", "/29.97df"), 1800),
             make_timecode({0, 1, 0, 2}, {30'000, 1001}, true).value());
+  for (const char* count : {"/29.97", "/29.97nd", "/29.97ndf"})
+    EXPECT_EQ(timecode_of(*live_parser_of("freed", count), 1800),
+              make_timecode({0, 1, 0, 0}, {30'000, 1001}, false).value());
   // Four bits beside an aperture of F2.8, as Z CAM documents it: 0x118 below a sequence number.
   const auto beside_aperture = live_parser_of("freed", "/25:12-15");
   for (const auto& [spare, frame] : {std::pair{0xE118, 14u}, {0xF118, 15u}, {0x0118, 16u}, {0x5FFF, 21u}})
@@ -197,6 +201,25 @@ TEST(FreedParser, ASpareWordThatStandsCountsNoFrames) {
   EXPECT_THAT(notes_after(119, false), IsEmpty());
   EXPECT_THAT(notes_after(300, false), ElementsAre(HasSubstr("stand at 7: they count no frames")));
   EXPECT_THAT(notes_after(300, true), IsEmpty());
+}
+
+// Packets come unevenly, by 8 ms either way.
+TEST(FreedParser, ASpareWordThatCountsAtAnotherRateIsToldWithIt) {
+  const auto notes_of = [](const char* said, int packets_hz, int each) {
+    const auto parser = live_parser_of("freed", said);
+    for (int i = 0; i < 10 * packets_hz; ++i) {
+      const int64_t time_ns = kSInNs + kSInNs * i / packets_hz + (i * 7 % 17 - 8) * kMsInNs;
+      const auto packet = parser->parse(test::freed({.spare = static_cast<uint16_t>(i / each)}), time_ns);
+      EXPECT_TRUE(packet.ok());
+    }
+    return parser->take_notes();
+  };
+  EXPECT_THAT(notes_of("/25", 50, 1),
+              ElementsAre(AllOf(HasSubstr("counts about 50 frames a second"), HasSubstr("says 25"))));
+  EXPECT_THAT(notes_of("/30:0-3", 25, 1), ElementsAre(HasSubstr("counts about 25 frames a second")));
+  EXPECT_THAT(notes_of("/25", 50, 2), IsEmpty()) << "each number twice";
+  EXPECT_THAT(notes_of("/50", 50, 1), IsEmpty());
+  EXPECT_THAT(notes_of("/23.976", 24, 1), IsEmpty());
 }
 
 TEST(FreedParser, RefusesWrongChecksumsAndOtherSizes) {

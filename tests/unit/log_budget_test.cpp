@@ -33,5 +33,32 @@ TEST(LogBudget, ThreeHundredLinesAMinuteForAllAndNoMoreAddressesInMemory) {
   EXPECT_EQ(budget.size(), 1u);
 }
 
+TEST(RepeatBudget, NoKindTakesTheLinesOfAnother) {
+  RepeatBudget budget({});
+  int written = 0;
+  for (int i = 0; i < 1'000; ++i) written += budget.take("malformed", "cut") ? 1 : 0;
+  EXPECT_EQ(written, 4);
+  EXPECT_TRUE(budget.take("sender", "stopped"));
+  // All kinds together are bounded, too.
+  written = 0;
+  for (int i = 0; i < 1'000; ++i) written += budget.take(std::to_string(i), "one") ? 1 : 0;
+  EXPECT_EQ(written, 15);
+}
+
+TEST(RepeatBudget, WhatComesAgainIsSummedUpUntilItEnds) {
+  RepeatBudget budget({});
+  EXPECT_TRUE(budget.take_sums(kStartNs).empty());
+  for (int i = 0; i < 41; ++i) (void)budget.take("malformed", std::to_string(i));
+  EXPECT_TRUE(budget.take_sums(kStartNs + 10 * kSInNs - 1).empty());
+  const auto sums = budget.take_sums(kStartNs + 10 * kSInNs);
+  ASSERT_EQ(sums.size(), 1u);
+  EXPECT_EQ(sums[0].count, 37u);
+  EXPECT_EQ(sums[0].newest, "40");
+  EXPECT_FALSE(budget.take("malformed", "again")) << "sums alone, while it goes on";
+  ASSERT_EQ(budget.take_sums(kStartNs + 20 * kSInNs).size(), 1u);
+  EXPECT_TRUE(budget.take_sums(kStartNs + 30 * kSInNs).empty());
+  EXPECT_TRUE(budget.take("malformed", "anew"));
+}
+
 }  // namespace
 }  // namespace strandcast::log_budget_test

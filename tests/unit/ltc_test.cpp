@@ -187,6 +187,23 @@ TEST(Ltc, AWavFileTellsWhereItIs) {
   }
 }
 
+TEST(Ltc, BehindTheEndOfAFileItCountsOnAndSaysSoOnce) {
+  const TemporaryFolder folder;
+  const Timecode first = *parse_timecode("01:00:00:00", {25, 1});
+  const std::string path = (folder.path() / "ltc.wav").string();
+  std::ofstream(path, std::ios::binary) << wav_of(sound_of(first, 50, {}), 16, 1);
+  std::vector<std::string> said;
+  const auto at =
+      open_ltc(path, FrameRate{25, 1}, [&](const std::string& sentence) { said.push_back(sentence); });
+  ASSERT_TRUE(at) << at.error().to_string();
+  for (double time_s = 0.0; time_s < 2.0; time_s += 0.02) (void)(*at)(time_s);
+  EXPECT_EQ(said.size(), 1u) << "it is there";
+  for (double time_s = 2.2; time_s < 9.0; time_s += 0.02)
+    EXPECT_NEAR(frames_between(first, *(*at)(time_s)), 25.0 * (time_s - 0.01), 0.1);
+  ASSERT_EQ(said.size(), 2u);
+  EXPECT_THAT(said[1], HasSubstr("ends at 01:00:01:24, and is counted on"));
+}
+
 // Words do not tell how many there are in a second: their times do, and whether numbers are dropped.
 TEST(Ltc, TheRateOfAFileIsMeasured) {
   const TemporaryFolder folder;

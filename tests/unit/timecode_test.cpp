@@ -47,6 +47,11 @@ TEST(FrameRate, IsReadAsPeopleWriteIt) {
     ASSERT_FALSE(rate(text)) << text;
     EXPECT_THAT(rate(text).error().message, HasSubstr("0.000001 to 240 are possible")) << text;
   }
+  // As cameras write it.
+  for (const char* text : {"29.97df", "29.97nd", "29.97ndf"})
+    EXPECT_THAT(rate(text).error().message, HasSubstr("write 29.97; a timecode's ; counts drop-frame"))
+        << text;
+  EXPECT_THAT(rate("59.94df").error().message, HasSubstr("write 59.94;"));
   EXPECT_EQ(frame_rate_text(24000.0 / 1001.0), "23.976");
   EXPECT_EQ(frame_rate_text(119.88011988), "119.88");
   EXPECT_EQ(frame_rate_text(30.0), "30");

@@ -145,6 +145,12 @@ Status ScenarioRun::carry_out(const ScenarioExpect& expect) {
                           expect.incoherent_below || expect.cpu_share_below;
   if (needs_span && !span_)
     return make_error(ErrorCode::BadInput, "nothing was measured: a step or run_s comes first");
+  const bool needs_states = expect.stretch_below || expect.bits_per_vertex_below || expect.realtime_above ||
+                            expect.realtime_below || expect.feed_pace_within || expect.head_mps_below ||
+                            expect.order_above || expect.incoherent_below;
+  if (needs_states && span_->has_waited)
+    return make_error(ErrorCode::BadInput,
+                      "nothing was simulated: in lockstep run_s only waits, and step goes on");
   if (needs_span) expect_span(expect);
   if (expect.has_no_quarantine) {
     expect_metric({"strandcast_publish_quarantined_total", {}, {}, 0.0});

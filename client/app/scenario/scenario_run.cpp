@@ -310,6 +310,7 @@ Status ScenarioRun::carry_out(const ScenarioRunTime& run) {
     realtime = static_cast<double>(status_.tick - first_tick) / client_->welcome().step_rate_hz /
                (static_cast<double>(status_ns_ - first_ns) * 1e-9);
   end_span(elapsed_s() - begin_s, realtime);
+  span_->has_waited = is_lockstep_;
   const FeedProgress now = live_feed_ != nullptr ? live_feed_->progress() : FeedProgress{};
   if (now.elapsed_s > fed.elapsed_s)
     span_->feed_pace = (now.motion_s - fed.motion_s) / (now.elapsed_s - fed.elapsed_s);

@@ -37,6 +37,7 @@ struct MeasuredSpan {
   double realtime = -1.0;   // -1 = not measured
   double feed_pace = -1.0;  // motion time per real time; likewise
   double cpu_share = -1.0;  // of one processor, by the server; likewise
+  bool has_waited = false;  // by run_s in lockstep: nothing was simulated
   struct Seen {
     ViewerCounts before;
     ViewerLook after;

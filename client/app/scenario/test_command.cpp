@@ -91,10 +91,24 @@ std::vector<ScenarioResult> run_all(const std::vector<Scenario>& scenarios, cons
 }
 
 /// When the files and the server program were written last.
+/// The files that scenarios read, but for those that --renew writes. Words for motion and wind are no files.
+void add_read_files(const std::filesystem::path& scenario, std::vector<std::filesystem::path>& paths) {
+  const auto loaded = load_scenario(scenario);
+  if (!loaded) return;
+  for (const ScenarioAction& action : loaded->actions) {
+    if (const auto* start = std::get_if<ScenarioStart>(&action.work)) paths.push_back(start->scene);
+    if (const auto* feed = std::get_if<ScenarioFeed>(&action.work))
+      paths.insert(paths.end(), {feed->motion, feed->wind});
+    if (const auto* send = std::get_if<ScenarioSend>(&action.work))
+      paths.insert(paths.end(), send->files.begin(), send->files.end());
+  }
+}
+
 std::vector<std::filesystem::file_time_type> written_times(const TestOptions& options,
                                                            const std::filesystem::path& server) {
   const auto files = scenario_files(options.scenarios);
   std::vector<std::filesystem::path> paths = files ? *files : options.scenarios;
+  for (const std::filesystem::path& scenario : std::vector(paths)) add_read_files(scenario, paths);
   if (!server.empty()) paths.push_back(server);
   std::vector<std::filesystem::file_time_type> times;
   std::error_code is_gone;

@@ -2,8 +2,10 @@
 // subject is a camera's number. Angles are `pan-tilt-roll` or `tilt-pan-roll`. The spare word is the sender's
 // own; where it, or some of its bits, counts frames of timecode, their number goes on beyond those bits.
 #include <array>
+#include <cmath>
 #include <utility>
 
+#include "common/base/units.h"
 #include "common/strands/byte_io.h"
 #include "server/input/live/conventions.h"
 #include "server/input/live/parsers_private.h"
@@ -17,6 +19,8 @@ constexpr uint8_t kFamilyMask = 0xF0;  // all types of FreeD begin with D
 constexpr uint8_t kFamily = 0xD0;
 constexpr uint32_t kSpareBits = 16;
 constexpr uint32_t kJudgedPackets = 120;  // after which a count that stood still is none
+constexpr int64_t kCountWindowNs = 2 * kSInNs;
+constexpr double kOtherRate = 0.1;  // counts that differ by less are the same
 constexpr uint8_t kChecksumBegin = 0x40;
 constexpr double kUnitsPerDegree = 32768.0;
 constexpr double kUnitsPerMm = 64.0;
@@ -65,7 +69,7 @@ class FreedParser : public LiveParser {
   FreedParser(size_t pan_at, size_t tilt_at, const std::optional<SpareCount>& count)
       : pan_at_(pan_at), tilt_at_(tilt_at), count_(count), frames_(count ? count->bits : kSpareBits) {}
 
-  Result<LivePacket> parse(std::span<const std::byte> bytes, int64_t) override {
+  Result<LivePacket> parse(std::span<const std::byte> bytes, int64_t arrival_ns) override {
     const uint8_t type = bytes.empty() ? uint8_t{0} : std::to_integer<uint8_t>(bytes.front());
     if ((type & kFamilyMask) == kFamily && type != kFreedPoseType) {
       ++ignored_;
@@ -89,9 +93,11 @@ class FreedParser : public LiveParser {
     pose.world_from_subject = pose_from_freed(last_pose());
     if (count_) {
       const uint32_t number = last_->spare >> count_->first_bit & ((1u << count_->bits) - 1);
-      newest_ = advanced(count_->begin, static_cast<int32_t>(frames_.unwrapped(number)));
+      const auto frame = static_cast<int32_t>(frames_.unwrapped(number));
+      newest_ = advanced(count_->begin, frame);
       pose.timecode = newest_;
       note_count(number);
+      measure(frame, arrival_ns);
     }
     return packet;
   }
@@ -125,6 +131,24 @@ class FreedParser : public LiveParser {
                       number));
   }
 
+  /// Says once that frames are counted at another rate than was said, where two windows agree.
+  void measure(int32_t frame, int64_t arrival_ns) {
+    if (!window_) window_ = CountWindow{frame, arrival_ns, 0.0};
+    const int64_t passed_ns = arrival_ns - window_->begin_ns;
+    if (passed_ns < kCountWindowNs) return;
+    const double said_hz = count_->begin.rate.hz();
+    const double hz =
+        (static_cast<double>(frame) - window_->begin) / (static_cast<double>(passed_ns) * kSPerNs);
+    const auto differ = [](double a, double b) { return std::abs(a - b) > kOtherRate * b; };
+    const bool is_other = hz > 0.0 && differ(hz, said_hz) && !differ(window_->hz_before, hz);
+    const double mean_hz = 0.5 * (hz + window_->hz_before);
+    window_ = CountWindow{frame, arrival_ns, hz};
+    if (!is_other || std::exchange(has_told_rate_, true)) return;
+    notes_.push_back(
+        fmt::format("the spare word counts about {:.0f} frames a second, and --mocap-timecode says {}",
+                    mean_hz, frame_rate_text(said_hz)));
+  }
+
   FreedPose last_pose() const {
     constexpr size_t kRollAt = 2;
     const FreedFields& fields = *last_;
@@ -140,6 +164,13 @@ class FreedParser : public LiveParser {
   std::optional<uint32_t> counted_;  // of the newest packet
   uint32_t counted_packets_ = 0;
   bool has_counted_ = false;
+  struct CountWindow {
+    int32_t begin = 0;  // its first frame
+    int64_t begin_ns = 0;
+    double hz_before = 0.0;  // of the window before
+  };
+  std::optional<CountWindow> window_;
+  bool has_told_rate_ = false;
   std::vector<std::string> notes_;
   std::optional<FreedFields> last_;
   uint64_t ignored_ = 0;

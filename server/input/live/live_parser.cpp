@@ -48,9 +48,12 @@ std::span<const LiveProtocol> live_protocols() {
 }
 
 Result<Timecode> parse_timecode_count(std::string_view text) {
-  constexpr std::string_view kDrop = "df";
-  const bool is_drop = text.ends_with(kDrop);
-  if (is_drop) text.remove_suffix(kDrop.size());
+  const bool is_drop = text.ends_with("df") && !text.ends_with("ndf");
+  for (const std::string_view ending : {"ndf", "nd", "df"})
+    if (text.ends_with(ending)) {
+      text.remove_suffix(ending.size());
+      break;
+    }
   ASSIGN_OR_RETURN(const FrameRate rate, parse_frame_rate(text));
   return make_timecode({}, rate, is_drop);
 }

@@ -71,8 +71,8 @@ class LiveParser {
   virtual std::vector<std::string> take_notes() { return {}; }
 };
 
-/// Parses how timecode counts: a rate, with "df" behind it for drop-frame. Returns its first frame; BadInput
-/// says which rates there are.
+/// Parses how timecode counts: a rate, with "df" behind it for drop-frame, or "nd" or "ndf". Returns its
+/// first frame; BadInput says which rates there are.
 Result<Timecode> parse_timecode_count(std::string_view text);
 
 /// How the spare word of FreeD counts frames; vendors differ, and some have the aperture in most of its bits.

@@ -128,6 +128,11 @@ void LiveSource::wish(const LiveTake& take) {
     ++counters_.over_rate;
     return;
   }
+  if (take.take > kMaxTake && notes_.size() < kMaxNotes)
+    notes_.push_back({true,
+                      fmt::format("{}: a sender wants take {}: takes go up to {}, and it is recorded as that",
+                                  describe(), take.take, kMaxTake),
+                      LiveNoteKind::Recording});
   recordings_.push_back(
       {take.is_wanted, {}, printable(take.slate, kMaxSlateChars), std::min(take.take, kMaxTake)});
 }
@@ -143,8 +148,10 @@ Status LiveSource::take(const std::string& sender, std::span<const std::byte> by
   if (is_heard(arrival_ns) && sender != sender_) {
     ++counters_.refused;
     if (sender != other_sender_ && notes_.size() < kMaxNotes)
-      notes_.push_back({true, fmt::format("{}: {} sends too, and is not heard before {} has stopped",
-                                          describe(), sender, sender_)});
+      notes_.push_back({true,
+                        fmt::format("{}: {} sends too, and is not heard before {} has stopped", describe(),
+                                    sender, sender_),
+                        LiveNoteKind::Other});
     other_sender_ = sender;
     return {};
   }
@@ -162,8 +169,10 @@ Status LiveSource::take(const std::string& sender, std::span<const std::byte> by
   if (!packet) {
     ++counters_.malformed;
     if (notes_.size() < kMaxNotes)
-      notes_.push_back({true, fmt::format("{}: a malformed packet from {}: {}", describe(), sender,
-                                          one_line(packet.error().to_string(), kMaxNoteChars))});
+      notes_.push_back({true,
+                        fmt::format("{}: a malformed packet from {}: {}", describe(), sender,
+                                    one_line(packet.error().to_string(), kMaxNoteChars)),
+                        LiveNoteKind::Malformed});
     return packet.error();
   }
   ++counters_.packets;
@@ -176,7 +185,8 @@ Status LiveSource::take(const std::string& sender, std::span<const std::byte> by
 }
 
 void LiveSource::warn(const std::string& text) {
-  if (notes_.size() < kMaxNotes) notes_.push_back({true, fmt::format("{}: {}", describe(), text)});
+  if (notes_.size() < kMaxNotes)
+    notes_.push_back({true, fmt::format("{}: {}", describe(), text), LiveNoteKind::Found});
 }
 
 void LiveSource::hear(const std::string& sender, int64_t arrival_ns) {
@@ -225,8 +235,9 @@ void LiveSource::rename_subject(const LivePose& pose, const std::string& name,
   });
   if (found == subjects_.end()) return;
   if (notes_.size() < kMaxNotes)
-    notes_.push_back(
-        {false, fmt::format("{}: {} is called {} now", describe(), shown(found->name), shown(name))});
+    notes_.push_back({false,
+                      fmt::format("{}: {} is called {} now", describe(), shown(found->name), shown(name)),
+                      LiveNoteKind::Subject});
   if (subject_ == found->name) subject_ = name;
   found->name = name;
 }
@@ -244,7 +255,7 @@ void LiveSource::note_subject(const std::string& name, int64_t arrival_ns) {
   }
   subjects_.push_back({name, arrival_ns, std::nullopt});
   if (!name.empty() && notes_.size() < kMaxNotes)
-    notes_.push_back({false, fmt::format("{}: sees {}", describe(), shown(name))});
+    notes_.push_back({false, fmt::format("{}: sees {}", describe(), shown(name)), LiveNoteKind::Subject});
 }
 
 /// Chooses who drives the head.
@@ -267,8 +278,10 @@ void LiveSource::follow_subject(int64_t now_ns) {
   subject_ = wanted;
   policy_.begin_another();
   if (subject_ && subject_->empty() && subjects_.size() == 1) return;  // there is nobody else
-  notes_.push_back({false, subject_ ? fmt::format("{}: {} drives the head", describe(), shown(*subject_))
-                                    : fmt::format("{}: waits for {}", describe(), live_.subject)});
+  notes_.push_back({false,
+                    subject_ ? fmt::format("{}: {} drives the head", describe(), shown(*subject_))
+                             : fmt::format("{}: waits for {}", describe(), live_.subject),
+                    LiveNoteKind::Subject});
 }
 
 void LiveSource::choose_subject(const std::string& subject) {
@@ -344,8 +357,10 @@ LiveSource::Due LiveSource::advance(int64_t now_ns) {
   if (is_stale_now && !was_stale_) {
     due.has_ended = true;
     if (subject_ && is_heard(now_ns))
-      notes_.push_back({true, fmt::format("{}: nothing of {} for {:g} s: the head rests", describe(),
-                                          shown(*subject_), static_cast<double>(kMotionStaleNs) * kSPerNs)});
+      notes_.push_back({true,
+                        fmt::format("{}: nothing of {} for {:g} s: the head rests", describe(),
+                                    shown(*subject_), static_cast<double>(kMotionStaleNs) * kSPerNs),
+                        LiveNoteKind::Subject});
     if (live_.subject.empty()) follow_subject(now_ns);
   }
   was_stale_ = is_stale_now;

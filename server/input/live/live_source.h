@@ -39,10 +39,14 @@ struct LiveSourceCounters {
   uint64_t over_rate = 0;
 };
 
+/// What a note is about: however often one kind comes, the log has room for the others.
+enum class LiveNoteKind { Sender, Other, Malformed, Subject, Found, Recording, Connection };
+
 /// A note for the log, written once.
 struct LiveNote {
   bool is_warning = false;
   std::string text;
+  LiveNoteKind kind = LiveNoteKind::Sender;
 };
 
 class LiveSource {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/input/live/live_parser.h"
@@ -26,6 +27,9 @@ std::unique_ptr<LiveParser> make_live_link_face_parser(size_t axis_order);
 
 /// Returns the index of a name among `known`; NotFound lists them.
 Result<size_t> find_name(const char* kind, const std::string& name, const std::vector<const char*>& known);
+
+/// What OSC's addresses begin with, by which one protocol's packets are known on the other's port.
+constexpr std::string_view kVmcAddresses = "/VMC/", kVrchatTrackers = "/tracking/trackers/";
 
 /// Longest name of a subject in bytes; longer names are cut.
 constexpr size_t kMaxSubjectBytes = 64;

@@ -116,12 +116,13 @@ class VmcBody {
   void set(size_t bone, const NamedPose& named, std::vector<LivePose>& poses) {
     const bool begins = bone == kRoot || (bone == kHips && (seen_ & bit_of(kRoot)) == 0);
     if ((seen_ & bit_of(bone)) != 0 || (begins && seen_ != 0)) {
-      tell(poses);
+      tell(bone_time_ns_, poses);
       end_frame();
     }
     local_[bone] = named.pose;
     if (ignores_zero_positions_ && named.position_m == glm::dvec3(0.0))
       local_[bone].position_m = kBones[bone].bind_m;
+    bone_time_ns_ = time_ns;
     seen_ |= bit_of(bone);
     known_ |= bit_of(bone);
     has_news_ = true;
@@ -132,13 +133,16 @@ class VmcBody {
     const bool is_first = expected_ == 0;
     const bool is_whole =
         is_first ? is_bundle && (seen_ & bit_of(kHead)) != 0 : (seen_ & expected_) == expected_;
-    if (is_whole) tell(poses);
+    if (is_whole) tell(time_ns, poses);
   }
 
  private:
-  void tell(std::vector<LivePose>& poses) {
+  /// Of one moment the newest is told: a datagram may end one frame and hold another.
+  void tell(const std::optional<int64_t>& at_ns, std::vector<LivePose>& poses) {
     if (!has_news_ || (known_ & bit_of(kHead)) == 0) return;
     has_news_ = false;
+    if (at_ns)
+      std::erase_if(poses, [&](const LivePose& p) { return p.subject.empty() && p.source_time_ns == at_ns; });
     std::array<Pose, kBoneCount> world;
     for (size_t bone = 0; bone < kBoneCount; ++bone) {
       const Pose parent = kBones[bone].parent == kNoParent ? Pose{} : world[kBones[bone].parent];
@@ -147,7 +151,7 @@ class VmcBody {
     LivePose& pose = poses.emplace_back();
     pose.world_from_subject = world[kHead];
     pose.has_position = (known_ & (bit_of(kRoot) | bit_of(kHips))) != 0;
-    pose.source_time_ns = time_ns;
+    pose.source_time_ns = at_ns;
     const auto add_joint = [&](const char* name, size_t bone) {
       if ((known_ & bit_of(bone)) == 0) return;
       pose.joint_names.emplace_back(name);
@@ -181,12 +185,13 @@ class VmcBody {
 
   bool ignores_zero_positions_;
   std::array<Pose, kBoneCount> local_;
-  int headless_frames_ = 0;  // in a row
-  BoneSet known_ = 0;        // ever
-  BoneSet seen_ = 0;         // of the frame that is coming in
-  bool has_news_ = false;    // that no pose tells
-  BoneSet expected_ = 0;     // of a whole frame
-  BoneSet lately_ = 0;       // of the frames since the last whole one
+  int headless_frames_ = 0;              // in a row
+  BoneSet known_ = 0;                    // ever
+  BoneSet seen_ = 0;                     // of the frame that is coming in
+  bool has_news_ = false;                // that no pose tells
+  std::optional<int64_t> bone_time_ns_;  // of the newest bone
+  BoneSet expected_ = 0;                 // of a whole frame
+  BoneSet lately_ = 0;                   // of the frames since the last whole one
   int short_frames_ = 0;
 };
 
@@ -268,13 +273,15 @@ class VmcParser : public LiveParser {
       return time_s.has_value();
     }
     if (address == "/strandcast/wind") return apply_wind(arguments, packet);
+    if (address.starts_with(kVrchatTrackers) && !std::exchange(has_told_vrchat_, true))
+      notes_.emplace_back("the sender tells trackers as to VRChat's OSC: --mocap vrchat:PORT takes them");
     if (address.starts_with(kRecordAddress) && !std::exchange(has_told_start_, true))
       notes_.push_back(
           fmt::format("{} is not understood: start takes a slate (text) and a take (a number), "
                       "stop takes nothing",
                       to_line(message)));
     // Faces, cameras, lights, devices in another scale: known, and of no use here.
-    return address.starts_with("/VMC/");
+    return address.starts_with(kVmcAddresses);
   }
 
   /// A time is a float: what has run for long, or tells the time of day, has steps that are too large.
@@ -318,6 +325,7 @@ class VmcParser : public LiveParser {
   bool has_told_steps_ = false;
   bool has_told_headless_ = false;
   bool has_told_start_ = false;
+  bool has_told_vrchat_ = false;
   std::vector<std::string> notes_;
   std::vector<std::byte> last_;
   uint64_t ignored_ = 0;

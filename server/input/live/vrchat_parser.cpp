@@ -13,7 +13,7 @@
 namespace strandcast {
 namespace {
 
-constexpr std::string_view kTrackers = "/tracking/trackers/", kPlaces = "position", kTurns = "rotation";
+constexpr std::string_view kPlaces = "position", kTurns = "rotation";
 constexpr std::array<std::string_view, 9> kTrackerNames = {"head", "1", "2", "3", "4", "5", "6", "7", "8"};
 constexpr uint8_t kPlaceBit = 1, kTurnBit = 2;
 constexpr uint32_t kLoneFrames = 3;  // of one kind alone: there is no other
@@ -44,12 +44,15 @@ class VrchatParser : public LiveParser {
   uint64_t ignored() const override { return ignored_; }
 
   std::vector<std::string> describe() const override { return describe_osc(last_, limit_bytes_); }
+  std::vector<std::string> take_notes() override { return std::exchange(notes_, {}); }
 
  private:
   /// False for a message that is not known, or has other arguments than its address asks for.
   bool apply(const OscMessage& message, LivePacket& packet) {
-    if (!message.address.starts_with(kTrackers)) return false;
-    const std::string_view rest = message.address.substr(kTrackers.size());
+    if (message.address.starts_with(kVmcAddresses) && !std::exchange(has_told_vmc_, true))
+      notes_.emplace_back("the sender tells a performer as VMC: --mocap vmc:PORT takes it");
+    if (!message.address.starts_with(kVrchatTrackers)) return false;
+    const std::string_view rest = message.address.substr(kVrchatTrackers.size());
     const size_t slash = std::min(rest.find('/'), rest.size());
     const std::string_view kind = rest.substr(std::min(slash + 1, rest.size()));
     size_t index = 0;
@@ -94,6 +97,8 @@ class VrchatParser : public LiveParser {
 
   uint32_t limit_bytes_;
   std::array<VrchatTracker, kTrackerNames.size()> trackers_;
+  bool has_told_vmc_ = false;
+  std::vector<std::string> notes_;
   std::vector<std::byte> last_;
   uint64_t ignored_ = 0;
 };
