@@ -54,7 +54,7 @@ if(STRANDCAST_LLD AND NOT CMAKE_INTERPROCEDURAL_OPTIMIZATION AND NOT EMSCRIPTEN)
   target_link_options(strandcast_flags INTERFACE -fuse-ld=lld)
 endif()
 
-# Presets with unity builds (`ci`, `release`) compile eight files of a target as one: names in unnamed namespaces are
+# Presets with unity builds (`ci`, `release`) compile sixteen files of a target as one: names in unnamed namespaces are
 # distinct within a target, and a test's file has a namespace of its own. What stays single: kernels marked `flatten`
 # (common/simd/variants.h), which would take in what else stands in the unit, and files that define macros of others.
 if(CMAKE_UNITY_BUILD)

@@ -229,8 +229,8 @@ std::string AbcTree::path(size_t node) const {
   std::string path;
   size_t names = 0;
   for (std::optional<size_t> i = node; i && nodes_[*i].parent; i = nodes_[*i].parent) {
-    if (++names > kMostPathNames) return "..." + path;
-    path = "/" + one_line(nodes_[*i].object.name, kMostPathChars) + path;
+    if (++names > kMostPathNames) return path.insert(0, "...");
+    path.insert(0, one_line(nodes_[*i].object.name, kMostPathChars)).insert(0, "/");
   }
   return path;
 }
