@@ -277,6 +277,17 @@ TEST_F(ScenarioProgram, WaitingInLockstepMeasuresNoStates) {
   const auto wrong = write("wrong.textproto", begin + "do { expect { realtime_below: 0.5 } }\n");
   EXPECT_EQ(run({"--scenario", wrong.string()}), 1) << text_of("said");
   EXPECT_THAT(text_of("said"), HasSubstr("in lockstep run_s only waits, and step goes on"));
+  const auto away =
+      write("away.textproto",
+            begin +
+                "do { link {} } do { expect { back_within_s: 0.3 } }\n"
+                "do { expect { metric { name: \"strandcast_viewers_strands_of_codec\" above: 0 } } }\n");
+  EXPECT_EQ(run({"--scenario", away.string()}), 1) << text_of("said");
+  EXPECT_THAT(
+      text_of("said"),
+      AllOf(
+          HasSubstr("no frame has come since: in lockstep, a step brings one"),
+          HasSubstr("no such line in /metrics, but 'strandcast_viewers_strands_of_codec{codec=\"step\"}'")));
   const auto right = write("right.textproto", begin + "do { expect { cpu_share_below: 9 } }\n");
   EXPECT_EQ(run({"--scenario", right.string()}), 0) << text_of("said");
 }

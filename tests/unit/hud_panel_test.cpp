@@ -209,6 +209,23 @@ TEST(ViewHud, SaysWhatAPersonShouldKnow) {
   EXPECT_TRUE(writer.write(state, facts, kSInNs + 2 * kSlowMotionNs).warnings.empty());
 }
 
+TEST(ViewHud, SaysTimecodeAndWhatItCounts) {
+  HudWriter writer;
+  ViewerState state;
+  state.is_connected = true;
+  state.session_number = 1;
+  const auto timecode = [&] {
+    for (const HudRow& row : writer.write(state, facts_of("127.0.0.1"), kSInNs).rows)
+      if (row.label == "timecode") return row.value;
+    return std::string("no row");
+  };
+  EXPECT_EQ(timecode(), "no row");
+  state.status.timecode = *parse_timecode("01:02:03:04", {25, 1});
+  EXPECT_EQ(timecode(), "01:02:03:04 at 25 fps");
+  state.status.timecode = *parse_timecode("01:02:03;04", {30000, 1001});
+  EXPECT_EQ(timecode(), "01:02:03;04 at 29.97 fps");
+}
+
 TEST(ViewHud, SaysWhatSimulates) {
   HudWriter writer;
   ViewerState state;

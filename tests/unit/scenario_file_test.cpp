@@ -204,5 +204,19 @@ TEST(ScenarioFile, EveryShippedScenarioParses) {
   EXPECT_TRUE(example) << example.error().to_string();
 }
 
+// What people begin with is what the page shows: all of it is right.
+TEST(ScenarioFile, TheDocumentedOneParses) {
+  std::ifstream file(std::filesystem::path(STRANDCAST_SOURCE_DIR) / "docs/use/test-a-server.md");
+  std::string text, line;
+  while (std::getline(file, line) && line != "```") {
+  }
+  while (std::getline(file, line) && line != "```") text += line + "\n";
+  const auto scenario = parse(text);
+  ASSERT_TRUE(scenario) << scenario.error().to_string() << text;
+  std::set<size_t> kinds;
+  for (const ScenarioAction& action : scenario->actions) kinds.insert(action.work.index());
+  EXPECT_GE(kinds.size(), 9u);
+}
+
 }  // namespace
 }  // namespace strandcast::scenario_file_test

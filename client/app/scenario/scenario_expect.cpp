@@ -106,6 +106,14 @@ std::vector<double> find_metric(const std::string& text, const std::string& name
   return values;
 }
 
+/// For who left out a metric's labels, the first line that has them: quoted, as a scenario may have it.
+std::string missing_metric_text(const std::string& text, const std::string& name) {
+  constexpr const char* kMissing = "there is no such line in /metrics";
+  const size_t at = text.find("\n" + name + "{");
+  if (at == std::string::npos) return kMissing;
+  return fmt::format("{}, but '{}'", kMissing, text.substr(at + 1, text.find("} ", at) - at));
+}
+
 Result<Image> draw(const ViewerPicture& picture, RenderSize size) {
   if (picture.mode == StreamMode::Frames && picture.image != nullptr) return *picture.image;
   if (picture.asset == nullptr || picture.state == nullptr)
@@ -362,11 +370,11 @@ void ScenarioRun::expect_back(const ScenarioExpect& expect) {
   const double since_s = was_away ? static_cast<double>(now_ns() - absence.mended_ns) * kSPerNs : 0.0;
   const bool is_there = was_away && is_back();
   report(name + " comes back", fmt::format("within {:g} s", *expect.back_within_s),
-         !was_away  ? std::string("neither its server was restarted nor its link changed")
-         : is_there ? fmt::format("was back after {:.1f} s", since_s)
-                    : fmt::format("is away: {}", who.look().trouble.empty()
-                                                     ? std::string("connected, and no frame has come since")
-                                                     : who.look().trouble),
+         !was_away                     ? std::string("neither its server was restarted nor its link changed")
+         : is_there                    ? fmt::format("was back after {:.1f} s", since_s)
+         : !who.look().trouble.empty() ? fmt::format("is away: {}", who.look().trouble)
+                                       : fmt::format("is away: connected, and no frame has come since{}",
+                                                     is_lockstep_ ? ": in lockstep, a step brings one" : ""),
          is_there);
 }
 
@@ -438,7 +446,7 @@ void ScenarioRun::expect_metric(const ScenarioMetric& metric) {
     const auto text = metrics();
     if (!text) return measured = text.error().to_string(), false;
     const std::vector<double> found = find_metric(*text, metric.name);
-    measured = found.empty() ? std::string("there is no such line in /metrics")
+    measured = found.empty() ? missing_metric_text(*text, metric.name)
                              : fmt::format("is {:g}", fmt::join(found, ", "));
     return !found.empty() &&
            std::all_of(found.begin(), found.end(), [&](double value) { return holds(metric, value); });
