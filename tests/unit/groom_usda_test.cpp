@@ -326,6 +326,21 @@ TEST(Usda, ProxiesAreLeftOutAndGuidesKnownByWhatIsAroundThem) {
   EXPECT_THAT(guides.notes, Contains(HasSubstr("2 guides are left out")));
 }
 
+TEST(Usda, InstancersAreLeftOutAndCounted) {
+  const std::string instancer =
+      "def PointInstancer \"Tufts\"\n{\nint[] protoIndices = [0, 0, 0]\npoint3f[] positions = [(0, 0, 0), "
+      "(1, "
+      "0, 0), (2, 0, 0)]\ndef BasisCurves \"Tuft\"\n{\n" +
+      kLines + "}\n}\n";
+  const auto beside = read_usd(stage(kLines) + instancer);
+  ASSERT_TRUE(beside) << beside.error().to_string();
+  EXPECT_EQ(beside->groom.rest_position_m, kPoints) << "what is in one is not drawn by itself";
+  EXPECT_THAT(beside->notes, Contains(HasSubstr("1 PointInstancer with 3 instances are left out")));
+  EXPECT_THAT(refusal("#usda 1.0\n" + instancer),
+              AllOf(HasSubstr("no BasisCurves to read"), HasSubstr("1 PointInstancer with 3 instances"),
+                    HasSubstr("make the instances curves")));
+}
+
 TEST(Usda, MotionOfATransformAndWidthsThatFitNothingAreNamed) {
   const auto notes_of = [](const std::string& body, const std::string& around) {
     const auto hair = read_usd(stage(kLines + body, around));
