@@ -107,6 +107,8 @@ Result<ExportReport> bake(const BakeCommand& command, const std::atomic<bool>& s
     if (!origin)
       return make_error(ErrorCode::BadInput,
                         "curves move the hair of a file: name it before the file to write");
+    for (const std::string& note : notes_of(*curves, *origin))
+      std::cerr << fmt::format("{}: {}\n", command.feed.motion, note);
     origin->is_world_at_rest = true;
     plan.motion = head_motion(std::move(*curves), *origin);
   }

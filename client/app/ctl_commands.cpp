@@ -105,6 +105,8 @@ Result<MotionClip> clip_of_curves(const FeedOptions& options, const FindHair& fi
                                          "curves move the hair of a server's file: only feed to a server, "
                                          "and bake, know it"));
   ASSIGN_OR_RETURN(const HairOrigin hair, find_hair());
+  for (const std::string& note : notes_of(*curves, hair))
+    std::cerr << fmt::format("{}: {}\n", options.motion, note);
   const size_t count = curves->time_s.size();
   MotionClip clip;
   clip.frame_s = curves->duration_s() / static_cast<double>(count - 1);

@@ -120,6 +120,19 @@ std::function<Pose(double t_s)> head_motion(CurveMotion motion, const HairOrigin
   };
 }
 
+std::vector<std::string> notes_of(const CurveMotion& motion, const HairOrigin& origin) {
+  std::vector<std::string> notes = {
+      fmt::format(
+          "the head goes as {} roots of {} curves object{} do, which move as one: it has no joints of a "
+          "body",
+          motion.root_count, motion.object_count, motion.object_count == 1 ? "" : "s"),
+      fmt::format("one unit is taken as {:.4g} m and +{} as up, as of the hair that it moves", origin.unit_m,
+                  origin.is_z_up ? 'Z' : 'Y')};
+  if (motion.is_behind_rest)
+    notes.emplace_back("its first sample is the rest shape, and the motion begins with the next");
+  return notes;
+}
+
 Result<SceneDesc> ask_scene(const CtlTarget& target) {
   ASSIGN_OR_RETURN(ClientConfig config, client_config_for(target, Role::Controller));
   config.hello.gets_no_stream = true;

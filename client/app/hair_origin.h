@@ -5,6 +5,8 @@
 #include <functional>
 #include <glm/glm.hpp>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "client/app/ctl_commands.h"
 #include "client/export/export_source.h"
@@ -30,6 +32,9 @@ Result<HairOrigin> load_place(const FileGroomDesc& file);
 /// Returns head motion from curves that lie where these files have their hair. The head is at the world's
 /// origin and unturned with the first sample.
 std::function<Pose(double t_s)> head_motion(CurveMotion motion, const HairOrigin& origin);
+
+/// Returns sentences of what was assumed of curves as motion, as load_motion_file() has them of a clip.
+std::vector<std::string> notes_of(const CurveMotion& motion, const HairOrigin& origin);
 
 /// Asks a server for the scene of the target's head, as who controls it.
 Result<SceneDesc> ask_scene(const CtlTarget& target);

@@ -10,6 +10,7 @@
 #include "client/export/abc_file.h"
 #include "client/export/strand_writer.h"
 #include "common/base/version.h"
+#include "common/groom/abc_motion.h"
 
 namespace strandcast {
 namespace {
@@ -186,10 +187,10 @@ class AbcWriter : public StrandWriter {
   std::string description() const {
     return fmt::format(
         "_ai_Application=Strandcast {};_ai_DCC_FPS={:.6f};_ai_Description={} strands of {} vertices, root "
-        "first, in {}. Sample 0 is the rest shape, the motion begins at sample 1.;unit_m={:.7g};up_axis={}",
+        "first, in {}. {}, the motion begins at sample 1.;unit_m={:.7g};up_axis={}",
         version(), options_.fps.hz(), strands_.strand_count(), strands_.vertex_count(),
-        options_.space == ExportSpace::Head ? "the head's own space" : "the world", options_.unit_m,
-        options_.up == ExportUp::Y ? 'Y' : 'Z');
+        options_.space == ExportSpace::Head ? "the head's own space" : "the world", kAbcRestSample,
+        options_.unit_m, options_.up == ExportUp::Y ? 'Y' : 'Z');
   }
 
   const ExportOptions options_;

@@ -61,8 +61,13 @@ class CurveMotionReading {
     ASSIGN_OR_RETURN(const std::vector<double> times, sample_times());
     CurveMotion motion;
     ASSIGN_OR_RETURN(const std::vector<glm::dvec3> first, roots_at(times.front()));
+    motion.object_count = curves_.size();
+    motion.root_count = first.size();
+    motion.is_behind_rest = begins_at_rest() && times.size() > 2;
+    const size_t begin = motion.is_behind_rest ? 1 : 0;
     glm::dquat rotation(1.0, 0.0, 0.0, 0.0);
-    for (const double time_s : times) {
+    for (size_t i = begin; i < times.size(); ++i) {
+      const double time_s = times[i];
       ASSIGN_OR_RETURN(const std::vector<glm::dvec3> roots, roots_at(time_s));
       if (roots.size() != first.size())
         return make_error(ErrorCode::BadInput, "{} strands at {:.6g} s, but {} at first: they come and go",
@@ -70,13 +75,19 @@ class CurveMotionReading {
       rotation = rotation_between(first, roots, rotation);
       const Pose pose{middle_of(roots) - rotation * middle_of(first), rotation};
       RETURN_IF_ERROR(check_rigid(first, roots, pose, time_s));
-      motion.time_s.push_back(time_s - times.front());
+      motion.time_s.push_back(time_s - times[begin]);
       motion.from_first.push_back(pose);
     }
     return motion;
   }
 
  private:
+  /// Whether it is an export of ours, which says so.
+  bool begins_at_rest() const {
+    return abc_metadata_value(archive_.metadata(), "_ai_Description").find(kAbcRestSample) !=
+           std::string_view::npos;
+  }
+
   /// Whether all roots are where the movement takes them.
   static Status check_rigid(std::span<const glm::dvec3> first, std::span<const glm::dvec3> roots,
                             const Pose& pose, double time_s) {

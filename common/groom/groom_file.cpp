@@ -11,6 +11,7 @@
 #include "common/base/text.h"
 #include "common/base/units.h"
 #include "common/groom/abc_loader.h"
+#include "common/groom/groom_parts.h"
 #include "common/groom/hair_loader.h"
 #include "common/groom/head_fit.h"
 #include "common/groom/ply_loader.h"
@@ -94,13 +95,16 @@ Result<StatedGroom> load_by_extension(const std::filesystem::path& path, const G
           extension));
 }
 
-uint32_t target_vertex_count(const Groom& groom, uint32_t wanted) {
-  if (wanted != 0) return wanted;
+uint32_t most_vertices(const Groom& groom) {
   uint32_t largest = 0;
   for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
     largest = std::max(largest, groom.vertex_count(strand));
   }
-  return std::clamp(largest, kMinVertexCount, kMaxVertexCount);
+  return largest;
+}
+
+uint32_t target_vertex_count(uint32_t most, uint32_t wanted) {
+  return wanted != 0 ? wanted : std::clamp(most, kMinVertexCount, kMaxVertexCount);
 }
 
 /// Adds a part of the hair behind the others.
@@ -119,33 +123,49 @@ void join(StatedGroom& hair, StatedGroom part) {
   whole.pinned.insert(whole.pinned.end(), part.groom.pinned.begin(), part.groom.pinned.end());
 }
 
-/// What two parts of one head of hair say, when both say it, has to be the same.
-template <class T>
-Status agree(const std::optional<T>& first, const std::optional<T>& part, const char* what) {
-  if (!first || !part || *first == *part) return {};
-  return make_error(ErrorCode::BadInput, "it states another {} than the first file: parts share one", what);
-}
-
-/// All files of the options in file units; the first that states a unit or an up axis does so for all.
-Result<StatedGroom> load_parts(const GroomFileOptions& options) {
+/// All files of the options in file units, each with what it says.
+Result<std::vector<GroomPart>> load_each(const GroomFileOptions& options) {
   if (options.more_paths.size() + 1 > kMaxGroomFiles)
     return make_error(ErrorCode::LimitExceeded, "{} groom files, at most {} make one head of hair",
                       options.more_paths.size() + 1, kMaxGroomFiles);
-  ASSIGN_OR_RETURN(StatedGroom whole, load_by_extension(options.path, options));
-  uint64_t vertex_total = whole.groom.rest_position_m.size();
-  if (!options.more_paths.empty())
-    whole.labels = named(std::move(whole.labels), whole.groom.strand_count(), whole.groom.name);
-  for (const std::filesystem::path& path : options.more_paths) {
+  std::vector<std::filesystem::path> paths = {options.path};
+  paths.insert(paths.end(), options.more_paths.begin(), options.more_paths.end());
+  std::vector<GroomPart> parts;
+  std::optional<bool> is_z_up;
+  uint64_t vertex_total = 0;
+  for (const std::filesystem::path& path : paths) {
     ASSIGN_OR_RETURN(StatedGroom part, load_by_extension(path, options));
     vertex_total += part.groom.rest_position_m.size();
     if (vertex_total > kMaxGroomVertices)
       return at(path.string(), make_error(ErrorCode::LimitExceeded,
                                           "{} vertices with the files before it, at most {} are allowed",
                                           vertex_total, kMaxGroomVertices));
-    if (const Status same = agree(whole.unit_m, part.unit_m, "unit"); !same)
-      return at(path.string(), same.error());
-    if (const Status same = agree(whole.is_z_up, part.is_z_up, "up axis"); !same)
-      return at(path.string(), same.error());
+    if (is_z_up && part.is_z_up && *is_z_up != *part.is_z_up)
+      return at(path.string(),
+                make_error(ErrorCode::BadInput,
+                           "it states another up axis than the files before it: parts share one"));
+    if (part.is_z_up) is_z_up = part.is_z_up;
+    if (const std::string turned = turn_tips_first(part.groom, part.labels); !turned.empty())
+      part.notes.push_back(fmt::format("{}: {}", path.filename().string(), turned));
+    parts.push_back({path, std::move(part)});
+  }
+  return parts;
+}
+
+struct JoinedParts {
+  StatedGroom whole;
+  std::string apart;  // as unify_units()
+};
+
+/// All files as one, in one unit; the first that states a unit or an up axis does so for all.
+Result<JoinedParts> load_parts(const GroomFileOptions& options) {
+  ASSIGN_OR_RETURN(std::vector<GroomPart> parts, load_each(options));
+  std::string apart = parts.size() > 1 ? unify_units(parts) : std::string();
+  StatedGroom whole = std::move(parts.front().stated);
+  if (parts.size() > 1)
+    whole.labels = named(std::move(whole.labels), whole.groom.strand_count(), whole.groom.name);
+  for (size_t i = 1; i < parts.size(); ++i) {
+    StatedGroom& part = parts[i].stated;
     if (!whole.material.is_known()) whole.material = part.material;
     if (!whole.unit_m) whole.unit_reason = part.unit_reason;
     if (!whole.is_z_up) whole.up_axis_reason = part.up_axis_reason;
@@ -154,7 +174,7 @@ Result<StatedGroom> load_parts(const GroomFileOptions& options) {
     whole.notes.insert(whole.notes.end(), part.notes.begin(), part.notes.end());
     join(whole, std::move(part));
   }
-  return whole;
+  return JoinedParts{std::move(whole), std::move(apart)};
 }
 
 constexpr std::array kUsualUnitsM = {1.0f, 0.01f, 0.001f, 0.0254f};
@@ -355,8 +375,7 @@ void turn_up(StatedGroom& stated, const GroomFileOptions& options, PlacedGroom& 
   }
   if (!options.is_z_up) {
     const UpSide side{upright.is_z_up, upright.is_upside_down};
-    placed.unlikely = unlikely_side(stated.groom, side, stated.is_z_up.has_value());
-    if (!placed.unlikely.empty()) placed.notes.push_back(placed.unlikely);
+    add_sentence(placed.unlikely, unlikely_side(stated.groom, side, stated.is_z_up.has_value()));
   }
   for (glm::vec3& point : stated.groom.rest_position_m) point = upright.place(point);
   placed.placement.is_z_up = upright.is_z_up;
@@ -397,9 +416,7 @@ PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
     const bool is_stated = options.unit_m > 0.0f || stated.unit_m;
     if (unlikely.empty() && is_stated) unlikely = unlikely_head(unit_m, groom);
     if (unlikely.empty()) unlikely = unlikely_roots(unit_m, groom);
-    if (unlikely.empty()) return;
-    placed.notes.push_back(unlikely);
-    if (placed.unlikely.empty()) placed.unlikely = std::move(unlikely);
+    add_sentence(placed.unlikely, unlikely);
   };
   if (options.unit_m > 0.0f) {
     placement.unit_m = options.unit_m;
@@ -413,7 +430,7 @@ PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
     const Guess<float> guess = guess_unit(groom);
     placement.unit_m = guess.value;
     note_guess(placed, fmt::format("1 unit = {}", unit_text(guess.value)),
-               guess.reason.empty() ? "the roots say nothing of a head" : guess.reason, "unit_m");
+               guess.reason.empty() ? "these roots say nothing of a head" : guess.reason, "unit_m");
     judge_unit(guess.value);
   }
   placed.material = usable_material(stated.material.scaled(placement.unit_m), placed.notes);
@@ -438,14 +455,21 @@ float guess_unit_m(const Groom& groom) {
 Result<PlacedGroom> load_placed_groom(const GroomFileOptions& options) {
   const std::string place_name = options.path.string();
   if (const Status checked = check_options(options); !checked) return at(place_name, checked.error());
-  ASSIGN_OR_RETURN(StatedGroom loaded, load_parts(options));
-  PlacedGroom placed = place(std::move(loaded), options);
+  ASSIGN_OR_RETURN(JoinedParts loaded, load_parts(options));
+  PlacedGroom placed = place(std::move(loaded.whole), options);
+  add_sentence(placed.unlikely, loaded.apart);
   // Before resampling, so that overflown coordinates never enter its sums.
   if (const Status checked = validate(placed.groom); !checked)
     return at(place_name, placed.unlikely.empty() ? checked.error()
                                                   : make_error(ErrorCode::BadInput, "{}; {}",
                                                                checked.error().message, placed.unlikely));
-  const uint32_t vertex_count = target_vertex_count(placed.groom, options.vertex_count);
+  const uint32_t most = most_vertices(placed.groom);
+  const uint32_t vertex_count = target_vertex_count(most, options.vertex_count);
+  if (most > vertex_count && options.vertex_count == 0)
+    placed.notes.push_back(fmt::format(
+        "strands of up to {} points are resampled to {} each, the most that are simulated, evenly "
+        "along their length",
+        most, vertex_count));
   if (placed.groom.uniform_vertex_count() != vertex_count) {
     placed.labels.width = resample(placed.groom, placed.labels.width, vertex_count);
     placed.groom = resample(placed.groom, vertex_count);

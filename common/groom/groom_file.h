@@ -39,10 +39,18 @@ struct PlacedGroom {
   HairMaterial material;
   GroomPlacement placement;
   bool is_of_head = true;  // its roots might be those of a head
-  std::string unlikely;    // why no head has hair in this unit or this side up, and what fits; empty: it may
+  // Why no head has this hair as it was placed, and what fits; empty where one may. --check refuses it, and a
+  // start warns of it. No note says it again.
+  std::string unlikely;
   std::vector<std::string>
       notes;  // a sentence for each thing that the file says or that was guessed, and why
 };
+
+/// Adds a sentence to others, parted by a semicolon; an empty one adds nothing.
+inline void add_sentence(std::string& sentences, const std::string& sentence) {
+  if (!sentences.empty() && !sentence.empty()) sentences += "; ";
+  sentences += sentence;
+}
 
 /// Returns the value of guess_unit(): metres per file unit.
 float guess_unit_m(const Groom& groom);

@@ -46,10 +46,11 @@ Status GroomSource::claim(uint64_t size_bytes) {
 
 Status GroomSource::check_reaches(uint64_t contents) const {
   if (contents < size_bytes_) return {};
-  return make_error(ErrorCode::BadInput,
-                    "it is cut off at byte {}, before the list of what is in it: copy it again, or export it "
-                    "anew",
-                    size_bytes_);
+  return make_error(
+      ErrorCode::BadInput,
+      "it is cut off at byte {}, before the list of what is in it, which stands at the end: nothing "
+      "of it can be had; copy it again, or export it anew (as .usda, which is read up to a cut)",
+      size_bytes_);
 }
 
 Status GroomSource::check(uint64_t offset, uint64_t count, uint64_t item_bytes) {

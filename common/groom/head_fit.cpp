@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "common/base/quantile.h"
+
 namespace strandcast {
 namespace {
 
@@ -32,15 +34,6 @@ glm::dvec3 growth_direction(const Groom& groom) {
     count += 1.0;
   }
   return count > 0.0 ? sum / count : sum;
-}
-
-float extent_m(const std::vector<glm::vec3>& points_m) {
-  glm::vec3 low = points_m.front(), high = points_m.front();
-  for (const glm::vec3& point : points_m) {
-    low = glm::min(low, point);
-    high = glm::max(high, point);
-  }
-  return glm::length(high - low);
 }
 
 /// Whether all around the sphere no place is further than this from a root: hair leaves 55 degrees and more
@@ -73,6 +66,24 @@ bool are_near(const FittedSphere& sphere, const std::vector<glm::vec3>& roots) {
   return 10 * static_cast<size_t>(near_count) >= kOfTen * roots.size();
 }
 
+/// Whether all roots lie below the middle of a face that they reach around: +Y is up. Hair of a head covers
+/// its top, and a wreath of hair reaches up to its middle.
+bool are_on_jaw(const FittedSphere& face, const std::vector<glm::vec3>& roots) {
+  constexpr double kMost = 0.98;
+  constexpr float kHighest = 0.15f, kHalf = -0.3f, kNearest = 0.6f, kFurthest = 1.6f;  // radii
+  if (!(extent_of(roots) >= face.radius_m)) return false;
+  size_t low_count = 0, near_count = 0;
+  std::vector<float> heights;
+  for (const glm::vec3& root : roots) {
+    const glm::vec3 out = (root - face.center_m) / face.radius_m;
+    heights.push_back(out.y);
+    low_count += out.y < kHighest ? 1 : 0;
+    near_count += glm::length(out) > kNearest && glm::length(out) < kFurthest ? 1 : 0;
+  }
+  const auto most = static_cast<size_t>(kMost * static_cast<double>(roots.size()));
+  return low_count >= most && near_count >= most && median(std::move(heights)) < kHalf;
+}
+
 }  // namespace
 
 std::vector<glm::vec3> roots_of(const Groom& groom) {
@@ -80,6 +91,15 @@ std::vector<glm::vec3> roots_of(const Groom& groom) {
   for (uint32_t strand = 0; strand < groom.strand_count(); ++strand)
     roots[strand] = groom.rest_position_m[groom.offset[strand]];
   return roots;
+}
+
+float extent_of(const std::vector<glm::vec3>& points) {
+  glm::vec3 low = points.front(), high = points.front();
+  for (const glm::vec3& point : points) {
+    low = glm::min(low, point);
+    high = glm::max(high, point);
+  }
+  return glm::length(high - low);
 }
 
 FittedSphere fit_head_sphere(const Groom& groom) {
@@ -91,29 +111,37 @@ FittedSphere fit_head_sphere(const Groom& groom) {
     if (count < kMinFittedRoots) break;
     roots.resize(count);
     const FittedSphere fitted = fit_sphere(roots);
-    if (extent_m(roots) >= 2.0f * fitted.radius_m) return fitted;
+    if (extent_of(roots) >= 2.0f * fitted.radius_m) return fitted;
   }
   return of_all;
 }
 
-bool are_on_a_disc(const std::vector<glm::vec3>& roots) {
+bool are_flat(const std::vector<glm::vec3>& points) {
   constexpr double kFlat = 0.05;  // 1 for what is as wide on all sides; a disc a tenth as thick has 0.03
-  if (roots.size() < kMinFittedRoots) return false;
   glm::dvec3 middle(0.0);
-  for (const glm::vec3& root : roots) middle += glm::dvec3(root) / static_cast<double>(roots.size());
+  for (const glm::vec3& point : points) middle += glm::dvec3(point) / static_cast<double>(points.size());
   glm::dmat3 spread(0.0);
-  for (const glm::vec3& root : roots)
-    spread += glm::outerProduct(glm::dvec3(root) - middle, glm::dvec3(root) - middle);
+  for (const glm::vec3& point : points)
+    spread += glm::outerProduct(glm::dvec3(point) - middle, glm::dvec3(point) - middle);
   const double mean = (spread[0][0] + spread[1][1] + spread[2][2]) / 3.0;
-  const bool is_flat = !(glm::determinant(spread) > kFlat * mean * mean * mean);
-  return is_flat && !are_near(fit_sphere(roots), roots);
+  return !(glm::determinant(spread) > kFlat * mean * mean * mean);
+}
+
+bool are_on_a_disc(const std::vector<glm::vec3>& roots) {
+  return roots.size() >= kMinFittedRoots && are_flat(roots) && !are_near(fit_sphere(roots), roots);
+}
+
+HairPlace hair_place(const Groom& groom) {
+  const std::vector<glm::vec3> roots = roots_of(groom);
+  if (roots.size() < kMinFittedRoots) return HairPlace::Head;
+  const FittedSphere fitted = fit_sphere(roots);
+  if (are_on_jaw(fitted, roots)) return HairPlace::Jaw;
+  if (!(extent_of(roots) >= 2.0f * fitted.radius_m) || are_on_a_disc(roots)) return HairPlace::Head;
+  return are_near(fitted, roots) && !is_covered(fitted, roots) ? HairPlace::Head : HairPlace::Body;
 }
 
 bool is_hair_of_head(const Groom& groom) {
-  const std::vector<glm::vec3> roots = roots_of(groom);
-  const FittedSphere fitted = fit_sphere(roots);
-  if (roots.size() < kMinFittedRoots || !(extent_m(roots) >= 2.0f * fitted.radius_m)) return true;
-  return are_on_a_disc(roots) || (are_near(fitted, roots) && !is_covered(fitted, roots));
+  return hair_place(groom) == HairPlace::Head;
 }
 
 float covered_head_radius(const Groom& groom) {
@@ -121,7 +149,8 @@ float covered_head_radius(const Groom& groom) {
   const std::vector<glm::vec3> roots = roots_of(groom);
   if (roots.size() < kMinCoveredRoots || are_on_a_disc(roots) || !is_hair_of_head(groom)) return 0.0f;
   const FittedSphere fitted = fit_sphere(roots);
-  return std::isfinite(fitted.radius_m) && extent_m(roots) >= 2.0f * fitted.radius_m ? fitted.radius_m : 0.0f;
+  return std::isfinite(fitted.radius_m) && extent_of(roots) >= 2.0f * fitted.radius_m ? fitted.radius_m
+                                                                                      : 0.0f;
 }
 
 FittedSphere fit_head(const Groom& groom) {

@@ -16,12 +16,21 @@ std::vector<glm::vec3> roots_of(const Groom& groom);
 /// sphere, only the upper roots count. Falls back to all roots.
 FittedSphere fit_head_sphere(const Groom& groom);
 
+/// Returns the diagonal of the box around points.
+float extent_of(const std::vector<glm::vec3>& points);
+
+/// Returns whether points lie in or near a plane or a line, on a sphere or not.
+bool are_flat(const std::vector<glm::vec3>& points);
+
 /// Returns whether roots fill a part of a plane, so that the sphere through them says nothing. A line over a
 /// head lies on its sphere.
 bool are_on_a_disc(const std::vector<glm::vec3>& roots);
 
-/// Tells hair of a head from fur: roots of a body lie far from the sphere that fits them best, and those of a
-/// ball leave no room for a face and a neck.
+/// Where hair grows: roots of a body lie far from the sphere that fits them best, and those of a ball leave
+/// no room for a face and a neck. A beard lies below the middle of its face; +Y is up.
+enum class HairPlace { Head, Jaw, Body };
+HairPlace hair_place(const Groom& groom);
+/// Returns whether hair is neither fur nor a beard.
 bool is_hair_of_head(const Groom& groom);
 
 /// Returns the radius of the head under the roots, in the groom's units; 0 where these are few, on a disc,

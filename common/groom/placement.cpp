@@ -39,14 +39,16 @@ constexpr double kHairlineShare = 0.05;
 /// A hairline that rises and falls by less, in head radii, has no front.
 constexpr double kMinHairlineSwing = 0.15;
 constexpr double kQuarterTurnDeg = 90.0;
-/// A face nearer than this to a quarter turn is there: by the mirror, or where roots are not alike on both
-/// sides by the hairline alone, which is up to 29 degrees off.
-constexpr double kSnapDeg = 8.0, kHairlineSnapDeg = 32.0;
+/// A face nearer than this to a quarter turn is there: by the mirror, which is 2 degrees off where hair is
+/// not quite alike on both sides, or where it is nothing like that by the hairline alone, up to 29 degrees
+/// off.
+constexpr double kSnapDeg = 8.0, kLopsidedSnapDeg = 10.0, kHairlineSnapDeg = 32.0;
 /// The mirror is looked for so far from where the hairline is highest.
 constexpr double kMirrorReachDeg = 45.0, kMirrorStepDeg = 0.25;
 /// Hair whose two sides differ more, 0 to 1, is no mirror image: whole heads of 143 strands and more have up
-/// to 0.04, those without a side or a patch 0.2 and more.
-constexpr double kMostSkew = 0.1;
+/// to 0.04, those without a side or a patch 0.2 and more. Up to half, they say so much: near a quarter turn
+/// it is that one.
+constexpr double kMostSkew = 0.1, kAlikeSkew = 0.01, kLopsidedSkew = 0.19;
 
 double angle_of(const glm::dvec3& direction) {
   return std::atan2(direction.x, direction.z);
@@ -122,16 +124,18 @@ struct FaceAngle {
 
 FaceAngle face_by_mirror(const std::vector<glm::dvec3>& directions, double hairline_deg) {
   const HairCover cover(directions);
-  FaceAngle best{hairline_deg};
-  double least = kMostSkew;
+  double best_deg = hairline_deg, least = 1.0;
   for (double aside_deg = -kMirrorReachDeg; aside_deg <= kMirrorReachDeg; aside_deg += kMirrorStepDeg) {
     const double deg = std::round(hairline_deg) + aside_deg;
     const double skew = cover.skew(deg * std::numbers::pi / 180.0);
     if (skew >= least) continue;
-    best = {std::remainder(deg, 360.0), kSnapDeg};
+    best_deg = std::remainder(deg, 360.0);
     least = skew;
   }
-  return best;
+  if (least < kMostSkew) return {best_deg, least < kAlikeSkew ? kSnapDeg : kLopsidedSnapDeg};
+  const double off_deg = std::abs(std::remainder(best_deg, kQuarterTurnDeg));
+  if (least < kLopsidedSkew && off_deg <= kLopsidedSnapDeg) return {best_deg, kLopsidedSnapDeg};
+  return {hairline_deg};
 }
 
 /// What speaks for +Y being up.
@@ -221,34 +225,56 @@ const char* setting_of(const UpSide& up) {
   return up.is_z_up ? (up.is_upside_down ? "MINUS_Z" : "Z") : (up.is_upside_down ? "MINUS_Y" : "Y");
 }
 
-Guess<float> guess_yaw_deg(const Groom& groom) {
-  if (groom.strand_count() < kMinRoots) return {};
+namespace {
+
+/// Where around +Y the lowest roots are highest: the first harmonic of the hairline's height.
+glm::dvec3 hairline_rise(const std::vector<glm::dvec3>& directions) {
   std::array<std::vector<double>, kSectors> heights;
-  const std::vector<glm::dvec3> directions = root_directions(groom, RootReach::Everywhere);
   for (const glm::dvec3& direction : directions) {
     const double turns = angle_of(direction) / (2.0 * std::numbers::pi) + 1.0;
     heights[static_cast<size_t>(turns * kSectors + 0.5) % kSectors].push_back(direction.y);
   }
-  // The first harmonic of the hairline's height; a sector without roots is bare up to the crown.
   glm::dvec3 rise(0.0);
+  // A sector without roots is bare up to the crown.
   for (size_t sector = 0; sector < kSectors; ++sector) {
     const double height =
         heights[sector].empty() ? 1.0 : quantile(std::move(heights[sector]), kHairlineShare);
     const double angle = 2.0 * std::numbers::pi * static_cast<double>(sector) / kSectors;
     rise += 2.0 / kSectors * height * glm::dvec3(std::sin(angle), 0.0, std::cos(angle));
   }
+  return rise;
+}
+
+/// Where around +Y roots are.
+glm::dvec3 middle_around(const std::vector<glm::dvec3>& directions) {
+  glm::dvec3 sum(0.0);
+  for (const glm::dvec3& direction : directions)
+    sum += glm::dvec3(direction.x, 0.0, direction.z) / static_cast<double>(directions.size());
+  return sum;
+}
+
+}  // namespace
+
+Guess<float> guess_yaw_deg(const Groom& groom) {
+  if (groom.strand_count() < kMinRoots) return {};
+  const HairPlace place = hair_place(groom);
+  if (place == HairPlace::Body) return {};
+  const std::vector<glm::dvec3> directions = root_directions(groom, RootReach::Everywhere);
+  const bool is_beard = place == HairPlace::Jaw;
+  const char* const why = is_beard ? "the beard grows" : "the hairline is highest";
+  const glm::dvec3 rise = is_beard ? middle_around(directions) : hairline_rise(directions);
   if (!(glm::length(rise) >= kMinHairlineSwing)) return {};
   const auto [face_deg, snap_deg] = face_by_mirror(directions, angle_of(rise) * 180.0 / std::numbers::pi);
   const double quarter_deg = kQuarterTurnDeg * std::round(face_deg / kQuarterTurnDeg);
   if (std::abs(face_deg - quarter_deg) > snap_deg) {
     const double whole_deg = std::round(face_deg);
     return {static_cast<float>(-whole_deg),
-            fmt::format("the hairline is highest about {} degrees from +Z towards +X", whole_deg)};
+            fmt::format("{} about {} degrees from +Z towards +X", why, whole_deg)};
   }
   constexpr std::array kNames = {"-Z", "-X", "+Z", "+X", "-Z"};
   const auto quarters = static_cast<size_t>(quarter_deg / kQuarterTurnDeg + 2.5);
   return {static_cast<float>(quarter_deg == 180.0 ? 180.0 : 0.0 - quarter_deg),
-          fmt::format("the hairline is highest at {}", kNames[quarters])};
+          fmt::format("{} at {}", why, kNames[quarters])};
 }
 
 namespace {
@@ -260,9 +286,9 @@ const char* unlike_a_head(const Groom& groom) {
   return are_on_a_disc(roots_of(groom)) ? "its roots lie in a plane" : nullptr;
 }
 
-/// The first common unit in which hair is as long as on a head; no reason where there is none.
-Guess<float> unit_by_length(const Groom& groom, const char* why) {
-  constexpr double kShortestM = 0.03, kLongestM = 1.2, kLongHair = 0.95;  // of strands
+/// What all strands but the longest are as long as.
+double usual_length(const Groom& groom) {
+  constexpr double kLongHair = 0.95;  // of strands
   std::vector<double> lengths;
   for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
     double length = 0.0;
@@ -270,7 +296,37 @@ Guess<float> unit_by_length(const Groom& groom, const char* why) {
       length += static_cast<double>(glm::distance(groom.rest_position_m[v], groom.rest_position_m[v - 1]));
     lengths.push_back(length);
   }
-  const double length = lengths.empty() ? 0.0 : quantile(lengths, kLongHair);
+  return lengths.empty() ? 0.0 : quantile(lengths, kLongHair);
+}
+
+/// The first common unit in which fur and its body are as large as on an animal; no reason where there is
+/// none.
+Guess<float> unit_of_fur(const Groom& groom) {
+  constexpr double kShortestM = 0.002, kLongestM = 0.25, kSmallestM = 0.05, kLargestM = 4.0;
+  const double length = usual_length(groom);
+  const std::vector<glm::vec3> roots = roots_of(groom);
+  glm::vec3 low = roots.front(), high = low;
+  for (const glm::vec3& root : roots) {
+    low = glm::min(low, root);
+    high = glm::max(high, root);
+  }
+  const double size = static_cast<double>(std::max({high.x - low.x, high.y - low.y, high.z - low.z}));
+  for (const CommonUnit& unit : kCommonUnits) {
+    const double length_m = length * static_cast<double>(unit.unit_m),
+                 size_m = size * static_cast<double>(unit.unit_m);
+    if (length_m >= kShortestM && length_m <= kLongestM && size_m >= kSmallestM && size_m <= kLargestM)
+      return {unit.unit_m,
+              fmt::format("these roots are no head of hair, and in {} the fur is {:.2g} m long on "
+                          "a body of {:.2g} m",
+                          unit.name, length_m, size_m)};
+  }
+  return {1.0f, {}};
+}
+
+/// The first common unit in which hair is as long as on a head; no reason where there is none.
+Guess<float> unit_by_length(const Groom& groom, const char* why) {
+  constexpr double kShortestM = 0.03, kLongestM = 1.2;
+  const double length = usual_length(groom);
   for (const CommonUnit& unit : kCommonUnits) {
     const double length_m = length * static_cast<double>(unit.unit_m);
     if (length_m >= kShortestM && length_m <= kLongestM)
@@ -285,12 +341,16 @@ Guess<float> guess_unit(const Groom& groom) {
   if (const char* const why = unlike_a_head(groom)) {
     if (Guess<float> by_length = unit_by_length(groom, why); !by_length.reason.empty()) return by_length;
   }
+  const HairPlace place = hair_place(groom);
+  if (place == HairPlace::Body) return unit_of_fur(groom);
   const float radius = fit_head_sphere(groom).radius_m;
   if (!std::isfinite(radius) || radius <= 0.0f) return {1.0f, {}};
   for (const CommonUnit& unit : kCommonUnits) {
     if (radius * unit.unit_m < kSmallestHeadRadiusM || radius * unit.unit_m > kLargestHeadRadiusM) continue;
-    return {unit.unit_m, fmt::format("in {} the head has the size of a person's", unit.name)};
+    return {unit.unit_m, fmt::format("in {} the {} has the size of a person's", unit.name,
+                                     place == HairPlace::Jaw ? "face behind this beard" : "head")};
   }
+  if (place == HairPlace::Jaw) return {1.0f, {}};
   return {kTypicalHeadRadiusM / radius, "that gives the head the size of a person's"};
 }
 

@@ -59,7 +59,8 @@ Guess<float> guess_yaw_deg(const Groom& groom);
 
 /// Guesses the unit: the first of metre, centimetre, millimetre and inch that gives the sphere through the
 /// roots the size of a human head, or flat roots hair of usual length. Otherwise returns the factor that
-/// does. `groom` is in file units, +Y up.
+/// does. Fur and beards never get a unit of their own: one in which neither is usual stays a metre. `groom`
+/// is in file units, +Y up.
 Guess<float> guess_unit(const Groom& groom);
 
 }  // namespace strandcast

@@ -1,12 +1,15 @@
 #include "common/groom/ply_loader.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <utility>
 
 #include "common/base/file.h"
+#include "common/base/hash.h"
 #include "common/base/mercy.h"
+#include "common/base/quantile.h"
 #include "common/groom/ply_table.h"
 #include "common/groom/text_scan.h"
 #include "common/groom/usable_strands.h"
@@ -277,6 +280,24 @@ Statements statements_of(const std::vector<std::string>& comments) {
   return said;
 }
 
+/// Whether successive points lie no nearer to each other than any two. `count`: points of a strand.
+bool are_shuffled(std::span<const glm::vec3> points, uint32_t count) {
+  constexpr size_t kMinPoints = 200;     // fewer may be as wild as they like
+  constexpr uint32_t kMinOfStrand = 10;  // of fewer, steps are as long as strands
+  constexpr double kNearer = 0.75;
+  if (points.size() < kMinPoints || count < kMinOfStrand) return false;
+  std::vector<float> steps, jumps;
+  for (size_t i = 0; i + 1 < points.size(); ++i) {
+    const float step = glm::distance(points[i], points[i + 1]);
+    const float jump = glm::distance(points[i], points[mix_u32(static_cast<uint32_t>(i)) % points.size()]);
+    if (!std::isfinite(step) || !std::isfinite(jump)) continue;
+    steps.push_back(step);
+    jumps.push_back(jump);
+  }
+  return !steps.empty() && static_cast<double>(median(std::move(steps))) >
+                               kNearer * static_cast<double>(median(std::move(jumps)));
+}
+
 /// Bare points: so many of them to a strand.
 Result<Groom> strands_of_points(std::vector<glm::vec3> points, uint32_t count,
                                 std::vector<std::string>& notes) {
@@ -285,6 +306,12 @@ Result<Groom> strands_of_points(std::vector<glm::vec3> points, uint32_t count,
                       "{} points are no strands of {} each; groom.file.strand_vertex_count says how many a "
                       "strand has",
                       points.size(), count);
+  if (are_shuffled(points, count))
+    return make_error(
+        ErrorCode::BadInput,
+        "{} points are in no order: from one to the next it is as far as to any other, so nobody "
+        "can tell strands of them (export curves, or points from root to tip)",
+        points.size());
   if (points.size() / count > kMaxStrandCount)
     return make_error(ErrorCode::LimitExceeded, "{} strands, at most {} are allowed", points.size() / count,
                       kMaxStrandCount);

@@ -17,7 +17,7 @@
 namespace strandcast {
 namespace {
 
-bool is_finite(const glm::vec3& point) {
+bool is_finite_point(const glm::vec3& point) {
   return std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z);
 }
 
@@ -65,7 +65,7 @@ size_t lost_point(std::span<const glm::vec3> strand) {
 }
 
 std::optional<Error> what_is_wrong(uint32_t strand, std::span<const glm::vec3> points) {
-  const auto bad = std::find_if_not(points.begin(), points.end(), is_finite);
+  const auto bad = std::find_if_not(points.begin(), points.end(), is_finite_point);
   if (bad != points.end())
     return make_error(ErrorCode::BadInput, "strand {} vertex {} has the coordinates {}, {} and {}", strand,
                       bad - points.begin(), bad->x, bad->y, bad->z);

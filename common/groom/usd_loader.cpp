@@ -222,7 +222,23 @@ Status add_curves(UsdStage& stage, size_t prim, Groom& groom, StrandLabels& labe
   return {};
 }
 
+/// What to say of instancers; empty where there are none.
+std::string left_out_instancers(const UsdStage& stage) {
+  uint64_t instancers = 0, instances = 0;
+  for (const UsdPrim& prim : stage.prim) {
+    if (!prim.is_instancer) continue;
+    ++instancers;
+    instances += prim.instance_count;
+  }
+  if (instancers == 0) return {};
+  return fmt::format("{} with {} left out: make the instances curves of their own, and export anew",
+                     counted(instancers, "PointInstancer", "PointInstancers"),
+                     counted(instances, "instance is", "instances are"));
+}
+
 std::string where_else(const UsdStage& stage) {
+  if (const std::string instancers = left_out_instancers(stage); !instancers.empty())
+    return "; " + instancers;
   if (stage.reference_count > 0)
     return "; it refers to other files, prims or variants, which are not followed: flatten it first "
            "(usdcat --flatten)";
@@ -256,7 +272,8 @@ std::vector<std::string> notes_of(const UsdStage& stage, const Tally& tally) {
     notes.emplace_back("rest shapes whose roots lie elsewhere are not read: points are the hair");
   if (tally.left_out_prims > 0)
     notes.push_back(counted(tally.left_out_prims, "BasisCurves is", "BasisCurves are") +
-                    " left out: inactive, invisible, a proxy, a class or an override");
+                    " left out: inactive, invisible, a proxy, a class, an override or of an instancer");
+  add_note(notes, left_out_instancers(stage));
   if (stage.reference_count > 0)
     notes.push_back(counted(stage.reference_count, "reference, layer or variant is",
                             "references, layers or variants are") +

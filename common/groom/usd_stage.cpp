@@ -73,7 +73,7 @@ bool is_other_curves(std::string_view type) {
 
 bool is_left_out(const UsdStage& stage, size_t prim) {
   for (std::optional<size_t> i = prim; i; i = stage.prim[*i].parent)
-    if (stage.prim[*i].is_left_out) return true;
+    if (stage.prim[*i].is_left_out || stage.prim[*i].is_instancer) return true;
   return purpose_of(stage, prim) == "proxy";
 }
 

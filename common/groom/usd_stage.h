@@ -53,7 +53,9 @@ struct UsdPrim {
   std::string purpose;       // empty: that of its parent
   std::vector<UsdXformOp> op;
   std::vector<std::string> op_order;
-  bool is_moving = false;  // an op has time samples
+  bool is_moving = false;       // an op has time samples
+  bool is_instancer = false;    // a PointInstancer: what is in it is not drawn by itself
+  uint64_t instance_count = 0;  // of one
   bool is_material = false;
   HairMaterial matter;                 // of a material
   std::optional<double> bend_modulus;  // likewise, in place of Young's modulus
@@ -88,9 +90,10 @@ std::optional<double>* find_material_number(UsdPrim& prim, std::string_view prop
 Status set_xform_op(UsdPrim& prim, std::string_view name, std::vector<double> value, bool is_sample);
 /// Whether a prim of this type is curves of another kind.
 bool is_other_curves(std::string_view type);
+inline constexpr std::string_view kUsdInstancer = "PointInstancer", kUsdInstances = "protoIndices";
 
-/// Returns whether this prim or one of its ancestors is left out, or whether it stands for another as a
-/// proxy.
+/// Returns whether this prim or one of its ancestors is left out or an instancer, or whether it stands for
+/// another as a proxy.
 bool is_left_out(const UsdStage& stage, size_t prim);
 /// Returns what a prim is for: by itself, else by the nearest prim around it that says it; else "default".
 std::string_view purpose_of(const UsdStage& stage, size_t prim);

@@ -133,6 +133,7 @@ class StageReader {
     if (is_other_curves(type)) ++stage_.other_curve_count;
     if (type == "BasisCurves") prim.curves.emplace();
     prim.is_material = type == "Material";
+    prim.is_instancer = type == kUsdInstancer;
     const size_t index = stage_.prim.size();
     stage_.prim.push_back(std::move(prim));
     RETURN_IF_ERROR(scan_.expect('{'));
@@ -204,6 +205,11 @@ class StageReader {
       return {};
     }
     if (name.starts_with("xformOp:")) return take_op(name, prim, time.has_value());
+    if (prim.is_instancer && name == kUsdInstances) {
+      ASSIGN_OR_RETURN(const auto instances, scan_.numbers(size_t{kMaxGroomVertices}));
+      prim.instance_count = instances.size();
+      return {};
+    }
     return prim.curves ? take_curves(name, *prim.curves, time) : scan_.skip_value();
   }
 

@@ -141,6 +141,7 @@ class CrateReader {
       ASSIGN_OR_RETURN(const auto name, archive_.text(*type));
       if (name == "BasisCurves") prim.curves.emplace();
       prim.is_material = name == "Material";
+      prim.is_instancer = name == kUsdInstancer;
       if (is_other_curves(name)) ++stage_.other_curve_count;
     }
     return count_references(own);
@@ -148,7 +149,8 @@ class CrateReader {
 
   static bool is_wanted(std::string_view name, UsdPrim& prim) {
     if (name == "visibility" || name == "purpose" || name.starts_with("xformOp")) return true;
-    if (find_material_number(prim, name) != nullptr) return true;
+    if (find_material_number(prim, name) != nullptr || (prim.is_instancer && name == kUsdInstances))
+      return true;
     return prim.curves &&
            (name == "points" || name == kUsdRestPoints || name == "curveVertexCounts" || name == "widths" ||
             name == kUsdGroupName || find_curves_numbers(*prim.curves, name) != nullptr ||
@@ -191,6 +193,11 @@ class CrateReader {
     if (name.starts_with("xformOp")) {
       ASSIGN_OR_RETURN(auto numbers, archive_.numbers(value));
       return set_xform_op(prim, name, std::move(numbers), time.has_value());
+    }
+    if (name == kUsdInstances) {
+      ASSIGN_OR_RETURN(const auto instances, archive_.ints(value, kMaxGroomVertices));
+      prim.instance_count = instances.size();
+      return {};
     }
     if (std::optional<double>* const number = find_material_number(prim, name)) {
       ASSIGN_OR_RETURN(const auto numbers, archive_.numbers(value));

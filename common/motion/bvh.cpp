@@ -251,7 +251,7 @@ std::vector<const Joint*> path_to(const Skeleton& skeleton, uint32_t joint_index
   return path;
 }
 
-/// The axis of a file that is up, or down: Y or Z.
+/// The axis of a file that is up, or down.
 struct Upward {
   int axis = 1;
   double sign = 1.0;
@@ -259,17 +259,19 @@ struct Upward {
 
   double of(const glm::dvec3& v) const { return sign * v[axis]; }
   /// Returns the farthest reach along the other axes.
-  double beside(const glm::dvec3& v) const { return std::max(std::abs(v.x), std::abs(v[3 - axis])); }
-  std::string name() const { return fmt::format("{}{}", sign > 0.0 ? '+' : '-', axis == 2 ? 'Z' : 'Y'); }
+  double beside(const glm::dvec3& v) const {
+    return std::max(std::abs(v[(axis + 1) % 3]), std::abs(v[(axis + 2) % 3]));
+  }
+  std::string name() const { return fmt::format("{}{}", sign > 0.0 ? '+' : '-', "XYZ"[axis]); }
 };
-constexpr std::array<Upward, 4> kUpwards = {{{1, 1.0}, {2, 1.0}, {1, -1.0}, {2, -1.0}}};
+constexpr std::array<Upward, 6> kUpwards = {{{1, 1.0}, {2, 1.0}, {1, -1.0}, {2, -1.0}, {0, 1.0}, {0, -1.0}}};
 
 /// Where the head is from the hips with all rotations zero. What is not clear counts as +Y up.
 Upward guess_up(const std::vector<const Joint*>& path) {
   glm::dvec3 head(0.0);
   for (size_t i = 1; i < path.size(); ++i) head += path[i]->offset;
   for (const Upward& up : kUpwards)
-    if (up.of(head) > kUpClearly * std::abs(head[3 - up.axis])) return up;
+    if (up.of(head) > kUpClearly * up.beside(head)) return up;
   return {};
 }
 
@@ -564,8 +566,9 @@ Upward guess_up_in_motion(const Rows& rows, const Upward& at_rest) {
 
 /// Turns that side up, and leaves the face ahead: +Z, or -Y where Z is the axis.
 glm::dquat upright_from(const Upward& up) {
-  const glm::dquat turn =
-      up.axis == 2 ? glm::angleAxis(glm::radians(-90.0), kAxis[0]) : glm::dquat(1, 0, 0, 0);
+  const glm::dquat turn = up.axis == 2   ? glm::angleAxis(glm::radians(-90.0), kAxis[0])
+                          : up.axis == 0 ? glm::angleAxis(glm::radians(90.0), kAxis[2])
+                                         : glm::dquat(1, 0, 0, 0);
   return up.sign > 0.0 ? turn : glm::dquat(0, 0, 0, 1) * turn;
 }
 
@@ -670,6 +673,8 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   else if (up.at_rest != Upward{} && !options.is_z_up)
     clip.up_reason = fmt::format("{} is taken as up: there the head is above the hips in the rest pose",
                                  up.at_rest.name());
+  if (up.at_rest.axis == 0)
+    clip.up_reason += ", and its face is taken to be at +Z there (feed turns it ahead by the motion alone)";
   const BodyHeight height = body_height(skeleton, *head, up, rows.first);
   const bool is_guessed = options.unit_m == 0.0;
   if (is_guessed && !(height.units > 0.0))

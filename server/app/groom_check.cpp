@@ -176,6 +176,7 @@ Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::p
   ASSIGN_OR_RETURN(const std::string drawn, draw_groom(scene, content, body, folder / "groom.png", config));
   std::string text;
   for (const std::string& note : content.notes) text += note + "\n";
+  if (!content.unlikely.empty()) text += content.unlikely + "\n";
   if (!body.capsules.empty()) {
     BodyInput fixed;
     fixed.capsules = body.capsules;

@@ -10,6 +10,7 @@
 #include "common/groom/head_measure.h"
 #include "common/groom/head_shape.h"
 #include "common/groom/head_spheres.h"
+#include "common/groom/mesh_fit.h"
 #include "common/groom/procedural.h"
 #include "common/groom/restyled.h"
 #include "common/scene/file_groom.h"
@@ -160,6 +161,8 @@ Result<SceneContent> load_scene_content(const SceneDesc& scene) {
   Mesh head;
   if (has_head) {
     ASSIGN_OR_RETURN(head, make_head_under(scene, content.groom, placement));
+    if (!scene.head.mesh_path.empty())
+      add_sentence(content.unlikely, unfit_mesh(head, content.groom, placement.place(glm::vec3(0.0f))));
   }
   if (std::holds_alternative<FileGroomDesc>(scene.groom))
     content.groom = restyled(std::move(content.groom), scene.hair.length, scene.hair.curl);

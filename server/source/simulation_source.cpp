@@ -191,6 +191,7 @@ Result<std::unique_ptr<StateSource>> make_simulation(SimulationConfig config, In
   ASSIGN_OR_RETURN(SceneContent content, load_scene_content(config.scene));
   config.scene = with_material(std::move(config.scene), content.material);
   for (const std::string& note : content.notes) log_info("scene", "{}", note);
+  if (!content.unlikely.empty()) log_warn("scene", "{}", content.unlikely);
   if (config.scene.camera == CameraDesc{})
     config.scene.camera = first_camera(config.scene.camera, content.groom.rest_position_m);
   return std::unique_ptr<StateSource>(std::make_unique<SimulationSource>(

@@ -46,10 +46,10 @@ class AbcMotion : public testing::Test {
     }
     return made;
   }
-  Result<CurveMotion> motion_of(const MadeCurves& made) {
+  Result<CurveMotion> motion_of(const MadeCurves& made, const std::string& metadata = {}) {
     const auto path = folder_.path() / "hair.abc";
     MadeAbc file(path);
-    file.finish({file.curves(made)});
+    file.finish({file.curves(made)}, metadata);
     return load_abc_motion(path);
   }
   TemporaryFolder folder_;
@@ -71,6 +71,23 @@ TEST_F(AbcMotion, IsTheMovementThatTheRootsHaveMade) {
   EXPECT_EQ(motion->sample(99.0), motion->from_first.back());
   const Pose between = motion->sample(0.25 * 2.5);
   EXPECT_NEAR(angle_between_rad(motion->sample(0.5).rotation, between.rotation), 0.35, 1e-5);
+}
+
+// As a frame it would put the motion a frame too late.
+TEST_F(AbcMotion, TheRestShapeOfOurOwnExportsIsNoFrame) {
+  const auto whole = motion_of(curves());
+  const auto motion =
+      motion_of(curves(), "_ai_Description=9 strands of 2 vertices, root first, in the world. " +
+                              std::string(kAbcRestSample) + ", the motion begins at sample 1.");
+  ASSERT_TRUE(whole && motion) << motion.error().to_string();
+  EXPECT_FALSE(whole->is_behind_rest);
+  EXPECT_TRUE(motion->is_behind_rest);
+  EXPECT_EQ(motion->object_count, 1u);
+  EXPECT_EQ(motion->root_count, static_cast<size_t>(kRoots));
+  ASSERT_EQ(motion->time_s.size(), static_cast<size_t>(kSamples - 1));
+  EXPECT_EQ(motion->time_s.front(), 0.0);
+  EXPECT_DOUBLE_EQ(motion->duration_s(), 0.25 * (kSamples - 2));
+  for (size_t i = 0; i + 1 < kSamples; ++i) EXPECT_EQ(motion->from_first[i], whole->from_first[i + 1]) << i;
 }
 
 TEST_F(AbcMotion, WhatDoesNotMoveAsOneIsNamed) {

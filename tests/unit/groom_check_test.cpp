@@ -11,6 +11,8 @@
 #include "common/groom/groom_file.h"
 #include "common/pictures/image_codec.h"
 #include "server/scene/scene_content.h"
+#include "server/source/simulation_source.h"
+#include "tests/support/log_capture.h"
 #include "tests/support/temporary_folder.h"
 
 namespace strandcast::groom_check_test {
@@ -98,6 +100,32 @@ TEST(GroomCheck, FailsForAUnitInWhichNoHeadHasThisHair) {
   ASSERT_FALSE(checked);
   EXPECT_THAT(checked.error().to_string(), HasSubstr(part));
   EXPECT_THAT(load_text(folder.path() / "groom.txt", 1 << 20).value(), HasSubstr(part));
+}
+
+// A start goes on with what a check refuses, and says the same.
+TEST(GroomCheck, OfWhatItRefusesAStartWarns) {
+  const TemporaryFolder folder;
+  const std::string text = straight_hair(0.2f);
+  ASSERT_TRUE(save_file(folder.path() / "hair.ply", std::as_bytes(std::span(text))));
+  SimulationConfig config;
+  config.scene = scene_of_file(folder.path() / "hair.ply");
+  InputHub inputs;
+  const test::LogCapture log;
+  ASSERT_TRUE(make_simulation(config, inputs));
+  EXPECT_EQ(log.count("warning [scene]"), 0u);
+  std::get<FileGroomDesc>(config.scene.groom).unit_m = 0.01f;
+  // And a mesh that is none of this head.
+  config.scene.head.mesh_path = folder.path() / "far.obj";
+  const std::string mesh = "v 90 0 0\nv 91 0 0\nv 90 1 0\nv 90 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n";
+  ASSERT_TRUE(save_file(config.scene.head.mesh_path, std::as_bytes(std::span(mesh))));
+  const std::string refused = load_scene_content(config.scene).value().unlikely;
+  EXPECT_THAT(refused, AllOf(HasSubstr("as on no head"), HasSubstr("the head's mesh does not fit")));
+  const auto checked = check_groom(config.scene, folder.path(), {});
+  ASSERT_FALSE(checked);
+  EXPECT_THAT(checked.error().to_string(), HasSubstr(refused));
+  ASSERT_TRUE(make_simulation(config, inputs));
+  EXPECT_EQ(log.count("warning [scene] " + refused), 1u) << testing::PrintToString(log.lines());
+  EXPECT_EQ(log.count("as on no head"), 1u) << "and not twice";
 }
 
 // A head of 0.1 m that is said to be one of inches in metres, and other such mistakes that leave hair of a

@@ -3,6 +3,7 @@
 #include <bit>
 #include <cmath>
 
+#include "common/base/hash.h"
 #include "common/groom/groom_file.h"
 #include "common/groom/ply_loader.h"
 #include "tests/support/temporary_folder.h"
@@ -154,6 +155,28 @@ TEST(Ply, PointsThatDoNotJumpAreTakenAsNeuralToolsLeaveThem) {
   line.resize(299);
   EXPECT_THAT(refusal(bare(line)),
               AllOf(HasSubstr("299 points"), HasSubstr("groom.file.strand_vertex_count says how many")));
+}
+
+// Splats, and points that a program has mixed: strands through them would be lies.
+TEST(Ply, PointsInNoOrderAreNoStrands) {
+  std::vector<glm::vec3> points = hanging(100, 20);
+  EXPECT_EQ(refusal(bare(points)), "accepted");
+  EXPECT_EQ(refusal(bare(points), 20), "accepted");
+  for (size_t i = points.size() - 1; i > 0; --i)
+    std::swap(points[i], points[mix_u32(static_cast<uint32_t>(i)) % (i + 1)]);
+  const auto told = AllOf(HasSubstr("2000 points are in no order"), HasSubstr("export curves"));
+  EXPECT_THAT(refusal(bare(points)), told);
+  EXPECT_THAT(refusal(bare(points), 20), told) << "whoever says how many a strand has";
+  // Long hair of few points, in no order of strands, is in order.
+  std::vector<glm::vec3> longer;
+  for (uint32_t s = 0; s < 200; ++s) {
+    const uint32_t root = mix_u32(s);
+    const glm::vec3 at(0.1f * unit_float(root), 0.1f * unit_float(mix_u32(root)),
+                       0.1f * unit_float(root + 1));
+    for (uint32_t i = 0; i < 10; ++i)
+      longer.push_back(at - glm::vec3(0.0f, 0.3f * static_cast<float>(i), 0.0f));
+  }
+  EXPECT_EQ(refusal(bare(longer), 10), "accepted");
 }
 
 TEST(Ply, CommentsStateUnitAxisAndCount) {

@@ -92,13 +92,22 @@ TEST(Usda, UnitAndAxisAreStatedAndSaidInTheNotes) {
   EXPECT_THAT(placed->notes, Contains(HasSubstr("+Z of the file is up: its upAxis says so")));
   options.unit_m = 0.5f;
   EXPECT_FLOAT_EQ(load_placed_groom(options)->placement.unit_m, 0.5f);
-  // Parts of one head of hair cannot be in two units.
+  // Parts of one head of hair are brought into the first one's unit.
   options.unit_m = 0.0f;
   std::string metres = stage(kLines);
   metres.replace(metres.find("0.01"), 4, "1.00");
   options.more_paths = {folder.write("brows.usda", metres)};
+  const auto both = load_placed_groom(options);
+  ASSERT_TRUE(both) << both.error().to_string();
+  EXPECT_FLOAT_EQ(both->placement.unit_m, 0.01f);
+  EXPECT_THAT(both->notes, Contains(AllOf(HasSubstr("brows.usda states another unit"), HasSubstr("by 100"))));
+  EXPECT_FLOAT_EQ(both->groom.length_m(2), 100.0f * both->groom.length_m(0));
+  // Two up axes are too many.
+  std::string other_axis = stage(kLines);
+  other_axis.replace(other_axis.find("\"Z\""), 3, "\"Y\"");
+  options.more_paths = {folder.write("brows.usda", other_axis)};
   EXPECT_THAT(load_placed_groom(options).error().to_string(),
-              AllOf(HasSubstr("brows.usda"), HasSubstr("another unit")));
+              AllOf(HasSubstr("brows.usda"), HasSubstr("another up axis")));
 }
 
 TEST(Usda, TransformsAreThoseOfUsd) {
@@ -326,6 +335,21 @@ TEST(Usda, ProxiesAreLeftOutAndGuidesKnownByWhatIsAroundThem) {
   EXPECT_THAT(guides.notes, Contains(HasSubstr("2 guides are left out")));
 }
 
+TEST(Usda, InstancersAreLeftOutAndCounted) {
+  const std::string instancer =
+      "def PointInstancer \"Tufts\"\n{\nint[] protoIndices = [0, 0, 0]\npoint3f[] positions = [(0, 0, 0), "
+      "(1, "
+      "0, 0), (2, 0, 0)]\ndef BasisCurves \"Tuft\"\n{\n" +
+      kLines + "}\n}\n";
+  const auto beside = read_usd(stage(kLines) + instancer);
+  ASSERT_TRUE(beside) << beside.error().to_string();
+  EXPECT_EQ(beside->groom.rest_position_m, kPoints) << "what is in one is not drawn by itself";
+  EXPECT_THAT(beside->notes, Contains(HasSubstr("1 PointInstancer with 3 instances are left out")));
+  EXPECT_THAT(refusal("#usda 1.0\n" + instancer),
+              AllOf(HasSubstr("no BasisCurves to read"), HasSubstr("1 PointInstancer with 3 instances"),
+                    HasSubstr("make the instances curves")));
+}
+
 TEST(Usda, MotionOfATransformAndWidthsThatFitNothingAreNamed) {
   const auto notes_of = [](const std::string& body, const std::string& around) {
     const auto hair = read_usd(stage(kLines + body, around));
@@ -436,7 +460,7 @@ TEST(Usda, AnAxisOrUnitThatIsNoneIsLeftOutAndNamed) {
 
 TEST(Usda, AUnitThatFitsNoHeadIsSaid) {
   const TemporaryFolder folder;
-  const auto notes_with = [&](const char* unit) {
+  const auto told_with = [&](const char* unit) {
     const std::string text = fmt::format(
         "#usda 1.0\n(\n    metersPerUnit = {}\n)\ndef BasisCurves \"Hair\" {{\n{}}}\n", unit, kLines);
     GroomFileOptions options;
@@ -444,12 +468,11 @@ TEST(Usda, AUnitThatFitsNoHeadIsSaid) {
     EXPECT_TRUE(save_file(options.path, std::as_bytes(std::span(text))));
     const auto placed = load_placed_groom(options);
     EXPECT_TRUE(placed) << placed.error().to_string();
-    return placed ? placed->notes : std::vector<std::string>();
+    return placed ? placed->unlikely : "";
   };
   // The hair is 3.5 units long.
-  EXPECT_THAT(notes_with("0.001"),
-              Contains(AllOf(HasSubstr("3.5 mm long"), HasSubstr("groom.file.unit_m=1 makes"))));
-  EXPECT_THAT(notes_with("1"), testing::Not(Contains(HasSubstr("as on no head"))));
+  EXPECT_THAT(told_with("0.001"), AllOf(HasSubstr("3.5 mm long"), HasSubstr("groom.file.unit_m=1 makes")));
+  EXPECT_EQ(told_with("1"), "");
 }
 
 TEST(Usda, WhatIsWrongIsNamedWithItsLine) {

@@ -424,6 +424,17 @@ TEST(Usdc, WhatDoesNotCountIsLeftOut) {
     EXPECT_EQ(strands({{"specifier", MadeUsdc::inlined(42, over_or_class)}}, "", ""), 2u);
 }
 
+TEST(Usdc, InstancersAreLeftOutAndCounted) {
+  MadeUsdc file;
+  const auto tufts = file.prim("Tufts", "PointInstancer",
+                               {MadeUsdc::attribute("protoIndices", file.ints({0, 0, 0, 0})),
+                                file.prim("Tuft", "BasisCurves", line_items(file))});
+  const auto groom = read_usd(file.finish({tufts, file.prim("On", "BasisCurves", line_items(file))}));
+  ASSERT_TRUE(groom) << groom.error().to_string();
+  EXPECT_EQ(groom->groom.strand_count(), 2u);
+  EXPECT_THAT(groom->notes, ::testing::Contains(HasSubstr("1 PointInstancer with 4 instances are left out")));
+}
+
 /// Members of a package as they are stored, one behind the other.
 std::string package(const std::vector<std::pair<std::string, std::string>>& members, uint16_t method = 0) {
   std::string zip;

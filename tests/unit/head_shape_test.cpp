@@ -347,6 +347,26 @@ TEST(Placement, AFaceBetweenTwoQuarterTurnsIsFound) {
   EXPECT_GT(off_deg(picked(whole, [](const glm::vec3& p) { return p.x > 0.0f; }), 15.0f), 20.0f);
 }
 
+// Files have their front at an axis. Hair that is not alike on both sides is no reason to turn it by some
+// degrees; hair that is alike, is one.
+TEST(Placement, HairThatIsLopsidedFacesTheAxisBesideIt) {
+  REQUIRE_SHARED_DATA();
+  const auto guessed = [](const Groom& groom, float yaw_deg) {
+    GroomPlacement turn;
+    turn.yaw_deg = yaw_deg;
+    return guess_yaw_deg(moved(groom, [&](const glm::vec3& p) { return turn.place(p); })).value;
+  };
+  for (const char* const name : {"sintel_11400x16.tfx", "Ratboy_mohawk.tfx", "ponytail_front_top.tfx"}) {
+    GroomFileOptions options;
+    options.path = test::shared_data() / "grooms" / name;
+    options.yaw_deg = std::nullopt;
+    const Groom groom = load_groom(options).value();
+    for (const float yaw_deg : {-6.0f, -3.0f, 0.0f, 3.0f, 6.0f, 8.0f})
+      EXPECT_EQ(guessed(groom, yaw_deg), 0.0f) << name << " turned by " << yaw_deg;
+  }
+  EXPECT_NEAR(guessed(full_head(), 9.5f), -9.5f, 1.0f);
+}
+
 TEST(Placement, FurOfABodyIsNoHeadOfHair) {
   const Groom head = full_head();
   EXPECT_TRUE(is_hair_of_head(head));
@@ -477,6 +497,8 @@ TEST(Placement, RealGroomsFaceForwardOnAHeadThatSwallowsNothing) {
     ASSERT_TRUE(placed) << placed.error().to_string();
     EXPECT_FALSE(placed->placement.is_z_up) << item.files[0];
     EXPECT_EQ(placed->placement.yaw_deg, item.yaw_deg) << item.files[0];
+    EXPECT_EQ(placed->is_of_head, item.files[0] != "TestHair1.tfx") << "which is fur all around";
+    if (!placed->is_of_head) continue;
     const FittedHead head = head_under(placed->groom);
     expect_head(head, item.files[0]);
     if (!item.is_full_head) continue;

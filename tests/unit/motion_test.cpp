@@ -2,11 +2,14 @@
 
 #include <cmath>
 #include <complex>
+#include <filesystem>
 #include <numbers>
 
 #include "common/motion/bvh.h"
+#include "common/motion/motion_file.h"
 #include "common/motion/motion_glitches.h"
 #include "common/motion/wind_csv.h"
+#include "tests/support/shared_data.h"
 
 namespace strandcast::motion_test {
 namespace {
@@ -29,6 +32,37 @@ TEST(MotionClip, InterpolatesAndClamps) {
   EXPECT_NEAR(clip.sample(0.125).position_m.x, 0.5, 1e-12);
   EXPECT_NEAR(angle_between_rad(clip.sample(0.125).rotation, {1, 0, 0, 0}), 0.25, 1e-12);
   EXPECT_NEAR(clip.sample(0.75).position_m.y, 2.0, 1e-12);
+}
+
+// As bodies of 3ds Max have it at rest, and files whose X is up altogether.
+TEST(UpAxis, MayBeX) {
+  const auto clip_of = [](const std::string& row) {
+    const std::string text =
+        "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 6 Xposition Yposition Zposition Xrotation Yrotation "
+        "Zrotation\nJOINT Head\n{\nOFFSET 2 0 0\nCHANNELS 0\nEnd Site\n{\nOFFSET 1 0 "
+        "0\n}\n}\n}\nMOTION\nFrames: "
+        "1\nFrame Time: .01\n" +
+        row + "\n";
+    BvhOptions options;
+    options.unit_m = 1.0;
+    options.recentre = false;
+    return parse_bvh(text, "x.bvh", options).value();
+  };
+  const auto expect_upright = [](const MotionClip& clip) {
+    const Pose& pose = clip.world_from_head.front();
+    EXPECT_NEAR(pose.position_m.y, 5.0, 1e-12) << "hips, and 2 above them";
+    EXPECT_NEAR(glm::distance(pose.rotation * glm::dvec3(0, 1, 0), glm::dvec3(0, 1, 0)), 0.0, 1e-12);
+    EXPECT_NEAR(glm::distance(pose.rotation * glm::dvec3(0, 0, 1), glm::dvec3(0, 0, 1)), 0.0, 1e-12);
+    EXPECT_THAT(clip.up_reason, HasSubstr("its face is taken to be at +Z there"));
+  };
+  const MotionClip all = clip_of("3 0 0 0 0 0");
+  expect_upright(all);
+  EXPECT_THAT(all.up_reason,
+              StartsWith("+X is taken as up: there the head is above the hips in the rest pose"));
+  const MotionClip at_rest = clip_of("0 3 0 0 0 90");
+  expect_upright(at_rest);
+  EXPECT_THAT(at_rest.up_reason, StartsWith("+Y is taken as up"));
+  EXPECT_THAT(at_rest.up_reason, HasSubstr("in the motion, though +X is up in the rest pose"));
 }
 
 TEST(WindSeries, InterpolatesAndClamps) {
@@ -401,6 +435,35 @@ TEST(MotionFileAxes, MayHaveYDown) {
   EXPECT_LT(angle_between_rad(first.rotation, other.rotation), 1e-7);
   EXPECT_LT(clip_of("-.05 -.7 .1", "-1 -.9 2 20 -30 -10", false).world_from_head[0].position_m.y, -1.0)
       << "stated";
+}
+
+// Small files that failed once, each with its right answer beside it.
+TEST(CaseFiles, MotionComesInAsItShould) {
+  struct Case {
+    const char* name;
+    double unit_m;  // 0: of no matter
+    size_t frames;
+    const char* said;  // by a note
+  };
+  const std::filesystem::path folder = std::filesystem::path(STRANDCAST_SHARED_DATA) / "cases";
+  REQUIRE_SHARED(folder);
+  for (const Case& item : {Case{"comma_decimals.bvh", 0.0, 24, ""},
+                           {"frame_time_zero.bvh", 0.0, 24, ""},
+                           {"frames_more_than_rows.bvh", 0.0, 24, "30 frames are announced, 24 are there"},
+                           {"joint_spaces.bvh", 0.0, 24, "the head is Bip01 Head"},
+                           {"nan_row.bvh", 0.0, 24, "1 of 24 frames cannot be used"},
+                           {"upper_body_cm.bvh", 0.01, 24, "one unit is taken as 0.01 m"},
+                           {"upper_body_m.bvh", 1.0, 24, "one unit is taken as 1 m"},
+                           {"zero_offsets_positions.bvh", 0.01, 24, "one unit is taken as 0.01 m"}}) {
+    MotionFileOptions options;
+    options.fps = 30.0;
+    options.is_keeping_first_frames = true;
+    const auto motion = load_motion_file(folder / item.name, options);
+    ASSERT_TRUE(motion) << motion.error().to_string();
+    EXPECT_EQ(motion->clip.world_from_head.size(), item.frames) << item.name;
+    EXPECT_TRUE(item.unit_m == 0.0 || motion->clip.file_unit_m == item.unit_m) << item.name;
+    EXPECT_THAT(motion->notes, testing::Contains(HasSubstr(item.said))) << item.name;
+  }
 }
 
 }  // namespace

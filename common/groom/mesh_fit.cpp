@@ -1,0 +1,147 @@
+#include "common/groom/mesh_fit.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/gtc/quaternion.hpp>
+#include <vector>
+
+#include "common/base/quantile.h"
+#include "common/base/units.h"
+#include "common/groom/head_fit.h"
+#include "common/math/point_tree.h"
+
+namespace strandcast {
+namespace {
+
+constexpr size_t kSurfacePoints = 20'000, kMostRoots = 300;
+/// Roots further than this from the skin are not on it: loose caps of hair stand off by 10 mm.
+constexpr float kFarM = 0.02f;
+/// A turn is told when it brings nearly all roots this near, and at least twice as near as they are. Nearer
+/// ones are where they belong.
+constexpr float kNearM = 0.008f, kCloseM = 0.005f;
+constexpr double kNearlyAll = 0.95;
+
+/// Points all over a surface, by area.
+std::vector<glm::vec3> spread_over(const Mesh& mesh) {
+  std::vector<double> area_up_to;
+  double total = 0.0;
+  for (const glm::uvec3& corner : mesh.triangle) {
+    const glm::dvec3 a = mesh.position_m[corner.x], b = mesh.position_m[corner.y],
+                     c = mesh.position_m[corner.z];
+    area_up_to.push_back(total += 0.5 * glm::length(glm::cross(b - a, c - a)));
+  }
+  std::vector<glm::vec3> points = mesh.position_m;
+  for (size_t i = 0; i < kSurfacePoints && total > 0.0; ++i) {
+    const double at = total * (static_cast<double>(i) + 0.5) / kSurfacePoints;
+    const auto found = std::lower_bound(area_up_to.begin(), area_up_to.end(), at) - area_up_to.begin();
+    const glm::uvec3& corner = mesh.triangle[std::min(static_cast<size_t>(found), mesh.triangle.size() - 1)];
+    // Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018: R2, folded into a triangle.
+    double u = std::fmod(0.7548776662466927 * static_cast<double>(i + 1), 1.0);
+    double v = std::fmod(0.5698402909980532 * static_cast<double>(i + 1), 1.0);
+    if (u + v > 1.0) {
+      u = 1.0 - u;
+      v = 1.0 - v;
+    }
+    const glm::dvec3 a = mesh.position_m[corner.x], b = mesh.position_m[corner.y],
+                     c = mesh.position_m[corner.z];
+    points.emplace_back(a + u * (b - a) + v * (c - a));
+  }
+  return points;
+}
+
+/// What a mesh may have been: as large, and turned so about the files' origin.
+struct Change {
+  float scale = 1.0f;
+  glm::mat3 turn{1.0f};
+};
+
+class MeshFit {
+ public:
+  MeshFit(const Mesh& head, const Groom& groom, const glm::vec3& origin_m)
+      : surface_m_(spread_over(head)), tree_(surface_m_), origin_m_(origin_m) {
+    const std::vector<glm::vec3> roots = roots_of(groom);
+    for (size_t i = 0; i < roots.size(); i += roots.size() / kMostRoots + 1) roots_m_.push_back(roots[i]);
+  }
+
+  /// How far this share of the roots are at most from the changed mesh.
+  float distance_m(const Change& change, double share) const {
+    std::vector<float> distances;
+    for (const glm::vec3& root : roots_m_) {
+      const glm::vec3 before = glm::transpose(change.turn) * (root - origin_m_) / change.scale + origin_m_;
+      distances.push_back(change.scale * std::sqrt(tree_.nearest(before, 1).front().distance_squared));
+    }
+    return quantile(distances, share);
+  }
+
+ private:
+  const std::vector<glm::vec3> surface_m_;
+  const PointTree tree_;
+  const glm::vec3 origin_m_;
+  std::vector<glm::vec3> roots_m_;
+};
+
+struct Named {
+  Change change;
+  std::string text;
+};
+
+/// Turns by quarters, and finer ones about Y.
+std::vector<Named> usual_turns() {
+  constexpr std::array<std::pair<float, char>, 6> kTilts = {
+      {{0.0f, 'X'}, {90.0f, 'X'}, {-90.0f, 'X'}, {180.0f, 'X'}, {90.0f, 'Z'}, {-90.0f, 'Z'}}};
+  std::vector<Named> turns;
+  for (const auto& [tilt_deg, axis] : kTilts)
+    for (float yaw_deg = -165.0f; yaw_deg <= 180.0f; yaw_deg += tilt_deg == 0.0f ? 15.0f : 90.0f) {
+      if (tilt_deg != 0.0f && yaw_deg == -165.0f) yaw_deg = -90.0f;
+      if (tilt_deg == 0.0f && yaw_deg == 0.0f) continue;
+      const glm::vec3 about(axis == 'X' ? 1.0f : 0.0f, 0.0f, axis == 'Z' ? 1.0f : 0.0f);
+      const glm::quat turn = glm::angleAxis(glm::radians(yaw_deg), glm::vec3(0, 1, 0)) *
+                             glm::angleAxis(glm::radians(tilt_deg), about);
+      std::string text;
+      if (tilt_deg != 0.0f) text += fmt::format(" by {:g} degrees about {}", tilt_deg, axis);
+      if (yaw_deg != 0.0f)
+        text += fmt::format("{} by {:g} degrees about Y", text.empty() ? "" : " and then", yaw_deg);
+      turns.push_back({{1.0f, glm::mat3_cast(turn)}, "turned" + text});
+    }
+  return turns;
+}
+
+std::vector<Named> usual_scales() {
+  std::vector<Named> scales;
+  for (const float scale :
+       {0.01f, 100.0f, 0.001f, 1000.0f, 0.1f, 10.0f, 0.0254f, 1.0f / 0.0254f, 2.54f, 1.0f / 2.54f})
+    scales.push_back({{scale, glm::mat3(1.0f)}, fmt::format("made {:.4g} times as large", scale)});
+  return scales;
+}
+
+}  // namespace
+
+std::string unfit_mesh(const Mesh& head, const Groom& groom, const glm::vec3& file_origin_m) {
+  if (head.triangle.empty() || groom.strand_count() == 0) return {};
+  const MeshFit fit(head, groom, file_origin_m);
+  const float half_m = fit.distance_m({}, 0.5), most_m = fit.distance_m({}, kNearlyAll);
+  if (most_m < kCloseM) return {};
+  const bool is_far = half_m > kFarM;
+  std::vector<Named> others = usual_turns();
+  if (is_far)
+    for (Named& scale : usual_scales()) others.push_back(std::move(scale));
+  const Named* best = nullptr;
+  float least_m = is_far ? kFarM : std::min(kNearM, 0.5f * most_m);
+  for (const Named& other : others) {
+    const float distance_m = fit.distance_m(other.change, kNearlyAll);
+    if (distance_m >= least_m) continue;
+    best = &other;
+    least_m = distance_m;
+  }
+  if (best == nullptr && !is_far) return {};
+  const std::string apart = fmt::format("the head's mesh does not fit: roots are up to {:.3g} mm from it",
+                                        static_cast<double>(most_m) * kMmPerM);
+  if (best == nullptr) return apart + ", and no usual turn or size brings it there";
+  return fmt::format("{}, and {:.2g} mm if it is {}", apart, static_cast<double>(least_m) * kMmPerM,
+                     best->text);
+}
+
+}  // namespace strandcast

@@ -1,0 +1,307 @@
+// What roots say of a groom's files: fur and beards are no hair of a head, parts may be in other units,
+// strands may run from tip to root, and a head's mesh may be another's.
+#include "common/groom/groom_parts.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "common/base/file.h"
+#include "common/groom/groom_file.h"
+#include "common/groom/head_fit.h"
+#include "common/groom/mesh_fit.h"
+#include "tests/support/groom_files.h"
+#include "tests/support/temporary_folder.h"
+
+namespace strandcast::groom_parts_test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr float kHeadM = 0.1f;  // radius
+using Strand = std::vector<glm::vec3>;
+
+/// Strands of six points that leave a ball where `grows` says so and fall from there, by their own lengths;
+/// `middle_m` is the ball's.
+std::vector<Strand> hair(const std::function<bool(const glm::vec3& out)>& grows, float length_m = 0.25f,
+                         const glm::vec3& middle_m = {}) {
+  constexpr int kRoots = 700;
+  std::vector<Strand> strands;
+  for (int i = 0; i < kRoots; ++i) {
+    const double y = 1.0 - (2.0 * i + 1.0) / kRoots, around = 2.399963 * i, across = std::sqrt(1.0 - y * y);
+    const glm::vec3 out(glm::dvec3(across * std::sin(around), y, across * std::cos(around)));
+    if (!grows(out)) continue;
+    Strand& strand = strands.emplace_back();
+    const float own_m = length_m * (0.4f + 0.6f * static_cast<float>(i % 11) / 10.0f);
+    for (int k = 0; k < 6; ++k) {
+      const float down = std::max(static_cast<float>(k) - 1.0f, 0.0f) / 5.0f;
+      const float off = static_cast<float>(std::min(k, 1)) / 5.0f;
+      strand.push_back(middle_m + kHeadM * out + own_m * (off * out - glm::vec3(0.0f, down, 0.0f)));
+    }
+  }
+  return strands;
+}
+bool is_of_scalp(const glm::vec3& out) {
+  return out.y > 0.2f || (out.z < 0.2f && out.y > -0.5f);
+}
+bool is_of_jaw(const glm::vec3& out) {
+  return out.y < -0.05f && out.y > -0.9f && out.z > 0.0f;
+}
+
+/// Writes strands in a unit; `said` is a comment line for it, or none.
+std::filesystem::path write(const TemporaryFolder& folder, const std::string& name,
+                            const std::vector<Strand>& strands, float unit_m, const std::string& said = "") {
+  size_t points = 0;
+  for (const Strand& strand : strands) points += strand.size();
+  std::string text = "ply\nformat ascii 1.0\n" + said +
+                     fmt::format(
+                         "element vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
+                         "element strand {}\nproperty int nverts\nend_header\n",
+                         points, strands.size());
+  for (const Strand& strand : strands)
+    for (const glm::vec3& p : strand)
+      text += fmt::format("{} {} {}\n", p.x / unit_m, p.y / unit_m, p.z / unit_m);
+  for (const Strand& strand : strands) text += fmt::format("{}\n", strand.size());
+  return folder.write(name, text);
+}
+
+PlacedGroom placed(const std::vector<std::filesystem::path>& paths, float unit_m = 0.0f) {
+  GroomFileOptions options;
+  options.path = paths.front();
+  options.more_paths.assign(paths.begin() + 1, paths.end());
+  options.unit_m = unit_m;
+  options.is_z_up.reset();
+  options.yaw_deg.reset();
+  auto loaded = load_placed_groom(options);
+  EXPECT_TRUE(loaded) << loaded.error().to_string();
+  return loaded ? std::move(*loaded) : PlacedGroom{};
+}
+
+TEST(FurAndBeards, ABeardIsNoHairOfAHeadAndKeepsTheUnitThatIsStated) {
+  const TemporaryFolder folder;
+  const std::vector<Strand> beard = hair(is_of_jaw, 0.08f);
+  for (const char* const said : {"comment unit_m 1\n", "comment unit_m 0.01\n"}) {
+    const PlacedGroom found =
+        placed({write(folder, "beard.ply", beard, said[15] == '1' ? 1.0f : 0.01f, said)});
+    EXPECT_FALSE(found.is_of_head);
+    EXPECT_EQ(found.unlikely, "");
+    EXPECT_EQ(found.placement.yaw_deg, 0.0f) << "the face is where it grows";
+  }
+  EXPECT_EQ(placed({write(folder, "cm.ply", beard, 0.01f)}).placement.unit_m, 0.01f) << "a face of a person";
+  EXPECT_TRUE(placed({write(folder, "hair.ply", hair(is_of_scalp), 1.0f)}).is_of_head);
+  const auto wreath =
+      hair([](const glm::vec3& out) { return out.z < 0.3f && out.y < 0.25f && out.y > -0.5f; });
+  EXPECT_TRUE(placed({write(folder, "wreath.ply", wreath, 1.0f)}).is_of_head) << "about a bald top";
+}
+
+TEST(FurAndBeards, FurOfABodyNeverGetsAHeadsUnit) {
+  const TemporaryFolder folder;
+  std::vector<Strand> fur;
+  for (int i = 0; i < 900; ++i) {
+    // Around a trunk of 1.5 m.
+    const double y = 1.0 - (2.0 * i + 1.0) / 900.0, around = 2.399963 * i, across = std::sqrt(1.0 - y * y);
+    const glm::vec3 out(glm::dvec3(across * std::sin(around), y, 3.0 * across * std::cos(around)));
+    fur.push_back({0.25f * out, 0.25f * out + 0.02f * glm::normalize(out), 0.25f * out + 0.04f * out});
+  }
+  for (const float unit_m : {1.0f, 0.01f, 0.001f}) {
+    const PlacedGroom found = placed({write(folder, "bear.ply", fur, unit_m)});
+    EXPECT_FALSE(found.is_of_head);
+    EXPECT_EQ(found.placement.unit_m, unit_m);
+    EXPECT_THAT(found.notes, Contains(HasSubstr("these roots are no head of hair")));
+  }
+  const PlacedGroom stated = placed({write(folder, "doll.ply", fur, 0.1f, "comment unit_m 0.1\n")});
+  EXPECT_EQ(stated.placement.unit_m, 0.1f);
+  EXPECT_EQ(stated.unlikely, "");
+}
+
+TEST(GroomParts, AFileInAnotherUnitIsFoundByWhereItsRootsLie) {
+  const TemporaryFolder folder;
+  const auto front = [](const glm::vec3& out) { return is_of_scalp(out) && out.z > 0.1f; };
+  const auto back = [&](const glm::vec3& out) { return is_of_scalp(out) && !front(out); };
+  for (const glm::vec3& middle_m : {glm::vec3(0.0f), glm::vec3(0.0f, 1.6f, 0.0f)}) {
+    const auto in_m = write(folder, "back.ply", hair(back, 0.25f, middle_m), 1.0f);
+    const PlacedGroom alike = placed({in_m, write(folder, "front.ply", hair(front, 0.1f, middle_m), 1.0f)});
+    EXPECT_THAT(alike.notes, Not(Contains(HasSubstr("is scaled by"))));
+    const PlacedGroom other = placed({in_m, write(folder, "front.ply", hair(front, 0.1f, middle_m), 0.01f)});
+    EXPECT_THAT(other.notes,
+                Contains(AllOf(HasSubstr("front.ply is scaled by 0.01"), HasSubstr("back.ply"))));
+    EXPECT_EQ(other.unlikely, "");
+    ASSERT_EQ(other.groom.rest_position_m.size(), alike.groom.rest_position_m.size());
+    float off_m = 0.0f;
+    for (size_t i = 0; i < alike.groom.rest_position_m.size(); ++i)
+      off_m = std::max(off_m, glm::distance(alike.groom.rest_position_m[i], other.groom.rest_position_m[i]));
+    EXPECT_LT(off_m, 1e-4f);
+  }
+}
+
+TEST(GroomParts, UnitsThatFilesStateAreBroughtTogether) {
+  const TemporaryFolder folder;
+  const auto m = write(folder, "m.ply", hair(is_of_scalp), 1.0f, "comment unit_m 1\n");
+  const auto cm = write(folder, "cm.ply", hair(is_of_jaw, 0.08f), 0.01f, "comment unit_m 0.01\n");
+  const auto bare = write(folder, "bare.ply", hair(is_of_jaw, 0.08f), 0.01f);
+  for (const std::vector<std::filesystem::path>& paths :
+       {std::vector{m, cm}, std::vector{cm, m}, std::vector{m, bare}, std::vector{bare, m}}) {
+    const PlacedGroom found = placed(paths);
+    EXPECT_THAT(found.notes, Contains(HasSubstr("scaled by"))) << paths.front();
+    for (const glm::vec3& root : roots_of(found.groom)) EXPECT_NEAR(glm::length(root), kHeadM, 1e-3f);
+  }
+}
+
+TEST(GroomParts, RootsOnNoneOfTheOthersHeadFailTheCheck) {
+  const TemporaryFolder folder;
+  const auto here = write(folder, "here.ply", hair(is_of_scalp), 1.0f);
+  const auto there = write(folder, "there.ply", hair(is_of_jaw, 0.1f, {5.0f, 3.0f, -4.0f}), 1.0f);
+  EXPECT_THAT(placed({here, there}).unlikely,
+              AllOf(HasSubstr("the roots of"), HasSubstr("there.ply are not on the head of")));
+}
+
+TEST(GroomParts, StrandsThatRunFromTipToRootAreTurnedRound) {
+  const TemporaryFolder folder;
+  std::vector<Strand> strands = hair(is_of_scalp);
+  const PlacedGroom right = placed({write(folder, "right.ply", strands, 1.0f)});
+  EXPECT_THAT(right.notes, Not(Contains(HasSubstr("from tip to root"))));
+  // A bob: all tips at one height, on a ring that a ball fits.
+  std::vector<Strand> bob = strands;
+  for (Strand& strand : bob)
+    for (size_t k = 2; k < strand.size(); ++k) {
+      const float share = static_cast<float>(k - 1) / static_cast<float>(strand.size() - 2);
+      strand[k] = strand[1] - glm::vec3(0.0f, share * (strand[1].y + 0.2f), 0.0f);
+    }
+  const PlacedGroom short_hair = placed({write(folder, "bob.ply", bob, 1.0f)});
+  EXPECT_THAT(short_hair.notes, Not(Contains(HasSubstr("from tip to root"))));
+  for (Strand& strand : strands) std::reverse(strand.begin(), strand.end());
+  for (Strand& strand : bob) std::reverse(strand.begin(), strand.end());
+  const PlacedGroom turned = placed({write(folder, "turned.ply", strands, 1.0f)});
+  EXPECT_THAT(turned.notes, Contains(HasSubstr("its strands run from tip to root and are turned round")));
+  EXPECT_EQ(turned.groom.rest_position_m, right.groom.rest_position_m);
+  EXPECT_EQ(turned.groom.pinned, right.groom.pinned);
+  const PlacedGroom turned_bob = placed({write(folder, "turned_bob.ply", bob, 1.0f)});
+  EXPECT_EQ(turned_bob.groom.rest_position_m, short_hair.groom.rest_position_m);
+}
+
+TEST(GroomParts, NoRealGroomIsTurnedRoundAndEachIsFoundWhenItIs) {
+  REQUIRE_SHARED_DATA();
+  for (const char* const name : {"sintel_11400x16.tfx", "Ratboy_mohawk.tfx", "TestHair1.tfx",
+                                 "ponytail_front_top.tfx", "ponytail_side.tfx"}) {
+    GroomFileOptions options;
+    options.path = test::shared_data() / "grooms" / name;
+    Groom groom = load_groom(options).value();
+    StrandLabels labels;
+    EXPECT_EQ(turn_tips_first(groom, labels), "") << name;
+    const std::vector<glm::vec3> points = groom.rest_position_m;
+    const uint32_t count = groom.uniform_vertex_count();
+    for (size_t i = 0; i < points.size(); i += count)
+      std::reverse(groom.rest_position_m.begin() + static_cast<std::ptrdiff_t>(i),
+                   groom.rest_position_m.begin() + static_cast<std::ptrdiff_t>(i + count));
+    EXPECT_NE(turn_tips_first(groom, labels), "") << name;
+    EXPECT_EQ(groom.rest_position_m, points) << name;
+  }
+}
+
+TEST(GroomParts, StrandsOfMorePointsThanAreSimulatedSaySo) {
+  const TemporaryFolder folder;
+  std::vector<Strand> strands = hair(is_of_scalp);
+  for (Strand& strand : strands) {
+    // A hundred points, most of them near the root.
+    Strand fine;
+    for (int k = 0; k < 100; ++k) {
+      const float share = static_cast<float>(k * k) / (99.0f * 99.0f);
+      fine.push_back(glm::mix(strand.front(), strand.back(), share));
+    }
+    strand = std::move(fine);
+  }
+  const auto path = write(folder, "fine.ply", strands, 1.0f);
+  const PlacedGroom found = placed({path});
+  ASSERT_EQ(found.groom.uniform_vertex_count(), kMaxVertexCount);
+  EXPECT_THAT(found.notes, Contains(HasSubstr("strands of up to 100 points are resampled to 64 each")));
+  const Groom& groom = found.groom;
+  for (uint32_t strand = 0; strand < groom.strand_count(); strand += 50) {
+    const float step_m = groom.length_m(strand) / 63.0f;
+    EXPECT_NEAR(groom.length_m(strand), glm::distance(strands[strand].front(), strands[strand].back()),
+                1e-4f);
+    for (uint32_t i = groom.offset[strand]; i + 1 < groom.offset[strand + 1]; ++i)
+      EXPECT_NEAR(glm::distance(groom.rest_position_m[i], groom.rest_position_m[i + 1]), step_m, 1e-5f);
+  }
+  GroomFileOptions options;
+  options.path = path;
+  options.vertex_count = 16;
+  EXPECT_THAT(load_placed_groom(options).value().notes, Not(Contains(HasSubstr("resampled")))) << "as asked";
+}
+
+/// A skull that is longer than wide, with a face: no turn of it is like it.
+Mesh skull(const std::function<glm::vec3(const glm::vec3&)>& change) {
+  Mesh mesh = make_head(kHeadM);
+  for (glm::vec3& point : mesh.position_m) point = change(point);
+  mesh.normal = compute_normals(mesh.position_m, mesh.triangle);
+  return mesh;
+}
+
+TEST(HeadMesh, OneThatDoesNotFitItsHairIsTold) {
+  const Mesh head = make_head(kHeadM);
+  // Roots on its skin where hair grows.
+  Groom groom;
+  groom.offset = {0};
+  for (const glm::vec3& point : head.position_m) {
+    const bool is_scalp = (point.y > 0.05f || point.z < -0.03f) && point.y > -0.06f;
+    if (!is_scalp) continue;
+    groom.rest_position_m.insert(groom.rest_position_m.end(), {point, point - glm::vec3(0.0f, 0.2f, 0.0f)});
+    groom.pinned.insert(groom.pinned.end(), {1, 0});
+    groom.offset.push_back(static_cast<uint32_t>(groom.rest_position_m.size()));
+  }
+  ASSERT_GT(groom.strand_count(), 200u);
+  const glm::vec3 origin_m(0.0f, -1.6f, 0.0f);  // between the feet
+  const auto told = [&](const std::function<glm::vec3(const glm::vec3&)>& change) {
+    return unfit_mesh(skull(change), groom, origin_m);
+  };
+  EXPECT_EQ(told([](const glm::vec3& p) { return p; }), "");
+  EXPECT_EQ(told([](const glm::vec3& p) { return 0.97f * p; }), "") << "hair that stands off by 3 mm";
+  const auto scaled = [&](float scale) {
+    return told([&](const glm::vec3& p) { return origin_m + scale * (p - origin_m); });
+  };
+  EXPECT_THAT(scaled(0.1f), HasSubstr("if it is made 10 times as large"));
+  EXPECT_THAT(scaled(10.0f), HasSubstr("if it is made 0.1 times as large"));
+  EXPECT_THAT(scaled(100.0f), HasSubstr("if it is made 0.01 times as large"));
+  EXPECT_THAT(told([](const glm::vec3& p) { return p + glm::vec3(0.4f, 0.0f, 0.0f); }),
+              HasSubstr("no usual turn or size brings it there"));
+  EXPECT_THAT(told([](const glm::vec3& p) { return glm::vec3(-p.x, p.y, -p.z); }),
+              HasSubstr("turned by 180 degrees about Y"));
+  EXPECT_THAT(told([](const glm::vec3& p) { return glm::vec3(p.z, p.y, -p.x); }),
+              HasSubstr("turned by -90 degrees about Y"));
+  EXPECT_THAT(told([&](const glm::vec3& p) {
+                const glm::vec3 off = p - origin_m;
+                return origin_m + glm::vec3(off.x, -off.z, off.y);
+              }),
+              HasSubstr("turned by -90 degrees about X"));
+}
+
+TEST(HeadMesh, ARealOneFitsItsHair) {
+  REQUIRE_SHARED_DATA();
+  GroomFileOptions options;
+  options.path = test::shared_data() / "grooms/sintel_11400x16.tfx";
+  const Groom groom = load_groom(options).value();
+  Mesh mesh = load_obj(test::shared_data() / "meshes/sintel.obj", 1.0f).value();
+  EXPECT_EQ(unfit_mesh(mesh, groom, {}), "");
+  for (glm::vec3& point : mesh.position_m) point = {-point.x, point.y, -point.z};
+  EXPECT_THAT(unfit_mesh(mesh, groom, {}), HasSubstr("turned by 180 degrees about Y"));
+}
+
+// Small files that failed once, each with its right answer beside it.
+TEST(CaseFiles, HairComesInAsItShould) {
+  const std::filesystem::path folder = test::shared_data() / "cases";
+  REQUIRE_SHARED(folder);
+  const PlacedGroom short_curve = placed({folder / "one_vertex_curve.usda"});
+  EXPECT_EQ(short_curve.groom.strand_count(), 22u) << "another curve has no length";
+  EXPECT_THAT(short_curve.notes, Contains(HasSubstr("left out")));
+  EXPECT_EQ(placed({folder / "upaxis_lowercase.usda"}).groom.strand_count(), 24u);
+  EXPECT_THAT(placed({folder / "unit_lies.usda"}).unlikely,
+              AllOf(HasSubstr("as on no head"), HasSubstr("groom.file.unit_m=1 ")));
+}
+
+}  // namespace
+}  // namespace strandcast::groom_parts_test
