@@ -20,6 +20,7 @@
 #include "tests/support/gl_fixture.h"
 #include "tests/support/grown_hair.h"
 #include "tests/support/sample_look.h"
+#include "tests/support/test_grid.h"
 
 namespace strandcast::gl_tiles_test {
 namespace {
@@ -103,12 +104,12 @@ TEST_F(GlTiles, ABustIsTurnedAndShadedAsOnTheProcessor) {
   EXPECT_TRUE(draw(*gl, asset, camera) == rest) << "nothing is left behind";
 }
 
-TEST_F(GlTiles, TenPicturesAreOne) {
+TEST_F(GlTiles, PicturesInARowAreOne) {
   const SceneAsset asset = grown_hair();
   const auto renderer = make(asset, changed_look());
   ASSERT_TRUE(renderer);
   const Image first = draw(*renderer, asset);
-  for (int i = 0; i < 10; ++i) {
+  for (int i = 0; i < on_grid(3, 10); ++i) {
     // Another picture in between leaves nothing behind.
     draw(*renderer, asset, {}, {64, 200});
     EXPECT_TRUE(draw(*renderer, asset) == first) << i;

@@ -102,6 +102,8 @@ def shortened(words):
         words += ["--export", "played.webm", "--to", "0.1", "--size", "160x90"] if is_played else ["--headless", "--after-frames", "3"]
     if words[0] == "strandcast-ctl" and {"feed", "monitor"} & set(words) and "--seconds" not in words:
         words += ["--seconds", "1"]
+    if words[0] == "strandcast-server" and "--explain" in words and "--groom" not in words:
+        words += SMALL
     if words[:2] == ["strandcast-ctl", "bake"]:
         words += [*FAST, "--to", "0.2"]
     return words
@@ -145,7 +147,7 @@ def begin_server(page, line, main):
     words = shlex.split(line.replace("quality=full", "quality=fast").replace("HOST:7878", f"127.0.0.1:{main.port}"))
     if "--port" in words:
         del words[words.index("--port"):words.index("--port") + 2]
-    words[1:1] = FAST if {"--groom", "--scene"} & set(words) else SMALL if "--upstream" not in words else []
+    words[1:1] = FAST if "--groom" in words else SMALL if "--upstream" not in words else []
     words += [] if {"--record", "--record-dir", "--upstream"} & set(words) else ["--record-dir", "takes"]
     server = Server(words)
     print(f"{time.monotonic() - server.begin:5.1f} s  {page}: {line}", flush=True)

@@ -11,7 +11,7 @@ import { Browser, comeToStand, picturesOf as shownPictures, sleep } from './brow
 import { NodeSocket } from './node_socket.mjs';
 import { HEAD, PackageSite, root, whyNoThree } from './package_site.mjs';
 import { psnr, readPng } from './png.mjs';
-import { Server, SMALL } from './server.mjs';
+import { Server } from './server.mjs';
 
 const [program, tar, shots] = process.argv.slice(2);
 const missing = whyNoThree();
@@ -23,6 +23,7 @@ const browser = await Browser.startOrSkip();
 const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-package-'));
 const Socket = globalThis.WebSocket ?? NodeSocket;
 const LEAST_DB = 40;
+const [STRANDS, VERTICES] = [400, 12]; // enough to cover a head
 const SIZE = { width: 640, height: 360 };
 const address = () => `ws://127.0.0.1:${server.port}`;
 /** Pages of tests; what they have learnt stands in document.documentElement.dataset.strandcast. */
@@ -159,7 +160,7 @@ const tests = {
     const node = strandcast.connect(server.url, { WebSocket: Socket, codec: 'tangent' });
     const { value: { hash } } = await node[Symbol.asyncIterator]().next();
     node.close();
-    assert.deepEqual([here, there, floats], [hash, hash, 3 * 400 * 12]);
+    assert.deepEqual([here, there, floats], [hash, hash, 3 * STRANDS * VERTICES]);
   },
   async 'the example has hair on its head'() {
     fs.copyFileSync(path.join(root, 'examples/three/head.mjs'), path.join(work, 'head.mjs'));
@@ -193,7 +194,7 @@ let failed = 0;
 try {
   if (shots) fs.mkdirSync(shots, { recursive: true });
   site = await PackageSite.open(tar, work, PAGES);
-  server = await Server.start(program, [...SMALL, '--allow-origin', site.origin]);
+  server = await Server.start(program, ['--set', `groom.procedural.strand_count=${STRANDS}`, '--set', `groom.procedural.vertex_count=${VERTICES}`, '--allow-origin', site.origin]);
   strandcast = await import(pathToFileURL(path.join(work, 'node_modules/strandcast/node.js')));
   pausing = strandcast.connect(server.url, { WebSocket: Socket });
   await pausing.opened;

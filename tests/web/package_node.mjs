@@ -10,7 +10,7 @@ import path from 'node:path';
 import { fileURLToPath, pathToFileURL } from 'node:url';
 import zlib from 'node:zlib';
 import { NodeSocket } from './node_socket.mjs';
-import { Link, Server, SMALL } from './server.mjs';
+import { HAIR, Link, Server, SMALL } from './server.mjs';
 
 const MOST_BYTES = 60_000; // of scripts, by gzip, without the modules
 const [program, tar] = process.argv.slice(2);
@@ -107,9 +107,9 @@ const tests = {
     const connection = open(server);
     const welcome = await connection.opened;
     const states = await take(connection, 10);
-    assert.deepEqual([welcome.strandCount, welcome.vertexCount, welcome.role], [400, 12, 'controller']);
+    assert.deepEqual([welcome.strandCount, welcome.vertexCount, welcome.role], [HAIR.strands, HAIR.vertices, 'controller']);
     states.forEach((state, i) => {
-      assert.equal(state.positions.length, 3 * 400 * 12);
+      assert.equal(state.positions.length, 3 * HAIR.strands * HAIR.vertices);
       assert.match(state.hash, /^[0-9a-f]{16}$/);
       assert.ok(i === 0 || state.tick >= states[i - 1].tick, `ticks ${states.map(({ tick, hash }) => `${tick} ${hash}`)}`);
     });

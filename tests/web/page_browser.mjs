@@ -14,6 +14,7 @@ import { begin, program, runAll, sharedTab, shots, work } from './served.mjs';
 import { Server, SMALL } from './server.mjs';
 
 const SLIDERS = ['Quality', 'Length', 'Curl', 'Stiffness', 'Friction', 'Wind'];
+const LITTLE = { width: 320, height: 180 }; // where what is drawn decides nothing
 const { browser, server } = await begin();
 
 function get(url, headers = {}) {
@@ -88,7 +89,7 @@ const all = {
   async 'of two heads the chosen one is drawn'() {
     const scene = path.join(path.dirname(fileURLToPath(import.meta.url)), '../../deploy/scenes/two_heads.textproto');
     const two = await Server.start(program, ['--scene', scene, ...SMALL]);
-    const tab = await browser.open(`${two.url}#mode=strands`);
+    const tab = await browser.open(`${two.url}#mode=strands`, LITTLE);
     await tab.until((now) => now.mode === 'strands' && now.states > 3, 'strands');
     const words = () => tab.evaluate('document.getElementById("hud-line").textContent');
     assert.match(await words(), /strands of anna alone/);
@@ -102,7 +103,7 @@ const all = {
   },
   async 'a stream of another solver brings its kernel'() {
     const other = await Server.start(program, [...SMALL, '--set', 'solver.name=direct_rod']);
-    const tab = await browser.open(`${other.url}#mode=strands&codec=step`);
+    const tab = await browser.open(`${other.url}#mode=strands&codec=step`, LITTLE);
     // The module that the page begins with cannot step these.
     const state = await tab.until((now) => now.states > 10 && now.codec === 'step', 'states');
     assert.equal(state.hash_ok, true);
@@ -114,7 +115,7 @@ const all = {
     // the page fetches the whole core.
     for (const [options, takesWhole] of [[['quality=fast', 'head.collider=field'], false], [['solver.name=xpbd'], true]]) {
       const other = await Server.start(program, [...SMALL, ...options.flatMap((one) => ['--set', one])]);
-      const tab = await browser.open(`${other.url}#mode=strands`, { seesWorkers: true });
+      const tab = await browser.open(`${other.url}#mode=strands`, { ...LITTLE, seesWorkers: true });
       await tab.until((now) => now.states !== undefined, 'the page');
       await tab.evaluate(`(() => {
         window.refused = [];
@@ -133,7 +134,7 @@ const all = {
   async 'a second tab sees the same, from the cache'() {
     const first = await sharedTab(browser, server, 'mode=strands');
     const begin = server.log.length;
-    const second = await browser.open(`${server.url}#mode=strands`);
+    const second = await browser.open(`${server.url}#mode=strands`, LITTLE);
     await second.until((now) => now.states > 3, 'states in the second tab');
     await first.until((now) => now.isConnected, 'the first one stays');
     // A browser opens connections ahead and asks nothing on some: those end after 5 s.
@@ -143,7 +144,7 @@ const all = {
   },
   async 'comes back after a restart of the server'() {
     const mortal = await Server.start(program, SMALL);
-    const tab = await browser.open(`${mortal.url}#mode=strands`);
+    const tab = await browser.open(`${mortal.url}#mode=strands`, LITTLE);
     await tab.until((now) => now.states > 3, 'states');
     await mortal.end();
     await tab.until((now) => !now.isConnected, 'the loss is noticed');
@@ -155,23 +156,25 @@ const all = {
   async 'a link of 2 Mbit/s carries page and strands'() {
     const chaos = path.join(path.dirname(program), 'strandcast-chaos');
     if (!fs.existsSync(chaos)) return console.log('  skipped: needs strandcast-chaos beside the server');
-    const listen = `127.0.0.1:${server.port + 1}`;
-    const relay = spawn(chaos, ['--to', `127.0.0.1:${server.port}`, '--listen', listen, '--rate-mbit', '2', '--delay-ms', '20'], { stdio: 'ignore' });
+    const more = await Server.start(program, [...SMALL, '--set', 'groom.procedural.strand_count=400']);
+    const listen = `127.0.0.1:${more.port + 1}`;
+    const relay = spawn(chaos, ['--to', `127.0.0.1:${more.port}`, '--listen', listen, '--rate-mbit', '2', '--delay-ms', '20'], { stdio: 'ignore' });
     try {
       await sleep(500);
-      const tab = await browser.open(`http://${listen}/#mode=strands`);
+      const tab = await browser.open(`http://${listen}/#mode=strands`, LITTLE);
       const first = await tab.until((now) => now.states > 3, 'states');
       const later = await tab.until((now) => now.states > first.states + 10, 'more states', 3_000);
       assert.ok(later.isConnected && later.hash_ok, JSON.stringify(later));
       await tab.close();
     } finally {
       relay.kill();
+      await more.end();
     }
   },
   async 'memory stays where it is'() {
     const seconds = Number(process.env.STRANDCAST_SOAK_S ?? 0);
     if (!seconds) return console.log('  skipped: STRANDCAST_SOAK_S says for how long (tests/nightly.sh: 600)');
-    const tab = await browser.open(`${server.url}#mode=strands`);
+    const tab = await browser.open(`${server.url}#mode=strands`, LITTLE);
     await tab.until((now) => now.states > 100, 'states');
     // Of the page and its workers, after a collection.
     const bytes = async () => (await tab.evaluate('performance.measureUserAgentSpecificMemory()')).bytes;
@@ -188,7 +191,7 @@ const all = {
     const file = path.join(work, 'tokens');
     fs.writeFileSync(file, `viewer ${right}\n`, { mode: 0o600 });
     const strict = await Server.start(program, [...SMALL, '--token-file', file, '--distrust-loopback']);
-    const tab = await browser.open(`${strict.url}#token=${wrong}&mode=strands&view-only`);
+    const tab = await browser.open(`${strict.url}#token=${wrong}&mode=strands&view-only`, LITTLE);
     await tab.until((now) => /token/i.test(now.error ?? ''), 'the reason');
     await tab.evaluate(`document.getElementById('token').value = '${right}'; document.getElementById('token-form').requestSubmit()`);
     await tab.until((now) => now.states > 3, 'states');
@@ -214,13 +217,13 @@ const all = {
     await reload(tab);
     await tab.until((now) => /token/i.test(now.error ?? ''), 'the question');
     await tab.close();
-    const keeping = await browser.open(`${strict.url}#token=${right}&keep-token&mode=strands`);
+    const keeping = await browser.open(`${strict.url}#token=${right}&keep-token&mode=strands`, LITTLE);
     await keeping.until((now) => now.states > 3, 'states');
     await reload(keeping);
     await keeping.until((now) => now.states > 0 && now.isConnected, 'states without a question');
     assert.equal(await keeping.evaluate('Object.keys(localStorage).length + document.cookie.length'), 0);
     await keeping.close();
-    const other = await browser.open(`${strict.url}#mode=strands`);
+    const other = await browser.open(`${strict.url}#mode=strands`, LITTLE);
     await other.until((now) => /token/i.test(now.error ?? ''), 'another tab is asked');
     await other.close();
     await strict.end();
@@ -233,7 +236,7 @@ const all = {
         socket.onopen = () => (document.title = 'open'); socket.onerror = () => (document.title = 'refused');</script>`);
     });
     await new Promise((done) => foreign.listen(0, '127.0.0.1', done));
-    const tab = await browser.open(`http://127.0.0.1:${foreign.address().port}/`);
+    const tab = await browser.open(`http://127.0.0.1:${foreign.address().port}/`, LITTLE);
     await tab.until(async () => (await tab.evaluate('document.title')) === 'refused', 'the refusal');
     await tab.until(() => tab.errors.some((error) => /frame-ancestors|ERR_BLOCKED/.test(error)), 'no frame');
     assert.match(server.log, /refused 127\.0\.0\.1 origin/);

@@ -29,7 +29,8 @@ const env = {
   ...process.env, STRANDCAST_FLEET: path.join(work, 'fleet'), FAKE_SLURM: path.join(work, 'slurm'), FAKE_GPUS: '1',
   PATH: `${source}/tests/fleet/slurm:${process.env.PATH}`,
 };
-const SMALL = ['--set', 'groom.procedural.strand_count=400', '--set', 'groom.procedural.vertex_count=12', '--sim-device', 'lanes'];
+const SMALL = ['--set', 'groom.procedural.strand_count=150', '--set', 'groom.procedural.vertex_count=12', '--sim-device', 'lanes'];
+const LITTLE = { width: 320, height: 180 };
 const MOST_AWAY_S = 2;
 const RELAYS = 2;
 const started = [];
@@ -87,7 +88,7 @@ async function walkAround(tab, name) {
   const strands = await tab.until((now) => now.mode === 'strands' && now.states > 10 && now.hz > 0, 'strands');
   assert.equal(strands.hash_ok, true, `refused: ${strands.rejected}`);
   const turn = async (before) => {
-    await tab.drag([480, 240], [540, 250]);
+    await tab.drag([240, 100], [300, 110]);
     return tab.until((now) => String(now.camera) !== String(before.camera), 'another camera');
   };
   const turned = await turn(strands);
@@ -132,7 +133,7 @@ async function lose(tab, folder) {
 const all = {
   async 'the page of a session behind a path'() {
     // Whoever leaves the slash out is led to it.
-    const tab = await browser.open(link('mode=strands').replace('/#', '#'));
+    const tab = await browser.open(link('mode=strands').replace('/#', '#'), LITTLE);
     await walkAround(tab, 'session');
     await tab.close();
   },
@@ -141,7 +142,7 @@ const all = {
     const wish = path.join(work, 'fleet/sessions/anna/session.json');
     fs.writeFileSync(wish, JSON.stringify({ ...JSON.parse(fs.readFileSync(wish)), relays: RELAYS }));
     await until(async () => (await relaysUp()) === RELAYS, 'relays');
-    const tab = await browser.open(link('mode=strands'));
+    const tab = await browser.open(link('mode=strands'), LITTLE);
     await walkAround(tab, 'relay');
     for (const others of ['another relay', 'whatever is left']) {
       const [[relay]] = [...(await served())].filter(([name, count]) => name.startsWith('relay') && count > 0);

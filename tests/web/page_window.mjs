@@ -9,9 +9,31 @@ import { Browser, sleep } from './browser.mjs';
 import { begin, program, runAll, sharedTab, shots, work } from './served.mjs';
 import { Link, Server, SMALL } from './server.mjs';
 
-// With them a window of 1280 x 720 at one, two, three and four times its size.
-const SIZES = [[1280, 720], [640, 360], [568, 320], [480, 270], [427, 240], [360, 640], [320, 256], [320, 180]];
-const { browser, server } = await begin();
+const isWhole = process.env.STRANDCAST_TEST_GRID === 'whole';
+// With them a window of 1280 x 720 at one, two, three and four times its size; by day the first and the last of these.
+const BETWEEN = isWhole ? [[568, 320], [480, 270], [427, 240]] : [];
+const SIZES = [[1280, 720], [640, 360], ...BETWEEN, [360, 640], [320, 256], [320, 180]];
+const LITTLE = { width: 320, height: 180 }; // where what is drawn decides nothing
+const { browser, server } = await begin([...SMALL, '--log-level', 'debug']);
+
+/** Sessions whose window somebody sees, as the server has it. */
+function seenSessions() {
+  const seen = new Set();
+  for (const [line, session] of server.log.matchAll(/session (\d+)[^\n]*/g)) {
+    if (/ left$| a window of .*, hidden$/.test(line)) seen.delete(session);
+    else if (/ joined: | a window of /.test(line)) seen.add(session);
+  }
+  return seen;
+}
+/** The page's account of itself after so many further ones. */
+async function accountAfter(tab, count) {
+  await tab.evaluate(`new Promise((done) => {
+    let left = ${count};
+    new MutationObserver((all, observer) => { if ((left -= all.length) <= 0) done(observer.disconnect()); })
+      .observe(document.documentElement, { attributeFilter: ['data-strandcast'] });
+  })`);
+  return tab.state();
+}
 
 const shown = (tab) => tab.evaluate('Number(document.body.dataset.pictures ?? 0)');
 const shoot = async (tab, name) => void (shots && (await tab.screenshot(path.join(shots, `${name}.png`))));
@@ -111,17 +133,13 @@ const all = {
     for (const mode of ['strands', 'pictures&pictures=tiles'])
       tabs.push({ tab: await sharedTab(browser, server, `mode=${mode}`), mode, now: {} }); // which hides the one before
     const other = await browser.open('about:blank');
-    // What was on its way, and the account of it, which comes once a second.
-    for (const one of tabs) {
-      await one.tab.until(async (now) => {
-        const isQuiet = now.states === one.now.states;
-        one.now = now;
-        if (!isQuiet) await sleep(1500);
-        return isQuiet;
-      }, 'silence');
+    await tabs[0].tab.until(() => seenSessions().size === 0, 'the server knows that nobody sees them');
+    await Promise.all(tabs.map(async (one) => {
+      // What was on its way arrives.
+      for (let before = -1; one.now.states !== before; one.now = await accountAfter(one.tab, 2)) before = one.now.states;
       one.drawn = await shown(one.tab);
-    }
-    await sleep(1500);
+    }));
+    await Promise.all(tabs.map(({ tab }) => accountAfter(tab, 2)));
     for (const { tab, mode, now, drawn } of tabs) {
       assert.equal(await tab.evaluate('document.visibilityState'), 'hidden');
       const after = await tab.state();
@@ -154,7 +172,7 @@ const all = {
   },
   async 'what slept comes back at once'() {
     const mortal = await Server.start(program, SMALL);
-    const tab = await browser.open(`${mortal.url}#mode=strands`);
+    const tab = await browser.open(`${mortal.url}#mode=strands`, LITTLE);
     await tab.until((now) => now.states > 3, 'states');
     mortal.child.kill('SIGSTOP'); // as if the link had died unnoticed
     await tab.until(async (now) => {
@@ -167,9 +185,9 @@ const all = {
     await tab.close();
   },
   async 'beside a silent link another is tried, and takes its place'() {
-    if (process.env.STRANDCAST_TEST_GRID !== 'whole') return console.log('  by night; beside it page.test.mjs and package_node.mjs');
+    if (!isWhole) return console.log('  by night; beside it page.test.mjs and package_node.mjs');
     const link = await Link.start(server);
-    const tab = await browser.open(`${link.url}#mode=strands`);
+    const tab = await browser.open(`${link.url}#mode=strands`, LITTLE);
     await tab.until((now) => now.codec === 'step' && now.states > 100, 'states');
     const since = Date.now();
     link.fallSilent();
@@ -181,7 +199,7 @@ const all = {
     link.end();
   },
   async 'the way back finds hair that moves'() {
-    const tab = await browser.open(`${server.url}#mode=strands`); // whose count of states begins anew
+    const tab = await browser.open(`${server.url}#mode=strands`, LITTLE); // whose count of states begins anew
     await tab.until((now) => now.states > 10, 'states');
     await tab.evaluate('addEventListener("pageshow", (event) => (window.wasKept = event.persisted))');
     await tab.go('about:blank');

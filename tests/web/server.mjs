@@ -7,8 +7,9 @@ import os from 'node:os';
 import path from 'node:path';
 
 const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
-/** Few short strands. */
-export const SMALL = ['--set', 'groom.procedural.strand_count=400', '--set', 'groom.procedural.vertex_count=12'];
+/** Few short strands: a server that simulates and draws them takes little beside a browser. */
+export const HAIR = { strands: 150, vertices: 12 };
+export const SMALL = ['--set', `groom.procedural.strand_count=${HAIR.strands}`, '--set', `groom.procedural.vertex_count=${HAIR.vertices}`];
 
 export class Server {
   static async start(program, options = [], port = 0) {
