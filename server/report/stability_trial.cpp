@@ -44,15 +44,15 @@ Curve bent_curve(const glm::dvec3& normal, const glm::dvec3& side, const std::ve
   return curve;
 }
 
-constexpr int kStrands = 7;
+constexpr int kTrialStrands = 7;
 constexpr double kGoldenAngleRad = 2.4;
 
 /// Strands of 0.25 m over the upper half of a head, each bent in a plane of its own.
 std::shared_ptr<const Groom> bent_groom(const std::vector<double>& segments_m) {
   constexpr double kBendRad = 0.8;
   std::vector<Curve> strands;
-  for (int s = 0; s < kStrands; ++s) {
-    const double up = 0.15 + 0.8 * s / (kStrands - 1.0);
+  for (int s = 0; s < kTrialStrands; ++s) {
+    const double up = 0.15 + 0.8 * s / (kTrialStrands - 1.0);
     const double level = std::sqrt(1.0 - up * up);
     const glm::dvec3 normal(level * std::cos(kGoldenAngleRad * s), up, level * std::sin(kGoldenAngleRad * s));
     const glm::dvec3 side = glm::normalize(glm::cross(normal, glm::dvec3(0.3, 0.2 + 0.1 * s, 0.9)));
@@ -65,8 +65,8 @@ std::shared_ptr<const Groom> bent_groom(const std::vector<double>& segments_m) {
 std::shared_ptr<const Groom> hanging_groom(const std::vector<double>& segments_m) {
   constexpr double kBendRad = 1.9;
   std::vector<Curve> strands;
-  for (int s = 0; s < kStrands; ++s) {
-    const double up = 0.3 * s / (kStrands - 1.0);
+  for (int s = 0; s < kTrialStrands; ++s) {
+    const double up = 0.3 * s / (kTrialStrands - 1.0);
     const double level = std::sqrt(1.0 - up * up);
     const glm::dvec3 normal(level * std::cos(kGoldenAngleRad * s), up, level * std::sin(kGoldenAngleRad * s));
     const glm::dvec3 side = glm::normalize(-kUp + normal * glm::dot(kUp, normal));

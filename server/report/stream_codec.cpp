@@ -10,20 +10,20 @@ namespace strandcast {
 namespace {
 
 /// Whose strands a simulation goes on from.
-enum class Hair { ItsOwn, OfViewers };
+enum class CodedHair { ItsOwn, OfViewers };
 
 /// A strand codec of common/strands, used as server and viewer use it.
 class OwnCodec final : public StreamCodec {
  public:
   static Result<std::unique_ptr<StreamCodec>> make(const std::string& name, float bound_m,
                                                    std::optional<WindTold> wind, const StreamShape& shape,
-                                                   Hair hair = Hair::ItsOwn) {
+                                                   CodedHair hair = CodedHair::ItsOwn) {
     auto codec = std::unique_ptr<OwnCodec>(new OwnCodec(name, shape));
     ASSIGN_OR_RETURN(codec->quantum_m_, lattice_step_m(name, bound_m));
     ASSIGN_OR_RETURN(codec->encoder_, make_strand_encoder(name));
     ASSIGN_OR_RETURN(codec->decoder_, codec->new_decoder());
     if (wind) codec->told_wind_.emplace(*wind);
-    if (hair == Hair::OfViewers) codec->shared_.emplace(codec->quantum_m_);
+    if (hair == CodedHair::OfViewers) codec->shared_.emplace(codec->quantum_m_);
     codec->encoder_->set_rest_shape(shape.rest_in_head_m);
     return std::unique_ptr<StreamCodec>(std::move(codec));
   }
@@ -162,7 +162,7 @@ StreamCodecRow exact_stream_codec(double bound_m) {
   row.is_ours = row.is_temporal = true;
   row.bound_m = bound_m;
   row.make = [bound_m](const StreamShape& shape) {
-    return OwnCodec::make("step", static_cast<float>(bound_m), std::nullopt, shape, Hair::OfViewers);
+    return OwnCodec::make("step", static_cast<float>(bound_m), std::nullopt, shape, CodedHair::OfViewers);
   };
   return row;
 }
