@@ -342,7 +342,7 @@ Result<std::string> RecordDesk::start_recording(const RecordCommand& command) {
 std::string RecordDesk::end(const std::shared_ptr<Recorder>& recorder) {
   Recorder* const other = recorder == whole_ ? take_.get() : whole_.get();
   // Steps and states end together. Without an answer the source has stopped, and tells nobody anything.
-  static_cast<void>(change_tap(other, [recorder] { recorder->refuse(); }));
+  if (change_tap(other, [recorder] { recorder->refuse(); })) recorder->await_last_strands();
   recorder->stop();
   {
     const std::lock_guard lock(mutex_);

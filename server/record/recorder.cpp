@@ -144,7 +144,11 @@ void Recorder::push(Item item) {
   if (is_frame) bytes = std::get<EncodedFramePtr>(item.what)->message.size();
   {
     const std::lock_guard lock(mutex_);
-    if (is_refusing_ || is_ended_) return;
+    const int64_t strands_ns =
+        is_frame ? std::get<EncodedFramePtr>(item.what)->header.sim_time_ns : INT64_MAX;
+    if (is_ended_ || (is_refusing_ && strands_ns > state_ns_)) return;
+    if (is_frame) strands_ns_ = std::max(strands_ns_, strands_ns);
+    if (const auto* state = std::get_if<StatePtr>(&item.what)) state_ns_ = (*state)->sim_time_ns;
     const bool is_full = bytes > 0 ? waiting_bytes_ + bytes > kMaxRecorderBytes && !waiting_.empty()
                                    : waiting_.size() >= kMaxRecorderItems;
     if (is_full) {
@@ -156,6 +160,7 @@ void Recorder::push(Item item) {
     waiting_.push_back(std::move(item));
   }
   changed_.notify_one();
+  if (is_frame) strands_came_.notify_all();
 }
 
 void Recorder::run() {
@@ -334,6 +339,12 @@ std::string Recorder::summary() const {
 void Recorder::refuse() {
   const std::lock_guard lock(mutex_);
   is_refusing_ = true;
+}
+
+void Recorder::await_last_strands() {
+  constexpr std::chrono::milliseconds kMostWait{500};
+  std::unique_lock lock(mutex_);
+  strands_came_.wait_for(lock, kMostWait, [this] { return is_ended_ || strands_ns_ >= state_ns_; });
 }
 
 void Recorder::stop() {

@@ -102,8 +102,12 @@ class Recorder : public StreamReader, public StepTap {
   void set_step_cost(double steps) { step_cost_ = steps; }
   /// Sets whether the simulation goes on from what keyframes tell; initially not. Before begin().
   void set_shared(bool is_shared) { is_shared_ = is_shared; }
-  /// Accepts nothing more from any caller, so that all recorded data ends at one moment. Any thread.
+  /// Accepts nothing more from any caller but the strands of states that it has, so that all recorded data
+  /// ends at one moment. Any thread.
   void refuse();
+  /// Waits after refuse() for the strands of the last state, which are still being encoded, for half a second
+  /// at most.
+  void await_last_strands();
   /// Unsubscribes, closes the file and logs its content; afterwards it is no longer a tap.
   void stop();
 
@@ -161,12 +165,14 @@ class Recorder : public StreamReader, public StepTap {
 
   mutable std::mutex mutex_;  // guards the block below
   std::condition_variable changed_;
+  std::condition_variable strands_came_;
   std::deque<Item> waiting_;
   uint64_t waiting_bytes_ = 0;
   RecordedLoss refused_;  // that found no place there
   bool is_refusing_ = false;
   bool is_stopping_ = false;
-  bool is_ended_ = false;  // the file takes nothing any more
+  bool is_ended_ = false;                                  // the file takes nothing any more
+  int64_t state_ns_ = INT64_MIN, strands_ns_ = INT64_MIN;  // simulated times of the newest that came
   RecordCounters counters_;
 
   // Of the recorder's thread.
