@@ -64,7 +64,9 @@ StrandEnd look_at(const Groom& groom, End end) {
   for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
     const glm::dvec3 point(points[strand]), out = point - glm::dvec3(sphere.center_m);
     const glm::dvec3 on = glm::dvec3(groom.rest_position_m[index(strand, 1)]) - point;
-    off.push_back(std::abs(glm::length(out) / static_cast<double>(sphere.radius_m) - 1.0));
+    const double own_off = std::abs(glm::length(out) / static_cast<double>(sphere.radius_m) - 1.0);
+    if (!std::isfinite(own_off)) return {};
+    off.push_back(own_off);
     const double lengths = glm::length(out) * glm::length(on);
     if (lengths > 0.0) result.outwards += glm::dot(out, on) / lengths / static_cast<double>(points.size());
   }
