@@ -64,7 +64,9 @@ StrandEnd look_at(const Groom& groom, End end) {
   for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
     const glm::dvec3 point(points[strand]), out = point - glm::dvec3(sphere.center_m);
     const glm::dvec3 on = glm::dvec3(groom.rest_position_m[index(strand, 1)]) - point;
-    off.push_back(std::abs(glm::length(out) / static_cast<double>(sphere.radius_m) - 1.0));
+    const double own_off = std::abs(glm::length(out) / static_cast<double>(sphere.radius_m) - 1.0);
+    if (!std::isfinite(own_off)) return {};
+    off.push_back(own_off);
     const double lengths = glm::length(out) * glm::length(on);
     if (lengths > 0.0) result.outwards += glm::dot(out, on) / lengths / static_cast<double>(points.size());
   }
@@ -73,12 +75,12 @@ StrandEnd look_at(const Groom& groom, End end) {
 }
 
 /// Whether the last points are the roots: hair leaves its skin outwards, and roots lie on a head more nearly
-/// than tips. Of real grooms roots have 0.1 (a ponytail) to 1.8 (fur) more outwards than tips, and are 0.7
-/// (fur) to 6 times nearer to their sphere.
+/// than tips. Of real heads roots have 0.1 to 0.7 more outwards than tips, and are 1.6 to 6 times nearer to
+/// their sphere. Hair that falls straight down through its head has neither nearer, whatever its ends do.
 bool are_tips_first(const StrandEnd& first, const StrandEnd& last) {
-  constexpr double kMore = 0.05, kClearlyMore = 0.3, kFurMore = 1.0, kClearlyNearer = 1.5;
+  constexpr double kMore = 0.05, kClearlyMore = 0.3, kNearer = 1.25, kClearlyNearer = 1.5;
   const double more = last.outwards - first.outwards;
-  return more > kFurMore || (more > kClearlyMore && last.off < first.off) ||
+  return (more > kClearlyMore && kNearer * last.off < first.off) ||
          (more > kMore && kClearlyNearer * last.off < first.off);
 }
 

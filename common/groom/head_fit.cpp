@@ -76,6 +76,7 @@ bool are_on_jaw(const FittedSphere& face, const std::vector<glm::vec3>& roots) {
   std::vector<float> heights;
   for (const glm::vec3& root : roots) {
     const glm::vec3 out = (root - face.center_m) / face.radius_m;
+    if (!std::isfinite(out.x + out.y + out.z)) return false;
     heights.push_back(out.y);
     low_count += out.y < kHighest ? 1 : 0;
     near_count += glm::length(out) > kNearest && glm::length(out) < kFurthest ? 1 : 0;

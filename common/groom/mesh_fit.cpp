@@ -17,8 +17,9 @@ namespace strandcast {
 namespace {
 
 constexpr size_t kSurfacePoints = 20'000, kMostRoots = 300;
-/// Roots further than this from the skin are not on it: loose caps of hair stand off by 10 mm.
-constexpr float kFarM = 0.02f;
+/// Roots of which half, or some, are further than this from the skin are not on it: loose caps of hair stand
+/// off by 10 mm.
+constexpr float kFarM = 0.02f, kFarthestM = 0.03f;
 /// A turn is told when it brings nearly all roots this near, and at least twice as near as they are. Nearer
 /// ones are where they belong.
 constexpr float kNearM = 0.008f, kCloseM = 0.005f;
@@ -124,7 +125,7 @@ std::string unfit_mesh(const Mesh& head, const Groom& groom, const glm::vec3& fi
   const MeshFit fit(head, groom, file_origin_m);
   const float half_m = fit.distance_m({}, 0.5), most_m = fit.distance_m({}, kNearlyAll);
   if (most_m < kCloseM) return {};
-  const bool is_far = half_m > kFarM;
+  const bool is_far = half_m > kFarM || most_m > kFarthestM;
   std::vector<Named> others = usual_turns();
   if (is_far)
     for (Named& scale : usual_scales()) others.push_back(std::move(scale));

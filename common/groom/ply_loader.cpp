@@ -151,9 +151,33 @@ Result<PlyRowsRead> read_rows(std::string_view file, const PlyHeader& header) {
   return read;
 }
 
+/// Whether successive points lie no nearer to each other than any two. `count`: points of a strand.
+bool are_shuffled(std::span<const glm::vec3> points, uint32_t count) {
+  constexpr size_t kMinPoints = 200;     // fewer may be as wild as they like
+  constexpr uint32_t kMinOfStrand = 10;  // of fewer, steps are as long as strands
+  constexpr double kNearer = 0.75;
+  if (points.size() < kMinPoints || count < kMinOfStrand) return false;
+  std::vector<float> steps, jumps;
+  for (size_t i = 0; i + 1 < points.size(); ++i) {
+    const float step = glm::distance(points[i], points[i + 1]);
+    const float jump = glm::distance(points[i], points[mix_u32(static_cast<uint32_t>(i)) % points.size()]);
+    if (!std::isfinite(step) || !std::isfinite(jump)) continue;
+    steps.push_back(step);
+    jumps.push_back(jump);
+  }
+  return !steps.empty() && static_cast<double>(median(std::move(steps))) >
+                               kNearer * static_cast<double>(median(std::move(jumps)));
+}
+
 /// Strands one after the other in the order of the file's points; a tenth of these at most may be left.
 Result<Groom> strands_of_counts(std::vector<glm::vec3> points, const std::vector<uint32_t>& counts,
                                 std::vector<std::string>& notes) {
+  if (are_shuffled(points, static_cast<uint32_t>(points.size() / std::max<size_t>(counts.size(), 1))))
+    return make_error(
+        ErrorCode::BadInput,
+        "{} points are in no order: from one to the next it is as far as to any other, so nobody "
+        "can tell strands of them (export curves, or points from root to tip)",
+        points.size());
   Groom groom;
   groom.offset.push_back(0);
   uint64_t total = 0;
@@ -280,24 +304,6 @@ Statements statements_of(const std::vector<std::string>& comments) {
   return said;
 }
 
-/// Whether successive points lie no nearer to each other than any two. `count`: points of a strand.
-bool are_shuffled(std::span<const glm::vec3> points, uint32_t count) {
-  constexpr size_t kMinPoints = 200;     // fewer may be as wild as they like
-  constexpr uint32_t kMinOfStrand = 10;  // of fewer, steps are as long as strands
-  constexpr double kNearer = 0.75;
-  if (points.size() < kMinPoints || count < kMinOfStrand) return false;
-  std::vector<float> steps, jumps;
-  for (size_t i = 0; i + 1 < points.size(); ++i) {
-    const float step = glm::distance(points[i], points[i + 1]);
-    const float jump = glm::distance(points[i], points[mix_u32(static_cast<uint32_t>(i)) % points.size()]);
-    if (!std::isfinite(step) || !std::isfinite(jump)) continue;
-    steps.push_back(step);
-    jumps.push_back(jump);
-  }
-  return !steps.empty() && static_cast<double>(median(std::move(steps))) >
-                               kNearer * static_cast<double>(median(std::move(jumps)));
-}
-
 /// Bare points: so many of them to a strand.
 Result<Groom> strands_of_points(std::vector<glm::vec3> points, uint32_t count,
                                 std::vector<std::string>& notes) {
@@ -306,12 +312,6 @@ Result<Groom> strands_of_points(std::vector<glm::vec3> points, uint32_t count,
                       "{} points are no strands of {} each; groom.file.strand_vertex_count says how many a "
                       "strand has",
                       points.size(), count);
-  if (are_shuffled(points, count))
-    return make_error(
-        ErrorCode::BadInput,
-        "{} points are in no order: from one to the next it is as far as to any other, so nobody "
-        "can tell strands of them (export curves, or points from root to tip)",
-        points.size());
   if (points.size() / count > kMaxStrandCount)
     return make_error(ErrorCode::LimitExceeded, "{} strands, at most {} are allowed", points.size() / count,
                       kMaxStrandCount);

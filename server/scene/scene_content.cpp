@@ -84,15 +84,19 @@ Result<Groom> load_target_of(const SceneDesc& scene, const Groom& groom) {
 Result<Mesh> load_head_meshes(const HeadDesc& head, const GroomPlacement& placement) {
   std::vector<std::filesystem::path> paths = {head.mesh_path};
   paths.insert(paths.end(), head.more_mesh_paths.begin(), head.more_mesh_paths.end());
+  // A file in centimetres has its head at 160: limits are of metres.
+  GroomPlacement of_metres = placement;
+  of_metres.unit_m = 1.0f;
+  of_metres.origin *= placement.unit_m;
   Mesh whole;
   for (const std::filesystem::path& path : paths) {
-    ASSIGN_OR_RETURN(const Mesh part, load_obj(path, 1.0f));
+    ASSIGN_OR_RETURN(const Mesh part, load_obj(path, placement.unit_m));
     if (whole.triangle.size() + part.triangle.size() > kMaxMeshTriangles)
       return at(path.string(), make_error(ErrorCode::LimitExceeded,
                                           "{} triangles with the meshes before it, at most {} are allowed",
                                           whole.triangle.size() + part.triangle.size(), kMaxMeshTriangles));
     const auto first = static_cast<uint32_t>(whole.position_m.size());
-    for (const glm::vec3& position : part.position_m) whole.position_m.push_back(placement.place(position));
+    for (const glm::vec3& position : part.position_m) whole.position_m.push_back(of_metres.place(position));
     for (const glm::vec3& normal : part.normal) whole.normal.push_back(placement.turn(normal));
     for (const glm::uvec3& triangle : part.triangle) whole.triangle.push_back(triangle + first);
   }

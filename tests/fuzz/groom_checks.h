@@ -6,6 +6,7 @@
 #include "common/base/check.h"
 #include "common/groom/groom.h"
 #include "common/groom/groom_file.h"
+#include "common/groom/groom_parts.h"
 #include "common/groom/resample.h"
 #include "common/groom/usable_strands.h"
 
@@ -30,6 +31,9 @@ inline void check_loaded_groom(const Groom& read) {
   CHECK(unit_m > 0.0f);
   CHECK(std::abs(guess_yaw_deg(groom).value) <= 180.0f);
   (void)guess_up(groom);
+  Groom turned = groom;
+  StrandLabels labels;
+  if (turn_tips_first(turned, labels).empty()) CHECK(turned.rest_position_m == groom.rest_position_m);
   if (!validate(groom)) return;
   const Groom uniform = resample(groom, 5);
   CHECK(uniform.uniform_vertex_count() == 5 && validate(uniform).ok());

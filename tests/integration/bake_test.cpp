@@ -210,6 +210,20 @@ TEST_F(Bake, CurvesThatMoveAsOneAreTheMotion) {
     }
     EXPECT_GT(tips, frame > 0 ? 1e-3 : -1.0) << "the rest of it is simulated";
   }
+  EXPECT_THAT(said(), AllOf(HasSubstr("roots of 1 curves object do, which move as one"),
+                            HasSubstr("one unit is taken as 0.0254 m and +Z as up, as of the hair")));
+  // What was written moves hair as it was moved, from its first frame on, which is behind the rest shape.
+  ASSERT_EQ(run({"--motion", path("out.abc"), "--fps", "4", path("again.abc")}), 0) << said();
+  EXPECT_THAT(said(), HasSubstr("its first sample is the rest shape, and the motion begins with the next"));
+  const BakedFile again(path("again.abc"));
+  ASSERT_EQ(again.reader->sample_count(), 4u);
+  for (uint64_t sample = 1; sample < 4; ++sample) {
+    const auto was = file.reader->read(sample, kMaxStrandCount, 1 << 20),
+               is = again.reader->read(sample, kMaxStrandCount, 1 << 20);
+    ASSERT_TRUE(was && is);
+    for (size_t root = 0; root < was->points.size(); root += 6)
+      EXPECT_LT(glm::distance(was->points[root], is->points[root]), 4.0 * kBoundM / 0.0254) << sample;
+  }
 }
 
 TEST_F(Bake, FollowersComeWithTheirGuides) {

@@ -167,6 +167,10 @@ TEST(Ply, PointsInNoOrderAreNoStrands) {
   const auto told = AllOf(HasSubstr("2000 points are in no order"), HasSubstr("export curves"));
   EXPECT_THAT(refusal(bare(points)), told);
   EXPECT_THAT(refusal(bare(points), 20), told) << "whoever says how many a strand has";
+  std::string counted = bare(points);
+  counted.insert(counted.find("end_header"), "element strand 100\nproperty int nverts\n");
+  for (int strand = 0; strand < 100; ++strand) counted += "20\n";
+  EXPECT_THAT(refusal(counted), told) << "so does the file";
   // Long hair of few points, in no order of strands, is in order.
   std::vector<glm::vec3> longer;
   for (uint32_t s = 0; s < 200; ++s) {

@@ -582,6 +582,9 @@ TEST(Usdc, EveryTruncationIsRefused) {
   ASSERT_EQ(refusal(whole), "accepted");
   for (size_t size = 0; size < whole.size(); ++size)
     ASSERT_NE(refusal(whole.substr(0, size)), "accepted") << size << " of " << whole.size();
+  EXPECT_THAT(refusal(whole.substr(0, whole.size() / 4)),
+              ::testing::AllOf(HasSubstr("which stands at the end: nothing of it can be had"),
+                               HasSubstr("copy it again, or export it anew")));
 }
 
 TEST(Usdc, EveryDamagedByteGivesASentenceOrASoundGroom) {

@@ -230,6 +230,39 @@ TEST(SceneContent, SeveralMeshesAreOneHead) {
   EXPECT_NE(load_scene_content(scene).error().to_string().find("eyes.obj"), std::string::npos);
 }
 
+TEST(SceneContent, AHeadsMeshMayBeInTheCentimetresOfItsHair) {
+  const TemporaryFolder folder;
+  const Mesh head = make_head(10.0f);
+  const glm::vec3 over_feet(0.0f, 160.0f, 0.0f);
+  std::string mesh, points;
+  size_t strands = 0;
+  for (const glm::vec3& at : head.position_m) {
+    const glm::vec3 p = at + over_feet;
+    mesh += fmt::format("v {} {} {}\n", p.x, p.y, p.z);
+    if (at.y < 2.0f) continue;
+    ++strands;
+    const glm::vec3 tip = 1.5f * at + over_feet;
+    points += fmt::format("{} {} {}\n{} {} {}\n", p.x, p.y, p.z, tip.x, tip.y, tip.z);
+  }
+  for (const glm::uvec3& t : head.triangle) mesh += fmt::format("f {} {} {}\n", t.x + 1, t.y + 1, t.z + 1);
+  SceneDesc scene = built_in_scene();
+  FileGroomDesc file;
+  file.path = folder.write(
+      "hair.ply", fmt::format("ply\nformat ascii 1.0\ncomment strand_vertex_count 2\nelement vertex "
+                              "{}\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+                              2 * strands) +
+                      points);
+  scene.groom = file;
+  scene.head.mesh_path = folder.write("head.obj", mesh);
+  const auto content = load_scene_content(scene);
+  ASSERT_TRUE(content) << content.error().to_string();
+  EXPECT_EQ(content->groom.file_unit_m, 0.01f);
+  EXPECT_EQ(content->unlikely, "");
+  ASSERT_EQ(content->head.position_m.size(), head.position_m.size());
+  const HeadMeasure measure = measure_head(content->head, spheres_of(*content), content->groom);
+  EXPECT_LT(measure.root_most_m, 1e-4);
+}
+
 TEST(SceneContent, WhatWasGuessedIsSaid) {
   const std::filesystem::path path =
       std::filesystem::path(STRANDCAST_SHARED_DATA) / "grooms/ponytail_side.tfx";
