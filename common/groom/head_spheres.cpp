@@ -113,6 +113,7 @@ struct RayTarget {
   double radius;
 };
 
+/// By height.
 std::vector<RayTarget> ray_targets(const Mesh& mesh) {
   std::vector<RayTarget> targets;
   for (const glm::uvec3& corner : mesh.triangle) {
@@ -123,6 +124,7 @@ std::vector<RayTarget> ray_targets(const Mesh& mesh) {
                               glm::length(target.c - target.middle)});
     targets.push_back(target);
   }
+  std::ranges::sort(targets, {}, [](const RayTarget& target) { return target.middle.y; });
   return targets;
 }
 
@@ -137,12 +139,19 @@ bool is_hit(const RayTarget& target, const glm::dvec3& from, const glm::dvec3& a
 /// Those that face no other part of the mesh within `reach`.
 std::vector<Sample> keep_outer(const std::vector<Sample>& samples, const Mesh& mesh, double reach) {
   constexpr double kLift = 1e-3;  // of the reach: past the sample's own triangle
-  if (uint64_t{samples.size()} * mesh.triangle.size() > kMaxRayTests) return samples;
+  if (samples.empty() || uint64_t{samples.size()} * mesh.triangle.size() > kMaxRayTests) return samples;
   const std::vector<RayTarget> targets = ray_targets(mesh);
+  double largest = 0.0;
+  for (const RayTarget& target : targets) largest = std::max(largest, target.radius);
+  const auto height_of = [](const RayTarget& target) { return target.middle.y; };
   std::vector<Sample> outer;
   for (const Sample& sample : samples) {
     const glm::dvec3 from = sample.point + kLift * reach * sample.normal;
-    const bool is_hidden = std::any_of(targets.begin(), targets.end(), [&](const RayTarget& target) {
+    // What a ray hits has its middle within sqrt(2) radii of the ray's height.
+    const auto [low, high] = std::minmax({from.y, from.y + reach * sample.normal.y});
+    const auto begin = std::ranges::lower_bound(targets, low - 1.5 * largest, {}, height_of);
+    const auto end = std::ranges::upper_bound(targets, high + 1.5 * largest, {}, height_of);
+    const bool is_hidden = std::any_of(begin, std::max(begin, end), [&](const RayTarget& target) {
       return is_hit(target, from, sample.normal, reach);
     });
     if (!is_hidden) outer.push_back(sample);
@@ -229,13 +238,12 @@ class BallChoice {
  public:
   BallChoice(const std::vector<Ball>& balls, const std::vector<Sample>& samples, std::vector<double> weights,
              double far_off)
-      : sample_count_(samples.size()), weights_(std::move(weights)), far_off_(static_cast<float>(far_off)) {
-    for (const Ball& ball : balls) {
-      auto& row = distance_.emplace_back();
-      for (const Sample& sample : samples)
-        row.push_back(static_cast<float>(
+      : ball_count_(balls.size()), weights_(std::move(weights)), far_off_(static_cast<float>(far_off)) {
+    distance_.reserve(samples.size() * balls.size());
+    for (const Sample& sample : samples)
+      for (const Ball& ball : balls)
+        distance_.push_back(static_cast<float>(
             std::clamp(glm::length(sample.point - ball.center) - ball.radius - kNearEnoughM, 0.0, far_off)));
-    }
   }
 
   /// Each in turn takes most off what is left; then each is looked for once more, among the others.
@@ -243,13 +251,13 @@ class BallChoice {
     std::vector<size_t> chosen;
     while (chosen.size() < count) {
       const size_t best = best_beside(chosen, chosen.size());
-      if (best == distance_.size()) break;
+      if (best == ball_count_) break;
       chosen.push_back(best);
     }
     for (int round = 0; round < kChoiceRounds; ++round)
       for (size_t i = 0; i < chosen.size(); ++i) {
         const size_t best = best_beside(chosen, i);
-        if (best != distance_.size()) chosen[i] = best;
+        if (best != ball_count_) chosen[i] = best;
       }
     return chosen;
   }
@@ -258,28 +266,30 @@ class BallChoice {
   /// Returns the ball that covers most of what the chosen ones, except number `open`, leave; the number of
   /// balls where none covers anything.
   size_t best_beside(const std::vector<size_t>& chosen, size_t open) const {
-    std::vector<float> left(sample_count_, far_off_);
-    for (size_t i = 0; i < chosen.size(); ++i)
-      for (size_t k = 0; i != open && k < sample_count_; ++k)
-        left[k] = std::min(left[k], distance_[chosen[i]][k]);
-    double best_gain = 0.0;
-    size_t best = distance_.size();
-    for (size_t ball = 0; ball < distance_.size(); ++ball) {
-      double gain = 0.0;
-      for (size_t k = 0; k < sample_count_; ++k) {
-        const auto before = static_cast<double>(left[k]);
-        const double after = std::min(before, static_cast<double>(distance_[ball][k]));
-        gain += weights_[k] * (before * before - after * after);
+    // Sample by sample for all balls at once, in vectors.
+    std::vector<double> gain(ball_count_, 0.0);
+    for (size_t k = 0; k < weights_.size(); ++k) {
+      const float* const distance = distance_.data() + k * ball_count_;
+      float left = far_off_;
+      for (size_t i = 0; i < chosen.size(); ++i)
+        if (i != open) left = std::min(left, distance[chosen[i]]);
+      const auto before = static_cast<double>(left);
+      for (size_t ball = 0; ball < ball_count_; ++ball) {
+        const double after = std::min(before, static_cast<double>(distance[ball]));
+        gain[ball] += weights_[k] * (before * before - after * after);
       }
-      if (gain > best_gain) best_gain = gain, best = ball;
     }
+    double best_gain = 0.0;
+    size_t best = ball_count_;
+    for (size_t ball = 0; ball < ball_count_; ++ball)
+      if (gain[ball] > best_gain) best_gain = gain[ball], best = ball;
     return best;
   }
 
-  size_t sample_count_;
-  std::vector<double> weights_;
+  size_t ball_count_;
+  std::vector<double> weights_;  // of the samples
   float far_off_;
-  std::vector<std::vector<float>> distance_;  // (ball x sample) held to what counts
+  std::vector<float> distance_;  // (sample x ball) held to what counts
 };
 
 /// The spheres for samples that count as much as `weigh` says of them.

@@ -1,6 +1,7 @@
 #include "common/render/scalp_cover.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -86,18 +87,24 @@ class RootArea {
     float squared = near.front().distance_squared;
     // Nothing is nearer than its roots but by what is between them.
     if (std::sqrt(squared) > most_m_ + reach_m_) return std::sqrt(squared);
+    // Between each two of them, once; most triangles have an edge that is too long.
+    std::array<std::array<float, kNearestRoots>, kNearestRoots> apart_m{};
     for (size_t i = 0; i < near.size(); ++i)
       for (size_t j = i + 1; j < near.size(); ++j)
-        for (size_t k = j + 1; k < near.size() && squared > 0.0f; ++k)
-          squared = std::min(squared, squared_to(point_m, {near[i].index, near[j].index, near[k].index}));
+        apart_m[i][j] = glm::distance(root_m_[near[i].index], root_m_[near[j].index]);
+    for (size_t i = 0; i < near.size(); ++i)
+      for (size_t j = i + 1; j < near.size(); ++j) {
+        if (!(apart_m[i][j] <= most_m_)) continue;
+        for (size_t k = j + 1; k < near.size() && squared > 0.0f; ++k) {
+          const float edge_m = std::max({apart_m[i][j], apart_m[j][k], apart_m[i][k]});
+          if (!(edge_m <= most_m_)) continue;
+          const float off_m = std::max(kOffReach * reach_m_, kOffEdge * edge_m);
+          squared =
+              std::min(squared, squared_to_triangle(point_m, root_m_[near[i].index], root_m_[near[j].index],
+                                                    root_m_[near[k].index], off_m));
+        }
+      }
     return std::sqrt(squared);
-  }
-
-  float squared_to(const glm::vec3& point_m, const glm::uvec3& corner) const {
-    const glm::vec3 &a = root_m_[corner.x], &b = root_m_[corner.y], &c = root_m_[corner.z];
-    const float edge_m = std::max({glm::distance(a, b), glm::distance(b, c), glm::distance(c, a)});
-    if (!(edge_m <= most_m_)) return std::numeric_limits<float>::max();
-    return squared_to_triangle(point_m, a, b, c, std::max(kOffReach * reach_m_, kOffEdge * edge_m));
   }
 
   std::span<const glm::vec3> root_m_;

@@ -10,6 +10,7 @@
 #include "server/report/scene_run.h"
 #include "server/source/sim_detail.h"
 #include "tests/support/sim_devices.h"
+#include "tests/support/test_grid.h"
 
 namespace strandcast::pruning_test {
 namespace {
@@ -38,7 +39,7 @@ class Pruning : public testing::TestWithParam<SimDevice> {
 INSTANTIATE_TEST_SUITE_P(Devices, Pruning, testing::ValuesIn(sim_devices()), name_of_device);
 
 // Every strand model with a kernel: with a pass that nobody asked for hair is where it is without, bit for
-// bit.
+// bit. Pictures of the same bits are the same: on the small grid of the first model.
 TEST_P(Pruning, WhatIsLeftOutIsNotMissed) {
   for (const char* solver : {"dftl", "direct_rod", "xpbd"}) {
     PruningDesc desc;
@@ -46,7 +47,8 @@ TEST_P(Pruning, WhatIsLeftOutIsNotMissed) {
     desc.scene.solver.name = solver;
     desc.motion = built_in_stream_motions()[1];
     desc.steps = 20;
-    desc.has_pictures = GetParam() == SimDevice::Lanes;
+    desc.has_pictures = GetParam() == SimDevice::Lanes &&
+                        (desc.scene.solver.name == "dftl" || test_grid() == TestGrid::Whole);
     const auto run = run_pruning(desc, executor());
     ASSERT_TRUE(run.ok()) << run.error().to_string();
     EXPECT_EQ(run->passes.size(), 7u) << "all that a step can be without";

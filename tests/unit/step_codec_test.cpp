@@ -477,7 +477,7 @@ TEST(StepCodec, EverySolverWithAKernelTakesAFractionOfTangentsBytes) {
   for (const SolverRow& row : solver_table()) {
     SCOPED_TRACE(row.name);
     if (!row.has_kernel) continue;
-    SteppedHair hair(stepped_scene(600, 16, row.name));
+    SteppedHair hair(stepped_scene(300, 16, row.name));
     hair.settle(40);
     Stream by_steps(hair);
     Stream by_motion(hair, "tangent");
@@ -501,7 +501,7 @@ TEST(StepCodec, ForcesBetweenStrandsArePredicted) {
   for (const std::string& solver : kSolvers)
     for (const bool has_air : {false, true}) {
       SCOPED_TRACE(solver + (has_air ? " in air" : ""));
-      SceneDesc scene = stepped_scene(600, kVertices, solver);
+      SceneDesc scene = stepped_scene(300, kVertices, solver);
       scene.volume.friction_per_s = 20.0;
       scene.volume.repulsion_per_s2 = 18000.0;
       scene.volume.target_per_s2 = 500.0;

@@ -136,7 +136,10 @@ const all = {
     await tabs[0].tab.until(() => seenSessions().size === 0, 'the server knows that nobody sees them');
     await Promise.all(tabs.map(async (one) => {
       // What was on its way arrives.
-      for (let before = -1; one.now.states !== before; one.now = await accountAfter(one.tab, 2)) before = one.now.states;
+      for (let before = -1, left = 5; one.now.states !== before && left > 0; --left) {
+        before = one.now.states;
+        one.now = await accountAfter(one.tab, 2);
+      }
       one.drawn = await shown(one.tab);
     }));
     await Promise.all(tabs.map(({ tab }) => accountAfter(tab, 2)));

@@ -232,7 +232,9 @@ Status record_tiny(Tape& tape) {
   return {};
 }
 
-constexpr uint32_t kFullStrands = 400;
+uint32_t full_strands() {
+  return static_cast<uint32_t>(on_grid(150, 400));
+}
 constexpr uint32_t kFullVertices = 12;
 
 /// A message that followers get, and what who joins there gets instead; empty: nobody does.
@@ -245,7 +247,7 @@ Result<std::vector<TapedFrame>> full_frames(std::vector<glm::vec3>& rest_in_head
   constexpr int kJoinEvery = 23;
   ASSIGN_OR_RETURN(SceneDesc scene, built_in_scene_with({"quality=full", "step_rate_hz=30", "substeps=2"}));
   auto& groom = std::get<ProceduralGroomDesc>(scene.groom);
-  groom.strand_count = kFullStrands;
+  groom.strand_count = full_strands();
   groom.vertex_count = kFullVertices;
   SteppedHair hair(scene);
   hair.move_bust();
@@ -292,7 +294,7 @@ Status record_full(Tape& tape) {
   for (size_t first = 0; first < frames.size(); ++first) {
     if (first > 0 && frames[first].keyframe.empty()) continue;
     tape.add_name(fmt::format("full from {}", first));
-    Player player(tape, "step", {kFullStrands, kFullVertices}, rest_in_head_m);
+    Player player(tape, "step", {full_strands(), kFullVertices}, rest_in_head_m);
     for (size_t i = first; i < std::min(frames.size(), first + (first > 0 ? kMostFollowed : frames.size()));
          ++i)
       if (!player.play(first > 0 && i == first ? frames[i].keyframe : frames[i].frame))
