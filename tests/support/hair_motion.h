@@ -67,7 +67,7 @@ class HairMotion {
     constexpr double kStepS = 1.0 / 60.0;
     constexpr double kDragPerS = 5.0;
     constexpr double kCorrection = 0.9;
-    constexpr double kHeadRadiusM = 0.1;
+    constexpr double kSkullRadiusM = 0.1;
     time_s_ += kStepS;
     const Pose pose = head_pose(time_s_);
     const uint32_t strands = desc_.strand_count;
@@ -85,8 +85,8 @@ class HairMotion {
         const glm::dvec3 acceleration = glm::dvec3(0.0, -9.81, 0.0) + kDragPerS * (wind - velocity_mps_[i]);
         glm::dvec3 free = position_m_[i] + kStepS * velocity_mps_[i] + kStepS * kStepS * acceleration;
         const glm::dvec3 from_head = free - pose.position_m;
-        if (const double distance = glm::length(from_head); distance < kHeadRadiusM)
-          free = pose.position_m + from_head * (kHeadRadiusM / std::max(distance, 1e-9));
+        if (const double distance = glm::length(from_head); distance < kSkullRadiusM)
+          free = pose.position_m + from_head * (kSkullRadiusM / std::max(distance, 1e-9));
         const double length_m = glm::distance(glm::dvec3(rest_[i]), glm::dvec3(rest_[i - strands]));
         moved[v] = moved[v - 1] + length_m * glm::normalize(free - moved[v - 1]);
         pull[v] = moved[v] - free;
