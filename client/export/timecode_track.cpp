@@ -10,7 +10,8 @@
 namespace strandcast {
 namespace {
 
-/// Between two states timecode goes on as long as time does, but for this.
+/// Between two states timecode goes on as long as time does, but for this. A head whose source is late coasts
+/// ahead of what it says next, and then shows moments again: those states are no jump.
 constexpr double kGapS = 0.5;
 constexpr double kFrameRounding = 1e-6;
 
@@ -23,8 +24,8 @@ void TimecodeTrack::add(int64_t sim_time_ns, const Timecode& timecode) {
     const double frames = frames_between(advanced(last->first, before.place), timecode);
     const double passed_s = static_cast<double>(sim_time_ns - before.sim_time_ns) / kNsPerS;
     if (frames == 0.0 && sim_time_ns == before.sim_time_ns) return;
-    if (frames > 0.0 && std::abs(frames / timecode.rate.hz() - passed_s) <= kGapS) {
-      last->point.push_back({sim_time_ns, before.place + frames});
+    if (std::abs(frames / timecode.rate.hz() - passed_s) <= kGapS) {
+      if (frames > 0.0) last->point.push_back({sim_time_ns, before.place + frames});
       return;
     }
     if (frames == 0.0) return;  // it stands still

@@ -270,6 +270,23 @@ TEST_F(ScenarioProgram, WhatIsWrongWithALineIsSeen) {
             HasSubstr("FAIL  line 11"), HasSubstr("relay: true")));
 }
 
+// The time is that of coming back, not of the question. A first attempt to connect again waits for 0.25 s.
+TEST_F(ScenarioProgram, ComingBackLateFailsHoweverLateItIsAskedFor) {
+  const auto path = write("late.textproto",
+                          "name: \"late\"\n"
+                          "do { start { set: \"groom.procedural.strand_count=20\" } }\n"
+                          "do { view { name: \"a\" } }\n"
+                          "do { link { fault: CUT } }\n"
+                          "do { expect { back_within_s: 60 } }\n"
+                          "do { expect { back_within_s: 0.2 } }\n");
+  EXPECT_EQ(run({"--scenario", path.string()}), 1) << text_of("said");
+  const std::string said = text_of("said");
+  EXPECT_THAT(said,
+              testing::ContainsRegex("ok    line 5    a comes back: wanted within 60 s, was back after"));
+  EXPECT_THAT(said, testing::ContainsRegex("FAIL  line 6    a comes back: was back after [0-9.]+ s, wanted "
+                                           "within 0.2 s"));
+}
+
 // In lockstep nothing goes by itself: what is then asked about states would be told wrongly.
 TEST_F(ScenarioProgram, WaitingInLockstepMeasuresNoStates) {
   const std::string begin = std::string("name: \"waits\"\n") + kStart +

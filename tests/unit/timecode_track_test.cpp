@@ -39,6 +39,26 @@ TEST(TimecodeTrack, FramesAreTheCamerasOverTenMinutesOfDrift) {
   }
 }
 
+// A camera's frames of 25 a second are told 60 times a second, some of them late: states show a moment ahead,
+// and then go back to it. Every frame is there, where it is first seen.
+TEST(TimecodeTrack, StatesThatGoBackToWhatTheyShowedAreNoJump) {
+  const Timecode first = *parse_timecode("01:00:00:00", {25, 1});
+  TimecodeTrack track;
+  double ahead_s = 0.0;
+  for (int i = 0; i <= 240; ++i) {
+    const double time_s = i / 60.0;
+    ahead_s = i % 20 == 0 ? 0.0 : i % 20 > 14 ? ahead_s + 1.0 / 60.0 : ahead_s;
+    const double told = std::floor((time_s - ahead_s) * 25.0);
+    track.add(std::llround(time_s * kNsPerS), advanced(first, told + ahead_s * 25.0));
+  }
+  EXPECT_TRUE(track.is_whole(0)) << track.text();
+  const auto frames = track.frames(advanced(first, 25.0), advanced(first, 75.0));
+  ASSERT_TRUE(frames);
+  ASSERT_EQ(frames->time_ns.size(), 51u);
+  for (size_t k = 0; k < frames->time_ns.size(); ++k)
+    EXPECT_NEAR(static_cast<double>(frames->time_ns[k]) / kNsPerS, 1.0 + static_cast<double>(k) / 25.0, 0.04);
+}
+
 TEST(TimecodeTrack, FindsFramesInTheFirstStretchThatHasThem) {
   TimecodeTrack track;
   const auto at = [](const char* text) { return *parse_timecode(text, {25, 1}); };

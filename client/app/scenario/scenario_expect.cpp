@@ -355,27 +355,27 @@ void ScenarioRun::expect_state(const ScenarioExpect& expect) {
          hash_ ? "is " + hash_text(hash_) : kNoState, wanted.has_value() && hash_ == wanted);
 }
 
+/// It counts from the change, however late it is asked for.
 void ScenarioRun::expect_back(const ScenarioExpect& expect) {
   const ScenarioViewer& who = **viewer(expect.viewer);
   const std::string& name = who.view().name;
-  const double begin_s = elapsed_s();
-  const Absence absence = absences_[name];
-  const bool was_away = absence.mended_ns != 0;
-  const auto is_back = [&] {
-    const ViewerLook look = who.look();
-    return look.is_connected && look.counts.frames > absence.frames;
+  const double within_s = *expect.back_within_s;
+  const auto changed = absent_since_ns_.find(name);
+  const bool was_away = changed != absent_since_ns_.end();
+  const auto seconds_to = [&](int64_t time_ns) {
+    return static_cast<double>(time_ns - changed->second) * kSPerNs;
   };
-  while (!is_back() && elapsed_s() - begin_s < *expect.back_within_s && go_on())
+  while (was_away && who.look().back_ns == 0 && seconds_to(now_ns()) < within_s && go_on())
     std::this_thread::sleep_for(milliseconds(10));
-  const double since_s = was_away ? static_cast<double>(now_ns() - absence.mended_ns) * kSPerNs : 0.0;
-  const bool is_there = was_away && is_back();
-  report(name + " comes back", fmt::format("within {:g} s", *expect.back_within_s),
-         !was_away                     ? std::string("neither its server was restarted nor its link changed")
-         : is_there                    ? fmt::format("was back after {:.1f} s", since_s)
-         : !who.look().trouble.empty() ? fmt::format("is away: {}", who.look().trouble)
-                                       : fmt::format("is away: connected, and no frame has come since{}",
-                                                     is_lockstep_ ? ": in lockstep, a step brings one" : ""),
-         is_there);
+  const ViewerLook look = who.look();
+  const bool is_there = was_away && look.back_ns != 0;
+  report(name + " comes back", fmt::format("within {:g} s", within_s),
+         !was_away               ? std::string("neither its server was restarted nor its link changed")
+         : is_there              ? fmt::format("was back after {:.2f} s", seconds_to(look.back_ns))
+         : !look.trouble.empty() ? fmt::format("is away: {}", look.trouble)
+                                 : fmt::format("is away: connected, and no frame has come since{}",
+                                               is_lockstep_ ? ": in lockstep, a step brings one" : ""),
+         is_there && seconds_to(look.back_ns) <= within_s);
 }
 
 /// In lockstep: the finest picture of the last step, by the newest look. What was on its way when that look

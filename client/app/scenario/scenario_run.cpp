@@ -447,7 +447,8 @@ Status ScenarioRun::restart_server() {
 
 /// From now on it is waited for.
 void ScenarioRun::begin_absence(const std::string& viewer) {
-  absences_[viewer] = {now_ns(), viewers_[viewer]->look().counts.frames};
+  absent_since_ns_[viewer] = now_ns();
+  viewers_[viewer]->begin_absence();
 }
 
 Status ScenarioRun::carry_out(const ScenarioLink& link) {

@@ -156,13 +156,8 @@ class ScenarioRun {
   double span_begin_s_ = 0.0;
   std::map<std::string, ViewerCounts> traced_;
   double traced_s_ = 0.0;
-  /// When the server or link of a viewer was mended last, and its frames then.
-  struct Absence {
-    int64_t mended_ns = 0;
-    uint64_t frames = 0;
-  };
-  std::map<std::string, Absence> absences_;
-  std::set<std::filesystem::path> renewed_;  // goldens
+  std::map<std::string, int64_t> absent_since_ns_;  // of viewers whose server or link was changed, now_ns()
+  std::set<std::filesystem::path> renewed_;         // goldens
 };
 
 /// Returns the value of a line of /metrics, of several heads that of each; none where there is no such line.

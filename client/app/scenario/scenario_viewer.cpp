@@ -132,6 +132,7 @@ void ScenarioViewer::note(LiveConnection& live) {
   const std::lock_guard lock(mutex_);
   look_.counts = counts;
   look_.is_connected = live.is_connected();
+  note_return();
   look_.trouble = trouble;
   look_.mode = session.mode();
   look_.mode_reason = session.mode_reason();
@@ -146,6 +147,17 @@ void ScenarioViewer::note(LiveConnection& live) {
               session.image_sim_time_ns(),
               seen_ns,
               session.is_image_still()};
+}
+
+/// Whoever is lost again is away again. mutex_ is held.
+void ScenarioViewer::note_return() {
+  if (!look_.is_connected) {
+    frames_before_ = look_.counts.frames;
+    look_.back_ns = 0;
+    awaits_loss_ = false;
+  } else if (!awaits_loss_ && look_.back_ns == 0 && look_.counts.frames > frames_before_) {
+    look_.back_ns = now_ns();
+  }
 }
 
 void ScenarioViewer::measure_rest(const std::shared_ptr<const SceneAsset>& asset) {
@@ -243,6 +255,12 @@ ViewerLook ScenarioViewer::look() const {
   return look_;
 }
 
+void ScenarioViewer::begin_absence() {
+  const std::lock_guard lock(mutex_);
+  frames_before_ = look_.counts.frames;
+  look_.back_ns = 0;
+}
+
 ViewerPicture ScenarioViewer::picture() const {
   const std::lock_guard lock(mutex_);
   return picture_;
@@ -256,7 +274,13 @@ void ScenarioViewer::change_link(const ScenarioLink& link) {
   relay_->set_plan(chaos::Direction::Down, plan);
   relay_->set_frozen(link.fault == ScenarioFault::Stall);
   relay_->set_silent(link.fault == ScenarioFault::HalfOpen);
-  if (link.fault == ScenarioFault::Cut) relay_->reset_all();
+  if (link.fault != ScenarioFault::Cut) return;
+  {
+    // What is on its way yet does not count.
+    const std::lock_guard lock(mutex_);
+    awaits_loss_ = look_.is_connected;
+  }
+  relay_->reset_all();
 }
 
 void ScenarioViewer::begin_measure() {

@@ -62,6 +62,7 @@ struct ViewerLook {
   double largest_head_mps = 0.0;  // likewise, between two states; infinite for what is no number
   SeenCoherence coherence;        // likewise, where the task says so
   std::string codec;
+  int64_t back_ns = 0;  // when it was back after begin_absence(), now_ns(); 0 = it is away
 };
 
 /// Data from which a picture is drawn.
@@ -98,6 +99,8 @@ class ScenarioViewer {
   ViewerPicture picture() const;
   /// Restarts the measurement of stretch, speed and coherence.
   void begin_measure();
+  /// From now on the viewer is away until it is connected and has decoded another frame.
+  void begin_absence();
   /// Puts another line in the place of the one that it has. The viewer must have joined with
   /// a changing link.
   void change_link(const ScenarioLink& link);
@@ -109,6 +112,7 @@ class ScenarioViewer {
   void watch(ViewerSession& session);
   ViewerCounts counts_of(ViewerSession& session) const;
   void note(LiveConnection& live);
+  void note_return();
   void take(ViewerSession& session, const std::shared_ptr<const Snapshot>& state);
   double head_mps(const Snapshot& state);
   void measure_moment(const std::shared_ptr<const Snapshot>& state);
@@ -128,6 +132,8 @@ class ScenarioViewer {
 
   mutable std::mutex mutex_;    // guards the block below
   int64_t next_moment_ns_ = 0;  // simulated
+  uint64_t frames_before_ = 0;  // back_ns is when there are more
+  bool awaits_loss_ = false;    // its line was cut, and it has not noticed
   ViewerLook look_;
   ViewerPicture picture_;
   std::atomic<bool> is_leaving_{false};
