@@ -372,6 +372,26 @@ int run_mocap_feed(const FeedOptions& options, const FeedPlan& plan, const std::
   return kDoneExit;
 }
 
+/// Says what became of a feed to a server. Returns the exit code.
+int tell_fed(const FeedProgress& done, double speed) {
+  if (const std::string slow = slow_motion_sentence(done, speed); !slow.empty()) std::cout << slow << '\n';
+  std::cout << fmt::format(
+      "fed {:.1f} s: {} motion and {} wind samples, at most {:.1f} ms late, {} skipped, {} unsent, {} "
+      "rejected of all sources since the server began\n",
+      done.elapsed_s, done.motion_samples, done.wind_samples, done.worst_lateness_ms, done.skipped_samples,
+      done.unsent_samples, done.rejected_samples);
+  if (done.reconnects > 0)
+    std::cout << fmt::format("reconnects {}, outage_s {:.1f}\n", done.reconnects, done.outage_s);
+  if (done.gone_s == 0.0 && done.reconnects > 0) std::cout << gone_sentence(done) << '\n';
+  if (!done.last_notice.empty()) std::cout << "the server says: " << done.last_notice << '\n';
+  if (done.gone_s > 0.0 && done.unsent_samples > 0)
+    return ctl_failure(make_error(ErrorCode::Unavailable, "{}", gone_sentence(done)), kRefusedExit);
+  if (done.is_heard) return kDoneExit;
+  return ctl_failure(make_error(ErrorCode::Unavailable,
+                                "this feed was not heard: no head motion arrives where hair is simulated"),
+                     kRefusedExit);
+}
+
 }  // namespace
 
 int run_feed(const CtlTarget& target, const FeedOptions& options, const std::atomic<bool>& stop) {
@@ -401,21 +421,7 @@ int run_feed(const CtlTarget& target, const FeedOptions& options, const std::ato
             << timecode_line(options);
   const auto done = feed(*heads, *plan, stop, progress_listener());
   if (isatty(STDERR_FILENO) != 0) std::cerr << '\n';
-  if (!done) return ctl_failure(done.error(), kRefusedExit);
-  if (const std::string slow = slow_motion_sentence(*done, plan->speed); !slow.empty())
-    std::cout << slow << '\n';
-  std::cout << fmt::format(
-      "fed {:.1f} s: {} motion and {} wind samples, at most {:.1f} ms late, {} skipped, {} unsent, {} "
-      "rejected of all sources since the server began\n",
-      done->elapsed_s, done->motion_samples, done->wind_samples, done->worst_lateness_ms,
-      done->skipped_samples, done->unsent_samples, done->rejected_samples);
-  if (done->reconnects > 0)
-    std::cout << fmt::format("reconnects {}, outage_s {:.1f}\n", done->reconnects, done->outage_s);
-  if (!done->last_notice.empty()) std::cout << "the server says: " << done->last_notice << '\n';
-  if (done->is_heard) return kDoneExit;
-  return ctl_failure(make_error(ErrorCode::Unavailable,
-                                "this feed was not heard: no head motion arrives where hair is simulated"),
-                     kRefusedExit);
+  return done ? tell_fed(*done, plan->speed) : ctl_failure(done.error(), kRefusedExit);
 }
 
 int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>& stop) {

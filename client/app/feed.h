@@ -53,14 +53,19 @@ struct FeedProgress {
   uint64_t motion_samples = 0;
   uint64_t wind_samples = 0;
   uint64_t skipped_samples = 0;    // their time had passed: this process was held up
-  uint64_t unsent_samples = 0;     // the server did not read fast enough
+  uint64_t unsent_samples = 0;     // the server was away, or did not read fast enough
   uint64_t rejected_samples = 0;   // as the server reports it, of all sources
   double worst_lateness_ms = 0.0;  // of a sample behind its time
   std::string last_notice;         // from the server
   bool is_heard = true;     // motion that is sent arrives where hair is simulated, as far as it is told
   uint64_t reconnects = 0;  // of all heads
   double outage_s = 0.0;    // without a connection, of the worst head
+  double gone_s = 0.0;      // since when a head has been without an answer at the end; 0: none is
 };
+
+/// Returns the sentence on a server that went away: for how long, whether it came back, and what was not
+/// sent; empty where it stayed.
+std::string gone_sentence(const FeedProgress& done);
 
 /// Returns the sentence on a feed that the simulation held up; empty where it went on in real time, but for
 /// its first moments.

@@ -519,5 +519,39 @@ TEST(ComingBack, AFeedThatIsNotHeardFails) {
   }
 }
 
+// A feed that nobody has heard to its end has not done what it was asked for.
+TEST(ComingBack, AFeedToAServerThatDiesSaysSoAndFails) {
+  for (const bool comes_back : {true, false}) {
+    std::atomic<bool> stop{false};
+    std::vector<std::function<void(FakePeer&)>> peers = {[&](FakePeer& peer) {
+      peer.welcome(make_welcome(kStrands, kVertices));
+      for (int i = 0; i < 20 && peer.read_until<MotionSamples>(); ++i) continue;
+      peer.reset();
+    }};
+    if (comes_back)
+      peers.emplace_back([&](FakePeer& peer) {
+        peer.welcome(make_welcome(kStrands, kVertices));
+        for (int i = 0; i < 20 && peer.read_until<MotionSamples>(); ++i) continue;
+        stop = true;
+        peer.read_to_end();
+      });
+    else
+      for (int i = 0; i < 20; ++i) peers.push_back(broken_answers()[1].second);
+    const Door door(peers);
+    FeedOptions options;
+    options.wind = "none";
+    options.seconds = comes_back ? 60.0 : 1.5;
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    const int code = run_feed(target_of(door.port()), options, stop);
+    const std::string errors = testing::internal::GetCapturedStderr();
+    const std::string said = testing::internal::GetCapturedStdout();
+    EXPECT_EQ(code, comes_back ? kDoneExit : kRefusedExit) << errors << said;
+    EXPECT_EQ(errors.find("the server was gone from ") == std::string::npos, comes_back) << errors;
+    EXPECT_EQ(said.find("and came back: ") != std::string::npos, comes_back) << said;
+    EXPECT_EQ(said.find("slow motion"), std::string::npos) << "the simulation was not slow: " << said;
+  }
+}
+
 }  // namespace
 }  // namespace strandcast::coming_back_test
