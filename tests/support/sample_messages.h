@@ -33,7 +33,7 @@ inline std::vector<ClientMessage> sample_client_messages() {
           ControlCommand{Command::Reset, 240},
           SetParameter{"solver.name=dftl"},
           AdminCommand{AdminAction::Kick, 1ull << 40, 600.5},
-          ViewerReport{3.5, 200.0, 1.25, 4.5, DrawingDevice::Software, 180.5, 12.5},
+          ViewerReport{3.5, 200.0, 1.25, 4.5, DrawingDevice::Software, 180.5, 12.5, 2},
           ModeRequest{StreamMode::Auto},
           SceneRequest{},
           LiveCommand{LiveAction::Reset, "Zoë's head"},

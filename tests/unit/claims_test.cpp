@@ -92,7 +92,7 @@ std::vector<std::string> built_claims() {
       fmt::format("{:g} to {:g} times the bits", kLeastDeltaRatio, kMostDeltaRatio),
       fmt::format("a quarter of {} strands of the built-in scene", kFilledStrands),
       fmt::format("within {:g} mm of the truth (median; {:g} mm for 95 %)", kFilledMedianMm, kFilledMostMm),
-      fmt::format("no more than {} ms of frames wait (a keyframe: {};", kGateQueueNs / kMsInNs,
+      fmt::format("At most {} ms of frames wait (a keyframe: {};", kGateQueueNs / kMsInNs,
                   kStartDelayNs / kMsInNs),
       fmt::format("only the asset, or {} KiB", kFirstBytes >> 10),
       fmt::format("at most every {} ms and the newest only", kLookChangeNs / kMsInNs),
