@@ -341,6 +341,8 @@ TEST_F(ScenarioProgram, WhatIsWrongInTheFileIsExitCodeTwo) {
       {begin + "do { step: 1 }\ndo { expect { same_as: \"here\" } }\n",
        "expect: no state was remembered as 'here': remember comes first\n"},
       {begin + "do { feed { motion: \"none.bvh\" } }\n" + end, "none.bvh"},
+      {"name: \"wrong\"\ndo { start { set: \"groom.procedural.strand_count=20\" } }\ndo { step: 1 }\n" + end,
+       "step: steps need start { lockstep: true }, or command: PAUSE before them; the server says: Single"},
       {begin + "do { expect {} }\n", "wrong: nothing is expected in it"},
       {"name: \"wrong\"\ndo { step: 1 }\n" + end, "step: there is no server yet: begin with start"},
       {"name: \"wrong\"\ndo { start { scene: \"none.textproto\" } }\n" + end, "none.textproto"},

@@ -256,6 +256,11 @@ Status ScenarioRun::step_chunk(uint64_t tick) {
   const auto step = [&](ViewerClient& client) -> Result<Notice> {
     for (const ClientMessage& message : samples) RETURN_IF_ERROR(client.send(message));
     ASSIGN_OR_RETURN(Notice notice, ask(client, steps));
+    if (notice.is_error && !is_lockstep_)
+      return make_error(
+          ErrorCode::BadInput,
+          "steps need start {{ lockstep: true }}, or command: PAUSE before them; the server says: {}",
+          notice.text);
     if (notice.is_error) return make_error(ErrorCode::Unavailable, "the server says: {}", notice.text);
     return notice;
   };
