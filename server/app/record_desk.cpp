@@ -344,14 +344,18 @@ std::string RecordDesk::end(const std::shared_ptr<Recorder>& recorder) {
   // Steps and states end together. Without an answer the source has stopped, and tells nobody anything.
   if (change_tap(other, [recorder] { recorder->refuse(); })) recorder->await_last_strands();
   recorder->stop();
+  const std::optional<Error> failure = recorder->failure();
   {
     const std::lock_guard lock(mutex_);
+    if (failure && recorder == whole_) {
+      lost_ = at(recorder->path().string(), *failure);
+      lost_counters_ = recorder->counters();
+    }
     (recorder == whole_ ? whole_ : take_).reset();
     both_.reset();
   }
   const std::string what = fmt::format("{}: {:.1f} s, {}", recorder->path().string(),
                                        recorder->counters().length_s, recorder->summary());
-  const std::optional<Error> failure = recorder->failure();
   return failure ? fmt::format("{}; it ended by itself: {}", what, failure->to_string()) : what + ".";
 }
 
@@ -407,7 +411,8 @@ void RecordDesk::add(const ServerStatus& status) {
 std::optional<Error> RecordDesk::failure() const {
   for (const auto& recorder : recorders())
     if (const auto failure = recorder->failure()) return at(recorder->path().string(), *failure);
-  return std::nullopt;
+  const std::lock_guard lock(mutex_);
+  return lost_;
 }
 
 std::optional<RecordCounters> RecordDesk::counters() const {
@@ -430,6 +435,8 @@ std::optional<RecordCounters> RecordDesk::counters() const {
     sum->lag_ms = std::max(sum->lag_ms, one.lag_ms);
     sum->has_failed = sum->has_failed || one.has_failed;
   }
+  const std::lock_guard lock(mutex_);
+  if (!sum && lost_) return lost_counters_;
   return sum;
 }
 

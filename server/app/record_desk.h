@@ -94,9 +94,11 @@ class RecordDesk {
   /// Returns slate and take of what is recorded, in one word; empty text without a slate, empty = nothing is.
   std::optional<std::string> slate() const;
   void add(const ServerStatus& status);
-  /// Returns the counters of the recordings together; empty if nothing is recorded.
+  /// Returns the counters of the recordings together, else of the one that began with the server and ended by
+  /// itself; empty if nothing is recorded.
   std::optional<RecordCounters> counters() const;
-  /// Why a recording in hand is not whole; nothing while all is well, or without one. Any thread.
+  /// Why a recording in hand, or the one that began with the server, is not whole; nothing while all is well,
+  /// or without one. Any thread.
   std::optional<Error> failure() const;
 
  private:
@@ -130,6 +132,8 @@ class RecordDesk {
   std::string take_slate_;           // of that one, as slate() has it
   std::unique_ptr<StepTap> both_;    // tells them both, while there are two
   std::string ended_;                // how the last one ended by itself; until somebody asks for another
+  std::optional<Error> lost_;        // why the one of --record is not whole, once it was ended
+  RecordCounters lost_counters_;     // of that one
   std::optional<Order> order_;       // that is carried out, or waits for it
   bool is_stopping_ = false;
 

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "client/app/live_connection.h"
+#include "client/net/http_get.h"
 #include "common/record/recording_reader.h"
 #include "tests/support/child_process.h"
 #include "tests/support/eventually.h"
@@ -106,6 +107,28 @@ TEST_F(ProcessFaults, AFullDiskEndsTheRecordingAndIsSaidAtTheEnd) {
   const auto reader = RecordingReader::open(recording);
   ASSERT_TRUE(reader) << reader.error().to_string();
   EXPECT_EQ((*reader)->info().cut_bytes, 0u) << "what was written is whole";
+}
+
+// Whoever may record beside it, or ends it, does not make it whole.
+TEST_F(ProcessFaults, AFullDiskIsSaidAtTheEndBesideAFolderForTakesToo) {
+  const std::filesystem::path recording = folder_.path() / "run.mcap";
+  const auto server = serve(0, {"--record", recording.string(), "--record-dir", folder_.path().string()});
+  if (server == nullptr && test::lacks_gl(output())) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
+  ASSERT_NE(server, nullptr) << output();
+  ASSERT_TRUE(eventually([&] { return RecordingReader::open(recording).ok(); }));
+  const rlimit limit{std::filesystem::file_size(recording) + 20'000,
+                     std::filesystem::file_size(recording) + 20'000};
+  ASSERT_EQ(prlimit(server->id(), RLIMIT_FSIZE, &limit, nullptr), 0);
+  LoadViewers viewers({"127.0.0.1", port_, {}});
+  ASSERT_TRUE(viewers.join({}).ok());
+  ASSERT_TRUE(run_until(viewers, [&] { return output().find("the recording ends: ") != std::string::npos; }))
+      << output();
+  const auto metrics = http_get({"127.0.0.1", port_, {}}, "/metrics", std::chrono::seconds(10), {});
+  ASSERT_TRUE(metrics) << metrics.error().to_string();
+  EXPECT_THAT(metrics->body, testing::HasSubstr("\nstrandcast_record_active 0\n"));
+  server->send_signal(SIGTERM);
+  EXPECT_EQ(server->wait(), 1) << output();
+  EXPECT_THAT(output(), testing::HasSubstr("the recording is not whole"));
 }
 
 TEST_F(ProcessFaults, AKilledServerIsFoundAgain) {

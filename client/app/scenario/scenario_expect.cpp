@@ -43,11 +43,20 @@ bool holds(const ScenarioMetric& metric, double value) {
          (!metric.equals || value == *metric.equals);
 }
 
-/// What a viewer knows of why it sees less than is wanted.
-std::string why_few_frames(const ViewerLook& look) {
+/// What is known of why a viewer saw no more frames in a span.
+std::string why_few_frames(const MeasuredSpan& span, const MeasuredSpan::Seen& seen) {
+  const ViewerLook& look = seen.after;
   if (!look.is_connected) return look.trouble;
-  return fmt::format("it sees {} ({}), every {} of the states", to_string(look.mode), look.mode_reason,
-                     look.rate_divisor == 1 ? std::string("one") : fmt::format("{}th", look.rate_divisor));
+  const ViewerCounts &now = look.counts, &before = seen.before;
+  const std::string meant =
+      look.rate_divisor == 1 ? std::string("each state") : fmt::format("one state of {}", look.rate_divisor);
+  std::string text =
+      fmt::format("it sees {} ({}); {} is meant for it, and {} came in {:.1f} s ({:.0f} kbit/s)",
+                  to_string(look.mode), look.mode_reason, meant, now.frames - before.frames, span.seconds,
+                  static_cast<double>(now.received_bytes - before.received_bytes) * kBitsPerByte * 1e-3 /
+                      std::max(span.seconds, 1e-6));
+  if (span.realtime >= 0.0) text += fmt::format(", at {:.2f} of real time", span.realtime);
+  return text;
 }
 
 /// What was sent, for a person.
@@ -147,6 +156,9 @@ Status ScenarioRun::carry_out(const ScenarioExpect& expect) {
                             expect.head_mps_below || expect.order_above || expect.incoherent_below ||
                             !expect.mode.empty();
   if (needs_viewer) RETURN_IF_ERROR(viewer(expect.viewer));
+  if (!expect.same_as.empty() && !remembered_.contains(expect.same_as))
+    return make_error(ErrorCode::BadInput, "no state was remembered as '{}': remember comes first",
+                      expect.same_as);
   const bool needs_span = expect.stretch_below || expect.kbit_below || expect.bits_per_vertex_below ||
                           expect.hz_above || expect.realtime_above || expect.realtime_below ||
                           expect.feed_pace_within || expect.head_mps_below || expect.order_above ||
@@ -196,7 +208,7 @@ void ScenarioRun::expect_span(const ScenarioExpect& expect) {
   if (expect.hz_above)
     report("frames per second of " + name, fmt::format("above {:g}", *expect.hz_above),
            fmt::format("measured {:.1f}", frames / seconds), frames / seconds > *expect.hz_above,
-           why_few_frames(seen.after));
+           why_few_frames(*span_, seen));
   if (expect.kbit_below) {
     const double kbit =
         static_cast<double>(now.received_bytes - seen.before.received_bytes) * kBitsPerByte * 1e-3 / seconds;

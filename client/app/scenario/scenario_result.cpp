@@ -45,6 +45,7 @@ std::string panel_svg(const ScenarioResult& result, const Panel& panel) {
 
 std::string sentence_of(const CheckResult& check) {
   if (check.has_passed) return fmt::format("wanted {}, {}", check.wanted, check.measured);
+  if (check.wanted.empty()) return check.measured;
   return fmt::format("{}, wanted {}{}{}", check.measured, check.wanted, check.detail.empty() ? "" : ", ",
                      check.detail);
 }

@@ -9,9 +9,9 @@
 namespace strandcast {
 
 struct CheckResult {
-  int line = 0;      // of the scenario's file
-  std::string what;  // "stretch of viewer"
-  std::string wanted;
+  int line = 0;        // of the scenario's file
+  std::string what;    // "stretch of viewer"
+  std::string wanted;  // empty: an action that could not be done
   std::string measured;
   bool has_passed = false;
   double seconds = 0.0;     // since the one before
@@ -45,6 +45,7 @@ struct ScenarioResult {
   std::vector<TraceSample> trace;
   std::vector<WantedLimit> wanted;
   std::vector<uint64_t> hashes;  // after each step, in order
+  bool is_file_wrong = false;    // what stopped it stands in the scenario
 
   size_t failed_count() const;
 };

@@ -1,6 +1,7 @@
 #include "client/app/scenario/scenario_run.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <thread>
 #include <utility>
@@ -30,6 +31,19 @@ constexpr milliseconds kHttpTimeout{3'000};
 constexpr double kTraceS = 0.25;
 constexpr double kLifetimeMarginS = 30.0;
 constexpr double kBytesPerMb = 1e6;
+
+/// What an action is called in a scenario.
+const char* name_of(const ScenarioWork& work) {
+  constexpr std::array kNames = {"start", "feed",   "step",   "run_s",    "set",  "command", "view",
+                                 "leave", "expect", "refuse", "remember", "send", "link",    "disk"};
+  static_assert(kNames.size() == std::variant_size_v<ScenarioWork>);
+  return kNames[work.index()];
+}
+
+/// Whether what went wrong is in the file, and not in the server.
+bool is_of_file(const Error& error) {
+  return error.code == ErrorCode::BadInput || error.code == ErrorCode::NotFound;
+}
 
 template <class Test>
 bool any_work(const Scenario& scenario, const Test& test) {
@@ -83,7 +97,9 @@ ScenarioResult ScenarioRun::run() {
     status = go_on();
     if (status) status = carry_out(action);
     if (!std::holds_alternative<ScenarioExpect>(action.work)) acted_ns_ = now_ns();
-    if (!status) report("to be done", "no trouble", status.error().to_string(), false);
+    if (status) continue;
+    report(name_of(action.work), {}, status.error().to_string(), false);
+    result_.is_file_wrong = is_of_file(status.error());
   }
   if (result_.failed_count() > 0 && !is_stopped()) save_evidence();
   result_.seconds = elapsed_s();
@@ -240,6 +256,11 @@ Status ScenarioRun::step_chunk(uint64_t tick) {
   const auto step = [&](ViewerClient& client) -> Result<Notice> {
     for (const ClientMessage& message : samples) RETURN_IF_ERROR(client.send(message));
     ASSIGN_OR_RETURN(Notice notice, ask(client, steps));
+    if (notice.is_error && !is_lockstep_)
+      return make_error(
+          ErrorCode::BadInput,
+          "steps need start {{ lockstep: true }}, or command: PAUSE before them; the server says: {}",
+          notice.text);
     if (notice.is_error) return make_error(ErrorCode::Unavailable, "the server says: {}", notice.text);
     return notice;
   };

@@ -17,6 +17,7 @@
 #include <thread>
 #include <utility>
 
+#include "client/app/ctl_commands.h"
 #include "common/base/file.h"
 #include "common/base/profile.h"
 #include "common/base/text.h"
@@ -127,7 +128,9 @@ Status ServerProcess::apply_file_limit() const {
 
 bool ServerProcess::has_ended() {
   if (process_ < 0) return true;
-  if (waitpid(process_, nullptr, WNOHANG) != process_) return false;
+  int status = 0;
+  if (waitpid(process_, &status, WNOHANG) != process_) return false;
+  has_refused_ = WIFEXITED(status) && WEXITSTATUS(status) == kBadInputExit;
   process_ = -1;
   return true;
 }
@@ -160,7 +163,9 @@ Status ServerProcess::wait_for_port(double timeout_s, const std::atomic<bool>& s
         return {};
       }
     }
-    if (has_ended()) return make_error(ErrorCode::Unavailable, "the server did not start: {}", last_line());
+    if (has_ended())
+      return make_error(has_refused_ ? ErrorCode::BadInput : ErrorCode::Unavailable,
+                        "the server did not start: {}", last_line());
     if (stop) return make_error(ErrorCode::Unavailable, "stopped while the server started");
     if (now_ns() >= end_ns)
       return make_error(ErrorCode::Timeout, "the server did not serve within {:.0f} s: {}", timeout_s,

@@ -63,7 +63,8 @@ class ServerProcess {
   Status wait_for_port(double timeout_s, const std::atomic<bool>& stop);
 
   const ServerProcessConfig config_;
-  pid_t process_ = -1;  // -1 = none
+  pid_t process_ = -1;        // -1 = none
+  bool has_refused_ = false;  // its arguments or scene, as its exit code said
   uint16_t port_ = 0;
   std::optional<uint64_t> most_file_bytes_;
 };

@@ -51,14 +51,17 @@ ScenarioResult run_scenario(const Scenario& scenario, const ScenarioOptions& opt
                             0.0};
     tell(check);
     result.seconds += next.seconds;
+    result.is_file_wrong = result.is_file_wrong || next.is_file_wrong;
     result.checks.insert(result.checks.end(), next.checks.begin(), next.checks.end());
     result.checks.push_back(check);
   }
-  if (result.checks.empty())
-    print(fmt::format("{}: nothing is expected in it, {:.1f} s", result.name, result.seconds));
-  else
+  if (result.checks.empty() && !*options.stop) {
+    print(fmt::format("{}: nothing is expected in it: add expect or refuse", result.name));
+    result.is_file_wrong = true;
+  } else {
     print(fmt::format("{}: {} of {} checks hold, {:.1f} s", result.name,
                       result.checks.size() - result.failed_count(), result.checks.size(), result.seconds));
+  }
   return result;
 }
 
@@ -146,6 +149,8 @@ int run_round(const TestOptions& options, const ScenarioOptions& run) {
   if (results.size() > 1)
     std::cout << fmt::format("{} of {} scenarios hold\n", results.size() - failed, results.size());
   if (failed > 0) std::cout << fmt::format("what failed: {}\n", options.out.string());
+  const auto is_wrong = [](const ScenarioResult& result) { return result.is_file_wrong; };
+  if (std::any_of(results.begin(), results.end(), is_wrong)) return kBadInputExit;
   return failed == 0 && results.size() == scenarios.size() ? kDoneExit : kRefusedExit;
 }
 
