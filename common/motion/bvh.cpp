@@ -384,13 +384,13 @@ void take_unit(MotionClip& clip, const BodyHeight& height, double unit_m) {
 }
 
 /// Says that a head lies, or hangs, by the stated up axis.
-void doubt_up(MotionClip& clip, const Upward& guessed) {
+void doubt_up(MotionClip& clip, const Upward& stated, const Upward& guessed) {
   constexpr double kMostRad = 1.0;  // of a head that is bent over
   constexpr glm::dvec3 kUp(0, 1, 0);
   glm::dvec3 sum(0.0);
   for (const Pose& pose : clip.world_from_head) sum += pose.rotation * kUp;
   const double off_rad = std::atan2(glm::length(glm::cross(sum, kUp)), glm::dot(sum, kUp));
-  if (off_rad > kMostRad)
+  if (guessed != stated && off_rad > kMostRad)
     clip.up_doubt =
         fmt::format("with the up axis that is stated the head is {:.0f} degrees off upright: {} is likely",
                     glm::degrees(off_rad), guessed.name());
@@ -715,8 +715,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   else
     take_unit(clip, height, options.unit_m);
   to_world(clip.world_from_head, clip.file_unit_m, up, options.recentre);
-  if (const FileUp guessed = guess_both(path, rows); options.is_z_up && guessed.in_motion != stated)
-    doubt_up(clip, guessed.in_motion);
+  if (options.is_z_up) doubt_up(clip, stated, guess_both(path, rows).in_motion);
   to_head_space(clip.joint_m, clip.file_unit_m, up.at_rest);
   return clip;
 }
