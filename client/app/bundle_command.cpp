@@ -37,6 +37,12 @@ addEventListener('DOMContentLoaded', async () => {
     const stream = new Blob([bytes(id)]).stream().pipeThrough(new DecompressionStream('gzip'));
     return new Blob([await new Response(stream).arrayBuffer()], { type });
   };
+  if (!document.getElementById('end')) {
+    const sentence = document.createElement('p');
+    sentence.textContent = 'This file was cut off on its way, and cannot be shown: copy it again.';
+    document.body.replaceChildren(sentence);
+    return;
+  }
   // As an address that workers of a file may fetch, too.
   const module = async (id) => {
     if (!document.getElementById(id)) return '';
@@ -147,6 +153,7 @@ Result<std::string> page_with(PageFiles files, const std::string& tape, const st
     parts += script_of("stepCore", step->gzip);
   }
   parts += script_of("tape", tape, fmt::format(" data-codec=\"{}\"", codec));
+  parts += script_of("end", "");  // missing where the file was cut off
   RETURN_IF_ERROR(replace_line(html, "<script type=\"module\"", parts));
   return html;
 }
@@ -231,6 +238,9 @@ int bundle_recording(const std::filesystem::path& recording, const BundleCommand
                            page.string(), bundle->frame_count, bundle->seconds,
                            static_cast<double>(bundle->html.size()) / kBytesPerKb,
                            static_cast<double>(bundle->tape_bytes) * 4.0 / 3.0 / kBytesPerKb);
+  if (!(*reader)->info().is_indexed)
+    std::cout << "  the recording was cut off, or is still being written: what is missing at its end is "
+                 "missing here\n";
   if (bundle->damaged > 0)
     std::cout << fmt::format("  {} damaged parts of the recording are left out\n", bundle->damaged);
   if (!bundle->other_codec.empty())

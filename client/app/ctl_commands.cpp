@@ -386,6 +386,8 @@ int tell_fed(const FeedProgress& done, double speed) {
   if (!done.last_notice.empty()) std::cout << "the server says: " << done.last_notice << '\n';
   if (done.gone_s > 0.0 && done.unsent_samples > 0)
     return ctl_failure(make_error(ErrorCode::Unavailable, "{}", gone_sentence(done)), kRefusedExit);
+  if (const std::string refused = refusal_sentence(done); !refused.empty())
+    return ctl_failure(make_error(ErrorCode::BadInput, "{}", refused), kRefusedExit);
   if (done.is_heard) return kDoneExit;
   return ctl_failure(make_error(ErrorCode::Unavailable,
                                 "this feed was not heard: no head motion arrives where hair is simulated"),

@@ -99,13 +99,13 @@ Result<ExportReport> export_with(const CtlTarget& target, const ExportCommand& c
 
 }  // namespace
 
-void print_export(const ExportReport& report) {
+void print_export(const ExportReport& report, std::string_view clock) {
   const std::string frames =
       report.frame_count == 1
-          ? fmt::format("the frame at {:.3f} s", report.first_s)
-          : fmt::format("{} frames at {} fps from {}{:.3f} s on", report.frame_count,
-                        frame_rate_text(report.fps),
-                        report.first_timecode.empty() ? "" : report.first_timecode + ", ", report.first_s);
+          ? fmt::format("the frame at {:.3f} s{}", report.first_s, clock)
+          : fmt::format(
+                "{} frames at {} fps from {}{:.3f} s{} on", report.frame_count, frame_rate_text(report.fps),
+                report.first_timecode.empty() ? "" : report.first_timecode + ", ", report.first_s, clock);
   std::cout << fmt::format(
       "{} strands x {} vertices, {}, {} in {}{}\n", report.strand_count, report.vertex_count, frames,
       size_text(report.bytes),
@@ -115,10 +115,10 @@ void print_export(const ExportReport& report) {
 }
 
 void declare_export(CLI::App& app, ExportCommand& command) {
-  app.add_option(
-         "paths", command.paths,
-         "[RECORDING.mcap] OUT.usda, .usdc, .usdz, .abc, .ply or .csv: what was recorded, or what the "
-         "server sends from now on; a file of the second name is replaced")
+  app.add_option("paths", command.paths,
+                 "[RECORDING.mcap] OUT.usda, .usdc, .usdz, .abc, .csv or .ply (one frame, or numbered files "
+                 "of a range): what was recorded, or what the "
+                 "server sends from now on; a file of the second name is replaced")
       ->required()
       ->expected(1, 2);
   app.add_option(
@@ -222,7 +222,7 @@ Result<ExportReport> export_dressed(std::unique_ptr<ExportSource> states, const 
 int run_export(const CtlTarget& target, const ExportCommand& command, const std::atomic<bool>& stop) {
   const auto report = export_with(target, command, stop);
   if (!report) return ctl_failure(report.error());
-  print_export(*report);
+  print_export(*report, " of the server's time");
   return kDoneExit;
 }
 

@@ -53,8 +53,8 @@ Result<ExportReport> export_dressed(std::unique_ptr<ExportSource> states, const 
                                     const ExportCommand& command, ExportOptions options,
                                     const std::atomic<bool>& stop);
 
-/// Prints what was written.
-void print_export(const ExportReport& report);
+/// Prints what was written; `clock` stands behind the time of the first frame.
+void print_export(const ExportReport& report, std::string_view clock = {});
 
 int run_export(const CtlTarget& target, const ExportCommand& command, const std::atomic<bool>& stop);
 

@@ -9,6 +9,7 @@
 
 #include "common/base/profile.h"
 #include "common/base/units.h"
+#include "common/wire/sample_limits.h"
 
 namespace strandcast {
 namespace {
@@ -103,6 +104,7 @@ class SessionWay {
       for (size_t i = 0; i < heads_.size(); ++i) {
         const bool is_sent = send_to(*heads_[i], message);
         count(is_sent, progress.motion_samples, progress);
+        if (is_sent) judge(message, progress);
         if (is_sent && told_[i].sent_ns == 0) told_[i].sent_ns = now_ns();
       }
     }
@@ -122,6 +124,9 @@ class SessionWay {
     for (size_t i = 0; i < heads_.size(); ++i) {
       const Told& told = told_[i];
       progress.rejected_samples += told.rejected_samples;
+      if (told.rejected_before && told.rejected_samples > *told.rejected_before)
+        progress.refused_samples =
+            std::max(progress.refused_samples, told.rejected_samples - *told.rejected_before);
       progress.pace = std::min(progress.pace, told.pace);
       progress.is_heard = progress.is_heard && told.is_heard;
       progress.reconnects += heads_[i]->policy().reconnects();
@@ -141,12 +146,21 @@ class SessionWay {
   }
 
  private:
+  /// Counts what the server leaves out, by its own limits.
+  static void judge(const MotionSamples& message, FeedProgress& progress) {
+    std::string why = refusal_of(message.samples.front(), message.joint_names.size());
+    if (why.empty()) return;
+    ++progress.refused_samples;
+    if (progress.refusal.empty()) progress.refusal = std::move(why) + ": is its unit right (--unit)?";
+  }
+
   /// What the server said last of a head.
   struct Told {
     double pace = 1.0;
     uint64_t rejected_samples = 0;
-    int64_t sent_ns = 0;  // the first sample of motion of this connection; 0: none yet
-    uint64_t tick = 0;    // of the first status after that
+    std::optional<uint64_t> rejected_before;  // this feed was told that its samples are left out
+    int64_t sent_ns = 0;                      // the first sample of motion of this connection; 0: none yet
+    uint64_t tick = 0;                        // of the first status after that
     bool is_heard = true;
     bool is_away = false;
     int64_t heard_ns = 0;  // the server's last byte
@@ -161,7 +175,13 @@ class SessionWay {
     Told& told = told_[index];
     SteadyClient& head = *heads_[index];
     RETURN_IF_ERROR(head.pump(milliseconds(0), [&](ClientEvent& event) {
-      if (auto* notice = std::get_if<Notice>(&event)) progress.last_notice = std::move(notice->text);
+      if (auto* notice = std::get_if<Notice>(&event)) {
+        if (progress.refusal.empty() && notice->text.starts_with(kRefusedSamples)) {
+          progress.refusal = notice->text.substr(std::string_view(kRefusedSamples).size());
+          told.rejected_before = told.rejected_samples;
+        }
+        progress.last_notice = std::move(notice->text);
+      }
       if (const auto* status = std::get_if<ServerStatus>(&event)) {
         told.rejected_samples = status->rejected_samples;
         if (!plan.is_live) told.pace = follow_pace(told.pace, *status);
@@ -254,6 +274,14 @@ std::string slow_motion_sentence(const FeedProgress& done, double speed) {
       "slow motion: {:.1f} s of the motion in {:.1f} s, as slowly as the simulation (--live feeds in real "
       "time)",
       done.motion_s, done.elapsed_s);
+}
+
+std::string refusal_sentence(const FeedProgress& done) {
+  constexpr uint64_t kMostShare = 10;  // one in so many
+  const uint64_t sent = done.motion_samples + done.wind_samples;
+  if (done.refused_samples * kMostShare <= sent) return {};
+  return fmt::format("{} of {} samples were left out by the server: {}", std::min(done.refused_samples, sent),
+                     sent, done.refusal);
 }
 
 std::string gone_sentence(const FeedProgress& done) {

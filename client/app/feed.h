@@ -55,6 +55,8 @@ struct FeedProgress {
   uint64_t skipped_samples = 0;    // their time had passed: this process was held up
   uint64_t unsent_samples = 0;     // the server was away, or did not read fast enough
   uint64_t rejected_samples = 0;   // as the server reports it, of all sources
+  uint64_t refused_samples = 0;    // of this feed, as far as it is known
+  std::string refusal;             // why the first of them
   double worst_lateness_ms = 0.0;  // of a sample behind its time
   std::string last_notice;         // from the server
   bool is_heard = true;     // motion that is sent arrives where hair is simulated, as far as it is told
@@ -66,6 +68,9 @@ struct FeedProgress {
 /// Returns the sentence on a server that went away: for how long, whether it came back, and what was not
 /// sent; empty where it stayed.
 std::string gone_sentence(const FeedProgress& done);
+
+/// Returns why a feed of which more than a tenth was refused has failed; empty for others.
+std::string refusal_sentence(const FeedProgress& done);
 
 /// Returns the sentence on a feed that the simulation held up; empty where it went on in real time, but for
 /// its first moments.

@@ -57,15 +57,58 @@ std::string text_beginning(const std::filesystem::path& path) {
   return has_controls ? std::string() : one_line(begin.substr(0, begin.find('\n')), kShownChars);
 }
 
+/// What a file under another name is by its first bytes, and what to do with it; "" for one that is not
+/// known.
+std::string likely_kind(const std::filesystem::path& path) {
+  struct Kind {
+    std::string_view begin;
+    const char* extension;
+    const char* advice;
+  };
+  constexpr std::array<Kind, 10> kKinds = {{
+      {"HIERARCHY", ".bvh",
+       "it looks like a BVH clip, motion and no hair: strandcast-ctl feed --motion plays it"},
+      {"version 2", ".tfx", "it looks like a TressFX 2 file: call it .tfx"},
+      {{"\0\0\x40\x40", 4}, ".tfx", "it looks like a TressFX file: call it .tfx"},
+      {{"\0\0\x80\x40", 4}, ".tfx", "it looks like a TressFX 4 file: call it .tfx"},
+      {"HAIR", ".hair", "it looks like a .hair file: call it that"},
+      {"ply", ".ply", "it looks like a .ply file: call it that"},
+      {"#usda", ".usda", "it looks like USD as text: call it .usda"},
+      {"PXR-USDC", ".usdc", "it looks like USD in binary: call it .usdc"},
+      {"PK\x03\x04", ".usdz", "it is a zip archive, as USD is packed in: call it .usdz, or unpack it"},
+      {"Ogawa", ".abc", "it looks like Alembic: call it .abc"},
+  }};
+  std::string begin(16, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  begin.resize(static_cast<size_t>(file.gcount()));
+  for (const Kind& kind : kKinds)
+    if (begin.starts_with(kind.begin) && path.extension() != kind.extension) return kind.advice;
+  return {};
+}
+
+/// A file of another kind than its name says is called that.
+Result<StatedGroom> of_its_kind(const std::filesystem::path& path, Result<StatedGroom> stated) {
+  if (stated || stated.error().code == ErrorCode::NotFound) return stated;
+  const std::string kind = likely_kind(path);
+  // USD is found out by its bytes, whatever its name.
+  if (kind.empty() || (is_usd_extension(path.extension().string()) && kind.find("USD") != std::string::npos))
+    return stated;
+  Error error = stated.error();
+  error.message += "; " + kind;
+  return error;
+}
+
 /// A file that is text where none is expected is called that, whatever its bytes mean as numbers.
 Error call_text(const std::filesystem::path& path, Error error) {
   const std::string begin = text_beginning(path);
   const bool is_text_format = path.extension() == ".tfx" && begin.starts_with("version 2");
   if (begin.empty() || is_text_format) return error;
-  const char* hint = begin.starts_with("version 2") ? "it looks like a TressFX 2 file: call it .tfx"
-                     : begin.starts_with("version https://git-lfs")
-                         ? "it only stands for a file that Git LFS keeps: fetch that one"
-                         : "a .hair file is binary, a .tfx file too or begins with 'version 2.0'";
+  std::string hint = likely_kind(path);
+  if (hint.empty())
+    hint = begin.starts_with("version https://git-lfs")
+               ? "it only stands for a file that Git LFS keeps: fetch that one"
+               : "a .hair file is binary, and a .tfx file too, or it begins with 'version 2.0'";
   return at(path.string(), make_error(ErrorCode::BadInput, "this is text, \"{}\", and no {} file: {}", begin,
                                       path.extension().string(), hint));
 }
@@ -75,7 +118,9 @@ Result<StatedGroom> usable(const std::filesystem::path& path, Result<StatedGroom
     auto usable = with_usable_strands(std::move(stated).value());
     return usable ? usable : call_text(path, at(path.string(), usable.error()));
   }
-  return stated.error().code == ErrorCode::NotFound ? stated.error() : call_text(path, stated.error());
+  if (stated.error().code == ErrorCode::NotFound) return stated;
+  const Error called = call_text(path, stated.error());
+  return text_beginning(path).empty() ? of_its_kind(path, called) : called;
 }
 
 Result<StatedGroom> load_by_extension(const std::filesystem::path& path, const GroomFileOptions& options) {
@@ -84,9 +129,9 @@ Result<StatedGroom> load_by_extension(const std::filesystem::path& path, const G
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (extension == ".tfx") return usable(path, load_tfx(path, options.guides));
   if (extension == ".hair") return usable(path, load_hair(path));
-  if (extension == ".abc") return load_abc(path, options.guides);
-  if (extension == ".ply") return load_ply(path, options.strand_vertex_count);
-  if (is_usd_extension(extension)) return load_usd(path, options.guides);
+  if (extension == ".abc") return of_its_kind(path, load_abc(path, options.guides));
+  if (extension == ".ply") return of_its_kind(path, load_ply(path, options.strand_vertex_count));
+  if (is_usd_extension(extension)) return of_its_kind(path, load_usd(path, options.guides));
   return at(
       path.string(),
       make_error(

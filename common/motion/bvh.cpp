@@ -369,6 +369,33 @@ void guess_unit(MotionClip& clip, const BodyHeight& height) {
       guess_m, height.of, height.units, kAssumedBodyHeightM);
 }
 
+/// Takes a stated unit, and doubts one that makes no body: a giant of 10 m and a puppet of 0.2 m may be
+/// meant.
+void take_unit(MotionClip& clip, const BodyHeight& height, double unit_m) {
+  clip.file_unit_m = unit_m;
+  constexpr double kLeastM = 0.2, kMostM = 10.0;
+  const double height_m = height.units * unit_m;
+  if (!(height.units > 0.0) || (height_m >= kLeastM && height_m <= kMostM)) return;
+  MotionClip likely;
+  guess_unit(likely, height);
+  clip.unit_doubt =
+      fmt::format("with the unit that is stated, {:g} m, {} are {:.4g} m, as of no body: {:.4g} m is likely",
+                  unit_m, height.of, height_m, likely.file_unit_m);
+}
+
+/// Says that a head lies, or hangs, by the stated up axis.
+void doubt_up(MotionClip& clip, const Upward& stated, const Upward& guessed) {
+  constexpr double kMostRad = 1.0;  // of a head that is bent over
+  constexpr glm::dvec3 kUp(0, 1, 0);
+  glm::dvec3 sum(0.0);
+  for (const Pose& pose : clip.world_from_head) sum += pose.rotation * kUp;
+  const double off_rad = std::atan2(glm::length(glm::cross(sum, kUp)), glm::dot(sum, kUp));
+  if (guessed != stated && off_rad > kMostRad)
+    clip.up_doubt =
+        fmt::format("with the up axis that is stated the head is {:.0f} degrees off upright: {} is likely",
+                    glm::degrees(off_rad), guessed.name());
+}
+
 /// Pose of the last joint of the path in the file's axes and units.
 Pose evaluate(const std::vector<const Joint*>& path, std::span<const double> row) {
   Pose pose;
@@ -564,6 +591,11 @@ Upward guess_up_in_motion(const Rows& rows, const Upward& at_rest) {
   return at_rest;
 }
 
+FileUp guess_both(const std::vector<const Joint*>& path, const Rows& rows) {
+  const Upward at_rest = guess_up(path);
+  return {at_rest, guess_up_in_motion(rows, at_rest)};
+}
+
 /// Turns that side up, and leaves the face ahead: +Z, or -Y where Z is the axis.
 glm::dquat upright_from(const Upward& up) {
   const glm::dquat turn = up.axis == 2   ? glm::angleAxis(glm::radians(-90.0), kAxis[0])
@@ -662,10 +694,8 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
       begins_with_t_pose(clip.world_from_head, rows.rest_share[0], rows.rest_share[1]))
     leave_out_first_frames(clip, 1);
   clip.head_reason = taken_head(skeleton, *head);
-  FileUp up;
   const Upward stated{options.is_z_up.value_or(false) ? 2 : 1};
-  up.at_rest = options.is_z_up ? stated : guess_up(path);
-  up.in_motion = options.is_z_up ? stated : guess_up_in_motion(rows, up.at_rest);
+  const FileUp up = options.is_z_up ? FileUp{stated, stated} : guess_both(path, rows);
   if (up.at_rest != up.in_motion)
     clip.up_reason = fmt::format(
         "{} is taken as up: there the head is above the hips in the motion, though {} is up in the rest pose",
@@ -683,8 +713,9 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   if (is_guessed)
     guess_unit(clip, height);
   else
-    clip.file_unit_m = options.unit_m;
+    take_unit(clip, height, options.unit_m);
   to_world(clip.world_from_head, clip.file_unit_m, up, options.recentre);
+  if (options.is_z_up) doubt_up(clip, stated, guess_both(path, rows).in_motion);
   to_head_space(clip.joint_m, clip.file_unit_m, up.at_rest);
   return clip;
 }

@@ -43,6 +43,8 @@ Result<MotionFile> load_motion_file(const std::filesystem::path& path, const Mot
   for (const std::string& repair : file.clip.repairs) note(repair);
   if (!file.clip.up_reason.empty()) note(file.clip.up_reason + " (--up states another)");
   if (!file.clip.unit_reason.empty()) note(file.clip.unit_reason + " (--unit states another)");
+  if (!file.clip.up_doubt.empty()) note(file.clip.up_doubt + " (--up)");
+  if (!file.clip.unit_doubt.empty()) note(file.clip.unit_doubt + " (--unit)");
   const FirstFrames first = find_first_frames(file.clip);
   if (first.count > 0 && !options.is_keeping_first_frames) {
     leave_out_first_frames(file.clip, first.count);
@@ -57,6 +59,8 @@ Result<MotionFile> load_motion_file(const std::filesystem::path& path, const Mot
   if (options.is_filtering_glitches)
     note(fmt::format("{}: {} frames replaced by what lies between the others", glitch_note(glitches),
                      filter_glitches(file.clip)));
+  else if (!file.clip.unit_doubt.empty())
+    note(glitch_note(glitches) + " (is --unit right?)");
   else
     note(glitch_note(glitches) + " (--filter-glitches takes them out)");
   return file;

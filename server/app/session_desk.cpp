@@ -153,11 +153,11 @@ Welcome SessionDesk::make_welcome(const Viewers::Place& place, const ViewerCodec
 
 void SessionDesk::on_message(SessionId session, const ClientMessage& message, int64_t arrival_ns) {
   std::visit(Overloaded{[&](const MotionSamples& samples) {
-                          parts_.inputs.push(session, samples, arrival_ns);
+                          tell_refusal(session, parts_.inputs.push(session, samples, arrival_ns));
                           parts_.hub.tell_motion(session, samples, arrival_ns);
                         },
                         [&](const WindSamples& samples) {
-                          parts_.inputs.push(session, samples, arrival_ns);
+                          tell_refusal(session, parts_.inputs.push(session, samples, arrival_ns));
                           parts_.hub.tell_wind(session, samples, arrival_ns);
                         },
                         [&](const ControlCommand& command) { obey(session, command); },
@@ -175,6 +175,10 @@ void SessionDesk::on_message(SessionId session, const ClientMessage& message, in
                         [&](const AdminCommand&) { is_shut_down_wanted_ = true; },  // all that comes here
                         [](const auto&) {}},
              message);
+}
+
+void SessionDesk::tell_refusal(SessionId session, std::string why) {
+  if (!why.empty()) net_->send(session, Notice{true, std::move(why)});
 }
 
 void SessionDesk::on_need(SessionId, const StreamNeed& need) {

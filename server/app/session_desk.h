@@ -102,6 +102,7 @@ class SessionDesk : public NetHandler, private StreamReader {
                        std::shared_ptr<void> until_told) override;
   void list_classes(const std::vector<StrandClass>& classes, const std::string& reason);
 
+  void tell_refusal(SessionId session, std::string why);
   void obey(SessionId session, const ControlCommand& command);
   void control(SessionId session, const ControlCommand& command);
   void obey(SessionId session, const SetParameter& parameter);

@@ -10,22 +10,6 @@
 namespace strandcast {
 namespace {
 
-bool is_possible(const Pose& pose) {
-  if (!is_finite(pose)) return false;
-  const double norm = glm::length(pose.rotation);
-  return norm >= kMinQuaternionNorm && norm <= kMaxQuaternionNorm &&
-         glm::length(pose.position_m) <= kMaxHeadDistanceM;
-}
-
-/// Joints of all names or of none, where a body can have them.
-bool is_possible(const std::vector<glm::vec3>& joint_m, size_t name_count) {
-  if (joint_m.empty()) return true;
-  return joint_m.size() == name_count && joint_m.size() <= kMaxMotionJoints &&
-         std::all_of(joint_m.begin(), joint_m.end(), [](const glm::dvec3& place_m) {
-           return glm::length(place_m) <= kMaxJointDistanceM;  // also false for NaN
-         });
-}
-
 bool is_possible(const glm::dvec3& wind_mps) {
   // Also false for NaN, which compares false.
   return glm::length(wind_mps) <= kMaxWindStreamMps;
@@ -126,13 +110,10 @@ void InputHub::accept(Stream<Value>& stream, uint64_t source_id, const TimedSamp
   if (stream.owner != source_id) {
     if (stream.owner && sample.arrival_ns - stream.accepted_ns <= stale_ns) {
       ++counters_.not_owner;
-      if (!std::exchange(stream.is_refusal_told, true))
-        log_warn("input", "samples from source {} are left out while source {} sends: one at a time is heard",
-                 source_id, *stream.owner);
+      tell_refusal(source_id, fmt::format("source {} sends, and one at a time is heard", *stream.owner));
       return;
     }
     stream.owner = source_id;
-    stream.is_refusal_told = false;
     restart(stream);
   }
   // A step of the source's clock: late samples would be refused for ever, or the mapping would be off by the
@@ -167,10 +148,13 @@ void InputHub::hold_samples() {
   held_.emplace();
 }
 
-void InputHub::push(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns) {
+std::string InputHub::push(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns) {
   const std::lock_guard lock(mutex_);
-  if (!held_) return take(source_id, samples, arrival_ns);
-  counters_.over_rate += held_->hold(source_id, samples, last_frame_ns_.value_or(0));
+  if (held_)
+    counters_.over_rate += held_->hold(source_id, samples, last_frame_ns_.value_or(0));
+  else
+    take(source_id, samples, arrival_ns);
+  return std::exchange(refusal_, {});
 }
 
 void InputHub::push(const Timecode& timecode, int64_t arrival_ns) {
@@ -179,10 +163,20 @@ void InputHub::push(const Timecode& timecode, int64_t arrival_ns) {
   if (!held_) timecodes_.add(timecode, newest_arrival_ns_);
 }
 
-void InputHub::push(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns) {
+std::string InputHub::push(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns) {
   const std::lock_guard lock(mutex_);
-  if (!held_) return take(source_id, samples, arrival_ns);
-  counters_.over_rate += held_->hold(source_id, samples, last_frame_ns_.value_or(0));
+  if (held_)
+    counters_.over_rate += held_->hold(source_id, samples, last_frame_ns_.value_or(0));
+  else
+    take(source_id, samples, arrival_ns);
+  return std::exchange(refusal_, {});
+}
+
+/// Of each source, once.
+void InputHub::tell_refusal(uint64_t source_id, const std::string& why) {
+  if (told_refusals_.size() >= kMaxInputSources || !told_refusals_.insert(source_id).second) return;
+  refusal_ = kRefusedSamples + why;
+  log_warn("input", "samples of source {} are left out: {}", source_id, why);
 }
 
 /// mutex_ is held.
@@ -195,9 +189,10 @@ void InputHub::take(uint64_t source_id, const MotionSamples& samples, int64_t ar
   for (const MotionSamples::Sample& sample : samples.samples) {
     if (!take_allowance(motion_, source_id, newest_arrival_ns_)) {
       ++counters_.over_rate;
-    } else if (!is_possible(sample.world_from_head) ||
-               !is_possible(sample.joint_m, samples.joint_names.size()) ||
-               bounded(sample.time_ns) != sample.time_ns) {
+    } else if (std::string why = refusal_of(sample, samples.joint_names.size()); !why.empty()) {
+      ++counters_.impossible;
+      tell_refusal(source_id, why);
+    } else if (bounded(sample.time_ns) != sample.time_ns) {
       ++counters_.impossible;
     } else {
       Pose pose = sample.world_from_head;
@@ -255,6 +250,7 @@ void InputHub::forget(uint64_t source_id) {
   }
   forget(motion_, source_id);
   forget(wind_, source_id);
+  told_refusals_.erase(source_id);
 }
 
 /// Where the head is at the asked time, as its source says.
@@ -382,7 +378,7 @@ void InputHub::show_head(const SeenHead& seen, int64_t server_time_ns) {
     head = easing_.coast(std::clamp(passed_s, 0.0, kTeleportLongestS));
   else
     head = easing_.follow(seen.pose, std::max(since_s, kTeleportShortestS), std::max(passed_s, 0.0));
-  if (!is_possible(head)) easing_.restart(head = seen.pose);  // at the edge of the world
+  if (!refusal_of(head).empty()) easing_.restart(head = seen.pose);  // at the edge of the world
   if (has_jumped || !is_silent) {
     heard_ns_ = seen.time_ns;
     heard_timecode_ = frame_.timecode;

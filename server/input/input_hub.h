@@ -36,8 +36,11 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
+#include <string>
 
 #include "common/wire/messages.h"
+#include "common/wire/sample_limits.h"
 #include "server/input/clock_map.h"
 #include "server/input/head_easing.h"
 #include "server/input/held_inputs.h"
@@ -112,8 +115,6 @@ inline constexpr int64_t kMotionStaleNs = 1'000'000'000;
 inline constexpr int64_t kWindStaleNs = 3'000'000'000;
 inline constexpr int64_t kClockJumpNs = 1'000'000'000;
 inline constexpr int64_t kMaxSampleTimeNs = int64_t{1} << 61;  // 73 years either way: no difference overflows
-inline constexpr double kMinQuaternionNorm = 0.5, kMaxQuaternionNorm = 2.0;
-inline constexpr double kMaxHeadDistanceM = 1e4;
 inline constexpr double kMaxWindStreamMps = 200.0;
 inline constexpr double kTeleportSpeedMps = 50.0;
 inline constexpr double kTeleportTurnRadPerS = 100.0;
@@ -161,9 +162,10 @@ class InputHub {
   void hold_samples();
 
   /// Takes the samples of one message. `source_id` is the session's; `arrival_ns` is the server clock when it
-  /// was read.
-  void push(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns);
-  void push(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns);
+  /// was read. Returns a sentence for a source of whose samples one is left out for the first time; else
+  /// empty.
+  std::string push(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns);
+  std::string push(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns);
   /// Takes a timecode that comes without motion. It is shown while the head's motion has none of its own.
   void push(const Timecode& timecode, int64_t arrival_ns);
 
@@ -194,7 +196,6 @@ class InputHub {
   template <class Value>
   struct Stream {
     std::optional<uint64_t> owner;
-    bool is_refusal_told = false;   // that others send beside this owner
     int64_t accepted_ns = 0;        // arrival of the newest accepted sample
     bool is_cut = false;            // what is shown next does not follow what was
     double usual_spacing_ns = 0.0;  // between samples, by the source's clock; 0: not known
@@ -229,6 +230,7 @@ class InputHub {
   void show_head(const SeenHead& seen, int64_t server_time_ns);
   int64_t steadied_ns(int64_t time_ns, int64_t server_time_ns);
   bool has_caught_up(int64_t shown_ns, int64_t server_time_ns);
+  void tell_refusal(uint64_t source_id, const std::string& why);
   void note_used(int64_t arrival_ns, int64_t made_ns);
 
   void take(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns);
@@ -236,7 +238,9 @@ class InputHub {
   void take_held(int64_t time_ns);
 
   mutable std::mutex mutex_;
-  std::optional<HeldInputs> held_;  // none: samples are for the time when they arrive
+  std::set<uint64_t> told_refusals_;  // sources that know it, at most kMaxInputSources
+  std::string refusal_;               // to be told by push()
+  std::optional<HeldInputs> held_;    // none: samples are for the time when they arrive
   Stream<HeadSample> motion_;
   Stream<glm::dvec3> wind_;
   std::map<uint64_t, int64_t> delays_ns_;  // of motion, by source; those that are not 0

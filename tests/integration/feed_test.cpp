@@ -122,6 +122,15 @@ TEST(Feed, SaysSlowMotionOfASimulationThatIsSlowAndNotOfItsStart) {
   EXPECT_THAT(said(4.3, 4.4, 2.0), testing::StartsWith("slow motion"));
 }
 
+TEST(Feed, SaysWhyItFailedOfWhichMoreThanATenthIsRefused) {
+  FeedPlan plan = plan_of(true);
+  EXPECT_EQ(refusal_sentence(feed_to(status_of(1.0), plan).progress), "");
+  plan.motion = [](double) { return Pose{{3e4, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}}; };
+  EXPECT_THAT(refusal_sentence(feed_to(status_of(1.0), plan).progress),
+              testing::AllOf(testing::HasSubstr("samples were left out by the server: the head is 3e+04 m"),
+                             testing::EndsWith("is its unit right (--unit)?")));
+}
+
 TEST(Feed, APausedSimulationHoldsTheMotion) {
   const Fed fed = feed_to(status_of(0.0, true), plan_of(false));
   expect_as_said(fed);

@@ -87,6 +87,8 @@ TEST(Bundle, HoldsThePageAndAllThatAServerWouldHaveSent) {
   EXPECT_EQ(part_of(bundle->html, "script"), "Man");
   EXPECT_EQ(part_of(bundle->html, "core"), "Ma");
   EXPECT_EQ(part_of(bundle->html, "stepCore"), "M");
+  EXPECT_GT(bundle->html.find("id=\"end\""), bundle->html.find("id=\"tape\""))
+      << "a file that is cut off has none";
 
   const std::vector<TapeMessage> tape = tape_of(bundle->html);
   ASSERT_EQ(tape.size(), 3u + 25u);

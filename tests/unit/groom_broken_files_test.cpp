@@ -407,6 +407,27 @@ TEST(GroomBrokenFiles, TextUnderTheWrongNameIsCalledText) {
       << "this is no text";
 }
 
+// A renamed file is called what it is, and the reader is told what to do with it.
+TEST(GroomBrokenFiles, AFileUnderAnotherNameIsCalledWhatItIs) {
+  const TemporaryFolder folder;
+  const auto refused = [&](const std::string& text, const std::string& name) {
+    ByteFile file;
+    for (const char c : text) file.bytes.push_back(static_cast<std::byte>(c));
+    return refusal(folder, file, name);
+  };
+  for (const char* name : {"a.tfx", "a.hair", "a.ply", "a.abc", "a.usda"})
+    EXPECT_THAT(refused("HIERARCHY\nROOT Hips\n{\n", name), HasSubstr("a BVH clip, motion and no hair"))
+        << name;
+  for (const char* name : {"b.ply", "b.abc", "b.hair"})
+    EXPECT_THAT(refused(std::string("\0\0\x80\x40", 4) + std::string(200, '\1'), name),
+                HasSubstr("call it .tfx"))
+        << name;
+  EXPECT_THAT(refused("ply\nformat ascii 1.0\n", "c.hair"), HasSubstr("a .ply file: call it that"));
+  EXPECT_THAT(refused("Ogawa" + std::string(40, '\1'), "d.ply"), HasSubstr("Alembic: call it .abc"));
+  EXPECT_THAT(refused("Ogawa" + std::string(40, '\1'), "d.abc"), Not(HasSubstr("looks like")));
+  EXPECT_THAT(refused("noise", "e.ply"), Not(HasSubstr("looks like")));
+}
+
 /// Strands of three points; the second point of some is no number, and others show nothing.
 struct SomeHair {
   static constexpr uint32_t kStrands = 40, kPoints = 3;

@@ -660,5 +660,20 @@ TEST(InputHub, ImpossibleJointsAreRefusedWithTheirSample) {
   EXPECT_EQ(hub.counters().accepted, 0u);
 }
 
+TEST(InputHub, ASourceIsToldOnceWhyItsSamplesAreLeftOut) {
+  InputHub hub;
+  EXPECT_EQ(hub.push(1, motion(0, pose_at(0.1)), kStart), "");
+  EXPECT_THAT(hub.push(1, motion(1, pose_at(2.0 * kMaxHeadDistanceM)), kStart + 1),
+              testing::HasSubstr("the head is 2e+04 m from the origin, and 10000 m at most are believed"));
+  EXPECT_EQ(hub.push(1, motion(2, pose_at(2.0 * kMaxHeadDistanceM)), kStart + 2), "");
+  MotionSamples far = motion(1, pose_at(0.1));
+  far.joint_names = {"neck"};
+  far.samples.front().joint_m = {{0.0f, -40.0f, 0.0f}};
+  EXPECT_THAT(hub.push(2, far, kStart + 3), testing::HasSubstr("a joint of the body is 40 m from the head"));
+  EXPECT_THAT(hub.push(3, motion(1, pose_at(0.1)), kStart + 4),
+              testing::HasSubstr("source 1 sends, and one at a time is heard"));
+  EXPECT_EQ(hub.counters().rejected(), 4u);
+}
+
 }  // namespace
 }  // namespace strandcast::input_hub_test

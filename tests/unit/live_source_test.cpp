@@ -395,5 +395,58 @@ TEST(LiveSource, WishesToRecordComeFromWhoeverMaySendAndOneByOne) {
   EXPECT_FALSE(source->advance(now_ns).recording);
 }
 
+/// What a source says of these packets, 60 a second for three seconds.
+std::vector<std::string> said_of(const char* protocol, const std::function<test::PacketBytes(int)>& packet) {
+  const auto source = make({.protocol = protocol});
+  std::vector<std::string> said;
+  for (int i = 0; i < 180; ++i) {
+    const int64_t time_ns = kStart + i * kSInNs / 60;
+    (void)source->take(kFirst, packet(i), time_ns);
+    (void)source->advance(time_ns);
+    for (std::string& text : texts(source->take_notes())) said.push_back(std::move(text));
+  }
+  return said;
+}
+
+// "Nothing comes" sends a person to the cable, where the fault is in the numbers.
+TEST(LiveSource, PacketsOfWhichNoneIsBelievedAreNotCalledNothing) {
+  // The last byte of a place, which changes with each packet, counts as its first.
+  const auto swapped = [](int i) {
+    test::FreedPacket packet;
+    const auto anywhere_mm = [i](int axis) { return 1'000.0 * ((i * (37 + 30 * axis)) % 128); };
+    packet.position_mm = {anywhere_mm(0), anywhere_mm(1), anywhere_mm(2)};
+    return test::freed(packet);
+  };
+  const auto jumping = said_of("freed", swapped);
+  EXPECT_THAT(jumping, Contains(HasSubstr("are not believed: they jump as no head does")));
+  EXPECT_THAT(jumping, Not(Contains(HasSubstr("nothing of"))));
+  const auto broken = said_of("vmc", [](int) {
+    return test::osc_bundle({test::vmc_pose("/VMC/Ext/Tra/Pos", "hat", {0, 1, 0}, {0, 9, 0, 9})});
+  });
+  EXPECT_THAT(broken, Contains(HasSubstr("are not believed: they are no pose of a head")));
+  const auto still = said_of("freed", [](int) { return camera(1, 1'700.0); });
+  EXPECT_THAT(still, Not(Contains(HasSubstr("not believed"))));
+}
+
+TEST(LiveSource, NamesTheProtocolOfPacketsOfAnother) {
+  const auto vmc = said_of("vmc", [](int) { return camera(1, 1'700.0); });
+  EXPECT_THAT(vmc, Contains(HasSubstr("it reads as a packet of freed, which wants --mocap freed")));
+  const auto freed = said_of("freed", [](int) { return tracker("hat", 1.7f); });
+  EXPECT_THAT(freed, Contains(HasSubstr("it reads as a packet of vmc, which wants --mocap vmc")));
+  const auto noise = said_of("vmc", [](int i) { return test::PacketBytes(37, static_cast<std::byte>(i)); });
+  EXPECT_THAT(noise, Not(Contains(HasSubstr("it reads as"))));
+}
+
+TEST(LiveSource, ACommandThatThereIsNotIsNamedWhoeverSendsIt) {
+  const auto source = make({.protocol = "vmc"});
+  ASSERT_TRUE(source->take(kFirst, tracker("hat", 1.7f), kStart));
+  ASSERT_TRUE(source->take(kSecond, test::osc("/strandcast/record/begin", {}), kStart + kMsInNs));
+  EXPECT_THAT(
+      texts(source->take_notes()),
+      Contains(HasSubstr("127.0.0.1:50002 sends /strandcast/record/begin, and there is no such command; "
+                         "there are /strandcast/record/start, /strandcast/record/stop")));
+  EXPECT_EQ(source->status(kStart + kMsInNs).refused, 0u);
+}
+
 }  // namespace
 }  // namespace strandcast::live_source_test

@@ -331,6 +331,37 @@ TEST(VmcParser, DescribesWhatCame) {
   EXPECT_EQ(lines.back(), "and 27 more");
 }
 
+/// The same message with the bytes of its floats, which are its last ones, turned round.
+PacketBytes with_little_floats(PacketBytes message, size_t count) {
+  for (size_t i = 0; i < count; ++i) {
+    const auto end = message.end() - static_cast<std::ptrdiff_t>(i * sizeof(float));
+    std::reverse(end - sizeof(float), end);
+  }
+  return message;
+}
+
+TEST(VmcParser, ReadsFloatsOfTheOtherOrderWhereQuaternionsSaySo) {
+  const auto parser = live_parser_of("vmc");
+  LivePacket packet;
+  std::vector<std::string> notes;
+  for (int i = 0; i < 8; ++i) {
+    const PacketBytes head =
+        test::vmc_pose("/VMC/Ext/Tra/Pos", "hat", {0.1f, 1.7f, 0.2f}, turn_about(1, 0.1 * (i + 1)));
+    packet =
+        parsed(*parser,
+               osc_bundle({with_little_floats(osc("/VMC/Ext/T", {12.3f}), 1), with_little_floats(head, 7)}));
+    for (std::string& note : parser->take_notes()) notes.push_back(std::move(note));
+  }
+  EXPECT_THAT(notes, ElementsAre("the sender's floats are little-endian, and are read so"));
+  ASSERT_EQ(packet.poses.size(), 1u);
+  EXPECT_NEAR(packet.poses[0].world_from_subject.position_m.y, 1.7, 1e-6);
+  // And back, as another program at the same port may send.
+  for (int i = 0; i < 8; ++i)
+    packet = parsed(*parser, osc_bundle({test::vmc_pose("/VMC/Ext/Tra/Pos", "hat", {0.1f, 1.6f, 0.2f},
+                                                        turn_about(1, 0.1 * (i + 1)))}));
+  EXPECT_NEAR(packet.poses.at(0).world_from_subject.position_m.y, 1.6, 1e-6);
+}
+
 // A receiver that knows the protocol's pages alone: it waits for OK, and hangs each bone on the one before.
 TEST(VmcPackets, HaveTheBonesThatPlaceAHead) {
   const Pose head{{0.3, 1.6, -0.2}, glm::angleAxis(0.4, glm::dvec3(0, 1, 0))};

@@ -466,5 +466,20 @@ TEST(CaseFiles, MotionComesInAsItShould) {
   }
 }
 
+// A person who states a wrong unit or axis reads about a head that is too fast, and filters what is right.
+TEST(MotionFile, DoubtsAStatedUnitAndAxisThatMakeNoBody) {
+  const std::filesystem::path clip = std::filesystem::path(STRANDCAST_SHARED_DATA) / "mocap/pirouette.bvh";
+  const auto metres = load_motion_file(clip, {.unit_m = 1.0, .up = "", .joint = ""});
+  ASSERT_TRUE(metres) << metres.error().to_string();
+  EXPECT_THAT(metres->notes, testing::Contains(HasSubstr("as of no body: 0.01 m is likely (--unit)")));
+  EXPECT_THAT(metres->notes, Not(testing::Contains(HasSubstr("--filter-glitches"))));
+  const auto z_up = load_motion_file(clip, {.unit_m = 0.0, .up = "z", .joint = ""});
+  ASSERT_TRUE(z_up) << z_up.error().to_string();
+  EXPECT_THAT(z_up->notes, testing::Contains(HasSubstr("degrees off upright: +Y is likely (--up)")));
+  const auto right = load_motion_file(clip, {.unit_m = 0.01, .up = "y", .joint = ""});
+  ASSERT_TRUE(right) << right.error().to_string();
+  EXPECT_THAT(right->notes, Not(testing::Contains(HasSubstr("is likely"))));
+}
+
 }  // namespace
 }  // namespace strandcast::motion_test

@@ -57,6 +57,9 @@ class LiveParser {
   virtual Result<LivePacket> parse(std::span<const std::byte> bytes, int64_t arrival_ns) = 0;
   /// Returns the wish to record that a datagram is, from any sender; such a datagram needs no parse().
   virtual std::optional<LiveTake> take_of(std::span<const std::byte>) const { return std::nullopt; }
+  /// Returns why a datagram, from any sender, that is a command and nothing else is none of ours; empty for
+  /// all others, which are parsed.
+  virtual std::string unknown_command_of(std::span<const std::byte>) const { return {}; }
   /// Returns bytes to send when a connection begins: VRPN's cookie, NatNet's request to be served; empty =
   /// nothing.
   virtual std::vector<std::byte> greeting() const { return {}; }

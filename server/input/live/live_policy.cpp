@@ -9,6 +9,7 @@
 #include "common/base/units.h"
 #include "common/math/turn.h"
 #include "common/scene/body_desc.h"
+#include "common/wire/sample_limits.h"
 #include "server/input/input_hub.h"
 
 namespace strandcast {
@@ -21,10 +22,7 @@ constexpr double kSteadyShare = 0.2;            // how much periods of a steady 
 constexpr double kLeastTurn = 1e-9;             // of a quaternion's vector part
 
 bool is_possible(const LivePose& pose) {
-  if (!is_finite(pose.world_from_subject)) return false;
-  const double norm = glm::length(pose.world_from_subject.rotation);
-  const bool is_rotation = norm >= kMinQuaternionNorm && norm <= kMaxQuaternionNorm;
-  return is_rotation && glm::length(pose.world_from_subject.position_m) <= kMaxHeadDistanceM;
+  return refusal_of(pose.world_from_subject).empty();
 }
 
 /// As a tracker tells that has lost what it tracks.

@@ -145,6 +145,13 @@ Status LiveSource::take(const std::string& sender, std::span<const std::byte> by
       ++counters_.over_rate;
     return {};
   }
+  if (const std::string unknown = parser_->unknown_command_of(bytes); !unknown.empty()) {
+    if (!take_allowance(bytes.size(), arrival_ns))
+      ++counters_.over_rate;
+    else
+      warn(fmt::format("{} sends {}", sender, unknown));
+    return {};
+  }
   if (is_heard(arrival_ns) && sender != sender_) {
     ++counters_.refused;
     if (sender != other_sender_ && notes_.size() < kMaxNotes)
@@ -168,11 +175,7 @@ Status LiveSource::take(const std::string& sender, std::span<const std::byte> by
   const Result<LivePacket> packet = parser_->parse(bytes, arrival_ns);
   if (!packet) {
     ++counters_.malformed;
-    if (notes_.size() < kMaxNotes)
-      notes_.push_back({true,
-                        fmt::format("{}: a malformed packet from {}: {}", describe(), sender,
-                                    one_line(packet.error().to_string(), kMaxNoteChars)),
-                        LiveNoteKind::Malformed});
+    note_malformed(sender, bytes, packet.error());
     return packet.error();
   }
   ++counters_.packets;
@@ -182,6 +185,46 @@ Status LiveSource::take(const std::string& sender, std::span<const std::byte> by
   use(*packet, arrival_ns);
   for (const std::string& note : parser_->take_notes()) warn(note);
   return {};
+}
+
+/// With the protocol whose packet it is, where one reads a pose in it.
+void LiveSource::note_malformed(const std::string& sender, std::span<const std::byte> bytes,
+                                const Error& error) {
+  constexpr uint64_t kMostTried = 8;  // of many that a sender may send
+  std::string other;
+  for (const LiveProtocol& protocol : live_protocols()) {
+    if (counters_.malformed > kMostTried || protocol.transport == LiveTransport::Tcp) continue;
+    LiveParserConfig config;
+    config.protocol = protocol.name;
+    const auto parser = make_live_parser(config);
+    const auto packet = parser ? (*parser)->parse(bytes, 0) : parser.error();
+    if (!other.empty() || !packet || packet->poses.empty()) continue;
+    other = fmt::format("; it reads as a packet of {}, which wants --mocap {}", protocol.name, protocol.name);
+  }
+  if (notes_.size() < kMaxNotes)
+    notes_.push_back({true,
+                      fmt::format("{}: a malformed packet from {}: {}{}", describe(), sender,
+                                  one_line(error.to_string(), kMaxNoteChars), other),
+                      LiveNoteKind::Malformed});
+}
+
+/// Notes, once for a sender, that nine of ten poses of a second are not believed.
+void LiveSource::note_unbelieved(int64_t now_ns) {
+  if (offered_ == 0 || now_ns - offered_ns_ < kMotionStaleNs) return;
+  const uint64_t offered = std::exchange(offered_, 0);
+  const uint64_t refused = refused_poses() - refused_before_;
+  if (refused * 10 < offered * 9 || std::exchange(has_told_unbelieved_, true)) return;
+  const LivePolicyCounters& counters = policy_.counters();
+  const char* const why =
+      counters.impossible > counters.gated ? "they are no pose of a head" : "they jump as no head does";
+  warn(fmt::format(
+      "{} poses came from {} in {:.1f} s, and {} are not believed: {}, as with the bytes, axes or "
+      "units of another protocol",
+      offered, sender_, static_cast<double>(now_ns - offered_ns_) * kSPerNs, refused, why));
+}
+
+uint64_t LiveSource::refused_poses() const {
+  return policy_.counters().impossible + policy_.counters().gated;
 }
 
 void LiveSource::warn(const std::string& text) {
@@ -200,7 +243,8 @@ void LiveSource::hear(const std::string& sender, int64_t arrival_ns) {
     subjects_.clear();
     subject_.reset();
     policy_.begin_another();
-    has_told_impossible_ = has_told_namesakes_ = false;
+    has_told_impossible_ = has_told_namesakes_ = has_told_unbelieved_ = false;
+    offered_ = 0;
   }
   sender_ = sender;
   notes_.push_back({false, fmt::format("{}: {} sends", describe(), sender)});
@@ -329,7 +373,13 @@ bool LiveSource::is_namesake(const LivePose& pose, const LivePose& taken) {
 
 void LiveSource::move_head(const LivePose& pose, int64_t arrival_ns) {
   const uint64_t impossible = policy_.counters().impossible;
+  const uint64_t refused = refused_poses();
+  if (offered_++ == 0) {
+    offered_ns_ = arrival_ns;
+    refused_before_ = refused;
+  }
   policy_.take(scaled(pose, live_.scale), arrival_ns);
+  if (refused_poses() > refused) refused_ns_ = arrival_ns;
   if (policy_.counters().impossible == impossible || std::exchange(has_told_impossible_, true)) return;
   warn(fmt::format("{} sends what is no head's pose, and is left out: {}", sender_,
                    one_line(fmt::format("{}", fmt::join(parser_->describe(), ", ")), kMaxNoteChars)));
@@ -346,6 +396,7 @@ LiveSource::Due LiveSource::advance(int64_t now_ns) {
     samples.timecode = head.timecode;
     due.motion.push_back(std::move(samples));
   }
+  note_unbelieved(now_ns);
   for (const std::string& note : policy_.take_notes()) warn(note);
   due.wind = std::exchange(wind_, {});
   if (!recordings_.empty() && now_ns - recorded_ns_ >= kRecordPauseNs) {
@@ -356,7 +407,7 @@ LiveSource::Due LiveSource::advance(int64_t now_ns) {
   const bool is_stale_now = policy_.is_stale(now_ns);
   if (is_stale_now && !was_stale_) {
     due.has_ended = true;
-    if (subject_ && is_heard(now_ns))
+    if (subject_ && is_heard(now_ns) && now_ns - refused_ns_ > kMotionStaleNs)
       notes_.push_back({true,
                         fmt::format("{}: nothing of {} for {:g} s: the head rests", describe(),
                                     shown(*subject_), static_cast<double>(kMotionStaleNs) * kSPerNs),

@@ -102,6 +102,9 @@ class LiveSource {
   bool take_allowance(size_t bytes, int64_t arrival_ns);
   void hear(const std::string& sender, int64_t arrival_ns);
   void note_silence();
+  void note_malformed(const std::string& sender, std::span<const std::byte> bytes, const Error& error);
+  void note_unbelieved(int64_t now_ns);
+  uint64_t refused_poses() const;
   void warn(const std::string& text);
   void measure(int64_t arrival_ns);
   void rename_subject(const LivePose& pose, const std::string& name, const std::vector<std::string>& names);
@@ -128,7 +131,12 @@ class LiveSource {
   bool was_stale_ = true;
   bool has_told_impossible_ = false;  // of this sender
   bool has_told_namesakes_ = false;
-  int64_t packet_ns_ = 0;  // arrival of the newest that could be read
+  bool has_told_unbelieved_ = false;
+  uint64_t offered_ = 0;                // poses to the policy, in a window of kMotionStaleNs
+  uint64_t refused_before_ = 0;         // of all poses, when the window began
+  int64_t offered_ns_ = 0;              // when that was
+  int64_t refused_ns_ = INT64_MIN / 2;  // when a pose was not believed last
+  int64_t packet_ns_ = 0;               // arrival of the newest that could be read
   double packet_allowance_ = 0.0, byte_allowance_ = 0.0;
   int64_t allowance_ns_ = 0;
 

@@ -2,8 +2,12 @@
 // OSC of our own (`/strandcast/wind fff`). The head is root * hips * spine * chest * upper chest * neck *
 // head, a subject without a name; `/strandcast/record/start [slate s, take i]` and `/stop` are for
 // recordings, from any sender that may send. Trackers go by serial number. A zero position is that of a usual
-// body, unless `ignores_zero_positions` is off. VMC has no frames: one ends with the last bone that frames
-// had so far, or before a bone that comes again. A time whose float has steps above 2 ms is not used.
+// body, unless `ignores_zero_positions` is off. Floats are little-endian where quaternions say so. VMC has no
+// frames: one ends with the last bone that frames had so far, or before a bone that comes again. A time whose
+// float has steps above 2 ms is not used.
+#include <fmt/ranges.h>
+
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -20,6 +24,12 @@ namespace strandcast {
 namespace {
 
 constexpr std::string_view kRecordAddress = "/strandcast/record/";
+constexpr std::string_view kOwnAddress = "/strandcast/";
+constexpr std::array<std::string_view, 3> kOwnCommands = {"/strandcast/record/start",
+                                                          "/strandcast/record/stop", "/strandcast/wind"};
+bool is_own_command(std::string_view address) {
+  return std::find(kOwnCommands.begin(), kOwnCommands.end(), address) != kOwnCommands.end();
+}
 constexpr size_t kNoParent = SIZE_MAX;
 
 /// A bone by its name in Unity and where it is under its parent in a usual body, for senders that tell
@@ -82,18 +92,61 @@ Pose operator*(const Pose& parent, const Pose& child) {
   return {parent * child.position_m, parent.rotation * child.rotation};
 }
 
+using PoseFloats = std::array<float, 7>;  // a place and a quaternion
+
+float turned_round(float number) {
+  auto bytes = std::bit_cast<std::array<std::byte, sizeof(float)>>(number);
+  std::reverse(bytes.begin(), bytes.end());
+  return std::bit_cast<float>(bytes);
+}
+PoseFloats turned_round(PoseFloats numbers) {
+  for (float& number : numbers) number = turned_round(number);
+  return numbers;
+}
+
+/// The order of the bytes of a sender's floats: OSC's, unless quaternions on end have unit length in the
+/// other order alone.
+class FloatOrder {
+ public:
+  bool is_little() const { return is_little_; }
+  void judge(const PoseFloats& as_osc) {
+    const bool is_osc = is_unit(as_osc), is_other = is_unit(turned_round(as_osc));
+    if (is_osc == is_other) return;
+    in_a_row_ = is_other == is_little_ ? 0 : in_a_row_ + 1;
+    if (in_a_row_ < kDecidingPoses) return;
+    is_little_ = is_other;
+    in_a_row_ = 0;
+    has_news_ = true;
+  }
+  bool take_news() { return std::exchange(has_news_, false); }
+
+ private:
+  static constexpr int kDecidingPoses = 5;
+  static bool is_unit(const PoseFloats& numbers) {
+    constexpr double kTolerance = 0.05;
+    double square = 0.0;
+    for (size_t i = 3; i < numbers.size(); ++i) square += static_cast<double>(numbers[i]) * numbers[i];
+    return std::abs(std::sqrt(square) - 1.0) < kTolerance;
+  }
+  int in_a_row_ = 0;  // of the other order
+  bool is_little_ = false;
+  bool has_news_ = false;
+};
+
 /// The name and the pose that many of VMC's messages begin with.
 struct NamedPose {
   std::string_view name;
   glm::dvec3 position_m{0.0};
   Pose pose;
 };
-std::optional<NamedPose> take_pose(OscArguments& arguments) {
+std::optional<NamedPose> take_pose(OscArguments& arguments, FloatOrder& order) {
   NamedPose named;
   named.name = arguments.take_string().value_or("");
-  std::array<double, 7> value{};
-  for (double& number : value) number = arguments.take_float().value_or(0.0f);
+  PoseFloats value{};
+  for (float& number : value) number = arguments.take_float().value_or(0.0f);
   if (!arguments.ok()) return std::nullopt;
+  order.judge(value);
+  if (order.is_little()) value = turned_round(value);
   named.position_m = {value[0], value[1], value[2]};
   named.pose =
       pose_from_unity(named.position_m, unit_or_nan(quaternion_of({value[3], value[4], value[5], value[6]})));
@@ -195,6 +248,9 @@ class VmcBody {
   int short_frames_ = 0;
 };
 
+/// Times that are told on: fewer may be of floats whose order is not known yet.
+constexpr int kCoarseTimes = 10;
+
 /// A slate as text or number, and a take as a number of either kind that counts.
 std::optional<LiveTake> take_of_start(const OscMessage& message) {
   constexpr float kMostFloatCount = 1 << 24;
@@ -228,6 +284,9 @@ class VmcParser : public LiveParser {
     for (const OscMessage& message : osc.messages)
       if (!apply(message, packet)) ++ignored_;
     body_.end_datagram(osc.is_bundle, packet.poses);
+    if (order_.take_news())
+      notes_.push_back(fmt::format("the sender's floats are {}-endian, and are read so",
+                                   order_.is_little() ? "little" : "big"));
     if (body_.lacks_head() && !std::exchange(has_told_headless_, true))
       notes_.emplace_back("the sender tells bones, and no Head among them: the head rests until it does");
     if (!body_.lacks_head()) has_told_headless_ = false;
@@ -249,6 +308,18 @@ class VmcParser : public LiveParser {
     return std::nullopt;
   }
 
+  std::string unknown_command_of(std::span<const std::byte> bytes) const override {
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    if (text.find(kOwnAddress) == std::string_view::npos) return {};
+    const auto osc = read_osc(bytes, limit_bytes_);
+    if (!osc || osc->messages.empty()) return {};
+    for (const OscMessage& message : osc->messages)
+      if (!message.address.starts_with(kOwnAddress) || is_own_command(message.address)) return {};
+    return fmt::format("{}, and there is no such command; there are {}",
+                       one_line(osc->messages.front().address, kMaxSubjectBytes),
+                       fmt::join(kOwnCommands, ", "));
+  }
+
   uint64_t ignored() const override { return ignored_; }
   std::vector<std::string> take_notes() override { return std::exchange(notes_, {}); }
 
@@ -261,7 +332,7 @@ class VmcParser : public LiveParser {
     const std::string_view address = message.address;
     if (address == "/VMC/Ext/Bone/Pos") return apply_bone(arguments, packet);
     if (address == "/VMC/Ext/Root/Pos") {
-      const auto root = take_pose(arguments);
+      const auto root = take_pose(arguments, order_);
       if (root) body_.set(kRoot, *root, packet.poses);
       return root.has_value();
     }
@@ -269,7 +340,7 @@ class VmcParser : public LiveParser {
       return apply_device(arguments, packet);
     if (address == "/VMC/Ext/T") {
       const auto time_s = arguments.take_float();
-      if (time_s) take_time(*time_s);
+      if (time_s) take_time(order_.is_little() ? turned_round(*time_s) : *time_s);
       return time_s.has_value();
     }
     if (address == "/strandcast/wind") return apply_wind(arguments, packet);
@@ -288,7 +359,8 @@ class VmcParser : public LiveParser {
   void take_time(float time_s) {
     const auto fine_s = fine_seconds(time_s);
     body_.time_ns = fine_s ? nanoseconds_of(*fine_s) : std::nullopt;
-    if (fine_s || !std::isfinite(time_s) || std::exchange(has_told_steps_, true)) return;
+    coarse_times_ = fine_s || !std::isfinite(time_s) ? 0 : coarse_times_ + 1;
+    if (coarse_times_ < kCoarseTimes || std::exchange(has_told_steps_, true)) return;
     notes_.push_back(
         fmt::format("the sender's time is {:.0f} s, of which a float tells no steps below {:g} ms: times of "
                     "arrival are used",
@@ -296,7 +368,7 @@ class VmcParser : public LiveParser {
   }
 
   bool apply_bone(OscArguments& arguments, LivePacket& packet) {
-    const auto named = take_pose(arguments);
+    const auto named = take_pose(arguments, order_);
     if (!named) return false;
     for (size_t bone = kHips; bone < kBoneCount; ++bone)
       if (named->name == kBones[bone].name) body_.set(bone, *named, packet.poses);
@@ -304,7 +376,7 @@ class VmcParser : public LiveParser {
   }
 
   bool apply_device(OscArguments& arguments, LivePacket& packet) {
-    const auto named = take_pose(arguments);
+    const auto named = take_pose(arguments, order_);
     if (!named) return false;
     LivePose& pose = packet.poses.emplace_back();
     pose.subject = one_line(named->name, kMaxSubjectBytes);
@@ -313,15 +385,20 @@ class VmcParser : public LiveParser {
     return true;
   }
 
-  static bool apply_wind(OscArguments& arguments, LivePacket& packet) {
+  bool apply_wind(OscArguments& arguments, LivePacket& packet) {
     glm::dvec3 wind_mps(0.0);
-    for (int axis = 0; axis < 3; ++axis) wind_mps[axis] = arguments.take_float().value_or(0.0f);
+    for (int axis = 0; axis < 3; ++axis) {
+      const float value = arguments.take_float().value_or(0.0f);
+      wind_mps[axis] = order_.is_little() ? turned_round(value) : value;
+    }
     if (arguments.ok()) packet.wind_mps = wind_mps;
     return arguments.ok();
   }
 
   uint32_t limit_bytes_;
   VmcBody body_;
+  FloatOrder order_;
+  int coarse_times_ = 0;  // in a row
   bool has_told_steps_ = false;
   bool has_told_headless_ = false;
   bool has_told_start_ = false;
