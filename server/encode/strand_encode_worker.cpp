@@ -133,13 +133,17 @@ bool StrandEncodeWorker::is_due(const SnapshotSlot::View& view) const {
 
 /// Returns for a new state, or when somebody has waited long enough for a keyframe of the present one.
 SnapshotSlot::View StrandEncodeWorker::wait_for_work() const {
+  const bool is_on_request = listeners_ == StrandListeners::OnRequest;
+  const bool had_request = has_request();
+  const int64_t wanted_ns = state_wanted_ns_;
+  const int64_t request_wait_ns = had_request ? wanted_ns - now_ns() : 0;
   const auto has_work_now = [this](const SnapshotSlot::View& now) { return has_work(now); };
-  const auto has_news = [this](const SnapshotSlot::View& now) {
-    return has_work(now) ||
+  const auto has_news = [&](const SnapshotSlot::View& now) {
+    // Whose time decides when to wake.
+    const bool is_asked = is_on_request && has_request() && (!had_request || state_wanted_ns_ != wanted_ns);
+    return has_work(now) || is_asked ||
            (has_listeners() && has_state(now, config()) && (is_keyframe_wanted_ || is_restarting_));
   };
-  const bool is_on_request = listeners_ == StrandListeners::OnRequest;
-  const int64_t request_wait_ns = has_request() ? state_wanted_ns_ - now_ns() : 0;
   if (is_on_request && request_wait_ns > 0)
     (void)slot_.wait_for(std::chrono::nanoseconds(request_wait_ns), has_news);
   else if (is_on_request || config().rate_divisor <= 1)

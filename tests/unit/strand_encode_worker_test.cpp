@@ -192,6 +192,20 @@ TEST_F(StrandEncoding, WhoDrawsPicturesGetsTheStatesThatItAsksFor) {
   EXPECT_EQ(control_->seen(), (std::vector<uint64_t>{1, 4, 5, 6}));
 }
 
+// The last one before a pause, or of counted steps, is asked for ahead of its time, and nothing follows it.
+TEST_F(StrandEncoding, AStateThatIsAskedForAheadComesThoughNoneFollows) {
+  const auto worker = start();
+  worker->set_listeners(StrandListeners::OnRequest);
+  slot_.put(make_state(1));
+  ASSERT_TRUE(eventually([&] { return list_.count() == 1; }));
+  give_time_to_misbehave();  // it waits, and nobody has asked
+  constexpr int64_t kAheadNs = 50'000'000;
+  worker->request_state(now_ns() + kAheadNs);
+  slot_.put(make_state(2));
+  ASSERT_TRUE(eventually([&] { return list_.count() == 2; }));
+  EXPECT_EQ(control_->seen(), (std::vector<uint64_t>{1, 2}));
+}
+
 TEST_F(StrandEncoding, AKeyframeComesWithTheNewestStateThoughNobodyAskedForThat) {
   const auto worker = start();
   worker->set_listeners(StrandListeners::OnRequest);
