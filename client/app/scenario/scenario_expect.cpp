@@ -20,9 +20,8 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kExpectPoll{50};
-// Without another picture; likewise where the last step's may still be drawn; of waiting for one.
-constexpr double kUnchangedS = 4.0, kUndrawnS = 12.0, kLongestStillS = 30.0;
-constexpr int64_t kOnItsWayNs = 150'000'000;  // for a picture
+constexpr double kUnchangedS = 4.0, kLongestStillS = 30.0;  // without another picture; of waiting for one
+constexpr int64_t kOnItsWayNs = 150'000'000;                // for a picture
 constexpr size_t kMaxExpectedChars = 300;
 constexpr double kRefusalTimeoutS = 10.0;
 constexpr size_t kHashChars = 16;
@@ -406,7 +405,7 @@ ViewerPicture ScenarioRun::still_picture(const ScenarioViewer& who) {
     const bool is_of_step =
         std::abs(static_cast<double>(seen.image_sim_time_ns) - wanted_ns) <= 0.5 * step_ns;
     const bool is_final = seen.is_image_still && is_of_step && seen.image_seen_ns > acted_ns_ + kOnItsWayNs;
-    return is_final || elapsed_s() >= changed_s + (is_of_step ? kUnchangedS : kUndrawnS);
+    return is_final || elapsed_s() >= changed_s + kUnchangedS;
   });
   return seen;
 }
