@@ -34,7 +34,8 @@ WORDS = {
     "kMaxGroomReadBytes": "512 MiB", "kMaxAbcObjects": "100,000", "kMaxAbcDepth": "2,000", "kMaxUsdPrims": "100,000", "kMaxUsdDepth": "64",
     "kMaxUsdXformOps": "32", "kMaxUsdcItems": "4,000,000", "kMaxUsdcTokenBytes": "64 MiB", "kMaxUsdcFields": "64", "connections_per_s": "10 a second", "requests_per_s": "50 a second", "wrong_tokens": "5", "guarded_addresses": "1,024",
     "handshake_ms": "5 s", "messages_per_s": "1,000 a second", "stalled_ms": "4.5 s", "idle_ms": "15 s",
-    "refusal_lines_per_address": "10 of one address", "refusal_lines": "300 of all", "session_lines": "1,200"}
+    "refusal_lines_per_address": "10 of one address", "refusal_lines": "300 of all", "session_lines": "1,200",
+    "lines_per_kind": "4 of a kind"}
 # Said in words, or of another constant; the value alone stands here.
 VALUES = {
     "kMaxHttpReadBytes": 8 * 1024 + 1, "kCatchUpShare": 0.125, "kJobShare": 0.25, "kBlockingShare": 0.25,
@@ -44,7 +45,7 @@ OF_HEADER = {"server/relay/voices.h": {
     "kMaxVoices": "40 of viewers", "kMaxWatchersVoices": "24 watchers", "kMaxVoicesPerAddress": "of one address 12", "kSpeakAgainNs": "2 s",
     "kIdleVoiceNs": "90 s"}}
 # Structs, or of two values in two places: their tests have them (PictureViews, LiveMocap, SnapshotTimeline, ClientHostile and the like).
-ELSEWHERE = {"kHardwareBudget", "kSoftwareBudget", "kReservedPictureClasses", "kLiveLines", "kMaxDatagramBytes", "kMaxMessageBytes", "kKeptSnapshots",
+ELSEWHERE = {"kHardwareBudget", "kSoftwareBudget", "kReservedPictureClasses", "kMaxDatagramBytes", "kMaxMessageBytes", "kKeptSnapshots",
              "kMaxShownChars", "kStopGrace", "kFarewellTimeout", "kDoubtedServer"}
 MULTIPLES = {"KiB": 1 << 10, "MiB": 1 << 20, "GiB": 1 << 30, "million": 10**6}
 # Units by the end of a name: what a second, or a millisecond, is of them.
@@ -105,6 +106,9 @@ def faults(source):
         said = [limit for limit, held in rows if re.search(rf"`{re.escape(key)}`", held)]
         if not any(re.search(rf"(?<![\d,.]){re.escape(words)}(?![\d]|,\d)", limit) for limit in said):
             yield f"{name}: no row that names {key} says '{words}': {said}"
+    for name in sorted(ELSEWHERE):
+        if not re.search(rf"\b{name}\b", source.code):
+            yield f"{name} is in no file of the product"
     for limit, held in rows:
         for name in re.findall(r"`(k[A-Z]\w+)`", held):
             if name not in WORDS and name not in VALUES and name not in ELSEWHERE:
@@ -124,6 +128,7 @@ PLANTS = {
     "a member": {"code": ("stalled_ms = 4'500", "stalled_ms = 4'600")},
     "a time": {"code": ("kSpeakAgainNs = 2'000'000'000", "kSpeakAgainNs = 200'000'000")},
     "a page": {"page": ("65,536, then refused", "65,535, then refused")},
+    "a name": {"code": ("kStopGrace", "kOtherGrace")},
     "a row": {"page": ("`kMaxHeldSamples`", "`kMaxOtherSamples`")}}
 
 
