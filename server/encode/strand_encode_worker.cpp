@@ -55,6 +55,7 @@ StrandEncodeWorker::~StrandEncodeWorker() {
   is_stopping_ = true;
   slot_.notify();
   thread_.join();
+  if (shared_ != nullptr) shared_->set_followed(false);
 }
 
 void StrandEncodeWorker::set_listeners(StrandListeners listeners) {
@@ -63,6 +64,7 @@ void StrandEncodeWorker::set_listeners(StrandListeners listeners) {
     is_restarting_ = true;
   }
   listeners_ = listeners;
+  say_followed();
   slot_.notify();
 }
 
@@ -78,7 +80,13 @@ void StrandEncodeWorker::change(const StrandEncodeConfig& config) {
     const std::lock_guard lock(config_mutex_);
     config_ = config;
   }
+  say_followed();
   slot_.notify();
+}
+
+void StrandEncodeWorker::say_followed() const {
+  if (shared_ != nullptr)
+    shared_->set_followed(listeners_ == StrandListeners::All && config().rate_divisor <= 1);
 }
 
 StrandEncodeConfig StrandEncodeWorker::config() const {
@@ -161,6 +169,7 @@ void StrandEncodeWorker::run() {
     if (view.is_stopped || is_stopping_) return;
     const StrandEncodeConfig config_now = config();
     if (has_listeners() && has_state(view, config_now)) serve(view, config_now);
+    if (shared_ != nullptr && view.snapshot != nullptr) shared_->set_encoded(view.snapshot->tick);
   }
 }
 

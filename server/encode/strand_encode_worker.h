@@ -97,6 +97,7 @@ class StrandEncodeWorker {
   enum class Audience { Followers, Joiners };
 
   void run();
+  void say_followed() const;
   bool has_work(const SnapshotSlot::View& view) const;
   bool is_due(const SnapshotSlot::View& view) const;
   bool has_request() const { return state_requests_ != answered_requests_; }

@@ -4,6 +4,8 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -47,12 +49,40 @@ class SharedSlot {
   /// Returns whether somebody is likely to take the state of this tick.
   bool is_read(uint64_t tick) const { return tick <= read_tick_ + kMostTrailTicks; }
 
+  /// Sets whether an encoder takes every published state in its turn.
+  void set_followed(bool is_followed) {
+    {
+      const std::lock_guard lock(mutex_);
+      is_followed_ = is_followed;
+    }
+    encoded_.notify_all();
+  }
+  /// Says that the state of this tick is encoded, and what it led to was put here.
+  void set_encoded(uint64_t tick) {
+    {
+      const std::lock_guard lock(mutex_);
+      encoded_tick_ = tick;
+    }
+    encoded_.notify_all();
+  }
+  /// Waits for the encoder of every state, kLongestEncode at most. Where time is counted in steps, it decides
+  /// nothing then how quick the encoder is.
+  void wait_encoded(uint64_t tick) {
+    std::unique_lock lock(mutex_);
+    encoded_.wait_for(lock, kLongestEncode, [&] { return !is_followed_ || encoded_tick_ == tick; });
+  }
+
  private:
+  static constexpr std::chrono::seconds kLongestEncode{1};
+
   std::atomic<SharedStates> wanted_{SharedStates::None};
   std::mutex mutex_;
   std::optional<SharedUpdate> update_;
   std::array<std::pair<uint64_t, std::shared_ptr<const SharedState>>, 2> states_;
   std::atomic<uint64_t> read_tick_{0};
+  std::condition_variable encoded_;
+  bool is_followed_ = false;
+  uint64_t encoded_tick_ = 0;
 };
 
 }  // namespace strandcast

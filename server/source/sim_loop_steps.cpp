@@ -88,6 +88,7 @@ bool SimLoop::shares() const {
 /// Before a step: takes over the viewers' strands if the encoder has handed them over.
 void SimLoop::follow_viewers() {
   if (config_.shared == nullptr) return;
+  if (config_.is_lockstep) config_.shared->wait_encoded(published_tick_);
   const bool is_shared = shares();
   // Whoever takes a recorded step again has what its keyframes tell.
   const SharedStates wanted = is_recorded() ? SharedStates::Told : SharedStates::All;

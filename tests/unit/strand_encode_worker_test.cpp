@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <future>
 #include <map>
 #include <random>
 #include <thread>
@@ -290,6 +291,26 @@ TEST_F(StrandEncoding, RequestsWithinHalfASecondShareAKeyframeThatIsTakenOver) {
     worker.request_keyframe();
     EXPECT_TRUE(eventually([&] { return list.count() > count; }));
   }
+}
+
+// A simulation that counts its steps goes on from the same keyframes, however slow the encoder is.
+TEST_F(StrandEncoding, WhoCountsStepsWaitsUntilAStateIsEncoded) {
+  SharedSlot shared;
+  SnapshotSlot slot;
+  FrameList list;
+  StrandEncodeWorker worker(slot, std::make_unique<FakeEncoder>(control_), list.sink(), {}, &shared);
+  shared.wait_encoded(7);  // nobody follows
+  worker.set_listeners(StrandListeners::All);
+  control_->hold();
+  slot.put(make_state(7));
+  ASSERT_TRUE(eventually([&] { return control_->inside(); }));
+  auto waiting = std::async(std::launch::async, [&] {
+    shared.wait_encoded(7);
+    return list.count();
+  });
+  give_time_to_misbehave();
+  control_->release();
+  EXPECT_EQ(waiting.get(), 1u);
 }
 
 TEST_F(StrandEncoding, AJoinerOfAPausedSceneGetsThePresentStateEncodedAgain) {
