@@ -101,6 +101,14 @@ Result<FrameRate> parse_frame_rate(std::string_view text, double least, double m
   return *exact;
 }
 
+double exact_frame_s(double frame_s) {
+  constexpr double kRounding = 2e-4;  // relative; whole rates and those of television lie 1e-3 apart
+  const double rate = 1.0 / frame_s, whole = std::round(rate);
+  for (const double exact : {whole, std::round(rate / kNtsc) * kNtsc})
+    if (exact >= 1.0 * kNtsc && std::abs(rate - exact) < kRounding * rate) return 1.0 / exact;
+  return frame_s;
+}
+
 std::string frame_rate_text(double rate_hz) {
   return fmt::format("{:.6g}", rate_hz < 1.0 ? rate_hz : std::round(rate_hz * 1e3) / 1e3);
 }

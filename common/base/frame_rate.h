@@ -28,6 +28,10 @@ inline constexpr double kLeastFrameRate = 1e-6;
 Result<FrameRate> parse_frame_rate(std::string_view text, double least = kLeastFrameRate,
                                    double most = kMostFrameRate);
 
+/// Returns the seconds of a frame whose decimals were rounded: of 0.0333333 1/30, of 0.0417083 1001/24000.
+/// Others stay: those that lie further off than rounding to four digits explains.
+double exact_frame_s(double frame_s);
+
 /// Formats a rate in frames per second for people, in as many digits as they use: 23.976.
 std::string frame_rate_text(double rate_hz);
 

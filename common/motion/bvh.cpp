@@ -7,6 +7,8 @@
 
 #include "common/base/check.h"
 #include "common/base/file.h"
+#include "common/base/file_kind.h"
+#include "common/base/frame_rate.h"
 #include "common/base/mercy.h"
 #include "common/base/quantile.h"
 #include "common/motion/bvh_body.h"
@@ -455,7 +457,7 @@ Result<MotionHeader> parse_motion_header(TextCursor& cursor, double stated_s) {
         "frame time is \"{}\", it must be within {} .. {} s (--fps states the rate, --motion-fps "
         "that of bake)",
         shown(word), kMinFrameTimeS, kMaxFrameTimeS);
-  header.frame_s = is_fit ? *frame_s : stated_s;
+  header.frame_s = is_fit ? exact_frame_s(*frame_s) : stated_s;
   return header;
 }
 
@@ -722,7 +724,12 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
 
 Result<MotionClip> load_bvh(const std::filesystem::path& path, const BvhOptions& options) {
   ASSIGN_OR_RETURN(const std::string text, load_text(path, kMaxBvhFileBytes));
-  return parse_bvh(text, path.string(), options);
+  Result<MotionClip> clip = parse_bvh(text, path.string(), options);
+  const std::string kind = clip ? std::string() : likely_kind(path);
+  if (kind.empty() || text.starts_with("HIERARCHY")) return clip;
+  Error error = clip.error();
+  error.message += "; " + kind;
+  return error;
 }
 
 }  // namespace strandcast

@@ -55,7 +55,7 @@ std::string error_of(const std::string& text, const BvhOptions& options = kPlain
 TEST(Bvh, RestPoseIsUprightAndOffsetsAddUp) {
   const MotionClip clip = parsed(small_with("1 2 3 0 0 0 0 0 0 0 0 0\n4 5 6 0 0 0 0 0 0 0 0 0"));
   ASSERT_EQ(clip.world_from_head.size(), 2u);
-  EXPECT_DOUBLE_EQ(clip.frame_s, 0.0083333);
+  EXPECT_DOUBLE_EQ(clip.frame_s, 1.0 / 120.0);
   EXPECT_EQ(clip.world_from_head[0].position_m, glm::dvec3(1, 4, 3.5))
       << "the root's channels replace its OFFSET";
   EXPECT_NEAR(angle_between_rad(clip.world_from_head[1].rotation, glm::dquat(1, 0, 0, 0)), 0.0, 1e-12);
@@ -382,10 +382,39 @@ TEST(Bvh, ARateThatThePersonStatesGoesWhereTheFileHasNone) {
   std::string text = small_with(rising_rows(2, {}));
   BvhOptions stated = kPlain;
   stated.frame_s = 0.04;
-  EXPECT_EQ(parsed(text, stated).frame_s, 0.0083333) << "the file says it";
+  EXPECT_EQ(parsed(text, stated).frame_s, 1.0 / 120.0) << "the file says it";
   text.replace(text.find(".0083333"), 8, "0");
   EXPECT_EQ(parsed(text, stated).frame_s, 0.04);
   EXPECT_THAT(error_of(text), HasSubstr("--fps states the rate"));
+}
+
+/// Rounded times would add up: the last of 240 frames came after the end of its clip.
+TEST(Bvh, ARoundedFrameTimeIsThatOfItsRate) {
+  const auto frame_s = [](const std::string& written) {
+    std::string text = small_with(rising_rows(2, {}));
+    text.replace(text.find(".0083333"), 8, written);
+    return parsed(text).frame_s;
+  };
+  EXPECT_EQ(frame_s("0.0333333"), 1.0 / 30.0);
+  EXPECT_EQ(frame_s("0.033333"), 1.0 / 30.0);
+  EXPECT_EQ(frame_s("0.04166667"), 1.0 / 24.0);
+  EXPECT_EQ(frame_s("0.008333"), 1.0 / 120.0);
+  EXPECT_EQ(frame_s("0.0333667"), 1001.0 / 30'000.0);
+  EXPECT_EQ(frame_s("0.041708"), 1001.0 / 24'000.0);
+  for (const char* const other : {"0.0333", "0.0416", "0.0217", "1.5"})
+    EXPECT_EQ(frame_s(other), std::stod(other)) << "it may be meant";
+}
+
+TEST(Bvh, AFileOfAnotherKindIsCalledThat) {
+  const TemporaryFolder folder;
+  for (const auto& [begin, said] : {std::pair("\x1f\x8b", "packed by gzip"),
+                                    {"Kaydara FBX Binary", "it is FBX"},
+                                    {"\xff\xfeH", "UTF-16"},
+                                    {"", "it is empty"}}) {
+    const auto clip = load_bvh(folder.write("walk.bvh", begin), kPlain);
+    ASSERT_FALSE(clip);
+    EXPECT_THAT(clip.error().to_string(), HasSubstr(said));
+  }
 }
 
 TEST(Bvh, DecimalCommasAreRead) {
@@ -393,7 +422,7 @@ TEST(Bvh, DecimalCommasAreRead) {
   std::string commas = small_with(row + row);
   std::replace(commas.begin(), commas.end(), '.', ',');
   EXPECT_EQ(parsed(commas).world_from_head, parsed(small_with(row + row)).world_from_head);
-  EXPECT_EQ(parsed(commas).frame_s, 0.0083333);
+  EXPECT_EQ(parsed(commas).frame_s, 1.0 / 120.0);
   EXPECT_THAT(error_of(small_with(row + "1,000,000 0 0 0 0 0 0 0 0 0 0 0\n")), HasSubstr("\"1,000,000\""));
 }
 
