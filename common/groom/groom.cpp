@@ -18,8 +18,8 @@ bool is_inside_extent(const glm::vec3& point) {
 Status validate_sizes(const Groom& groom) {
   if (groom.offset.size() < 2) return make_error(ErrorCode::BadInput, "the groom has no strands");
   if (groom.offset.size() - 1 > kMaxStrandCount) {
-    return make_error(ErrorCode::LimitExceeded, "{} strands, at most {} are allowed", groom.offset.size() - 1,
-                      kMaxStrandCount);
+    return make_error(ErrorCode::LimitExceeded, "{} strands, at most {} are allowed: export fewer of them",
+                      groom.offset.size() - 1, kMaxStrandCount);
   }
   const uint64_t vertex_total = groom.rest_position_m.size();
   if (vertex_total > kMaxGroomVertices) {

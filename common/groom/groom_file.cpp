@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 
+#include "common/base/file_kind.h"
 #include "common/base/quantile.h"
 #include "common/base/text.h"
 #include "common/base/units.h"
@@ -28,10 +29,10 @@ Status check_options(const GroomFileOptions& options) {
     return make_error(ErrorCode::BadInput, "unit_m is {}, it has to be above 0, or 0 to be guessed",
                       options.unit_m);
   }
-  if (!std::isfinite(options.origin.x) || !std::isfinite(options.origin.y) ||
-      !std::isfinite(options.origin.z)) {
-    return make_error(ErrorCode::BadInput, "origin is ({}, {}, {}), it has to be finite", options.origin.x,
-                      options.origin.y, options.origin.z);
+  const glm::vec3 origin = options.origin.value_or(glm::vec3(0.0f));
+  if (!std::isfinite(origin.x) || !std::isfinite(origin.y) || !std::isfinite(origin.z)) {
+    return make_error(ErrorCode::BadInput, "origin is ({}, {}, {}), it has to be finite", origin.x, origin.y,
+                      origin.z);
   }
   if (options.yaw_deg && !std::isfinite(*options.yaw_deg)) {
     return make_error(ErrorCode::BadInput, "yaw_deg is {}, it has to be finite", *options.yaw_deg);
@@ -55,36 +56,6 @@ std::string text_beginning(const std::filesystem::path& path) {
     return c < ' ' && c != '\t' && c != '\n' && c != '\r';
   });
   return has_controls ? std::string() : one_line(begin.substr(0, begin.find('\n')), kShownChars);
-}
-
-/// What a file under another name is by its first bytes, and what to do with it; "" for one that is not
-/// known.
-std::string likely_kind(const std::filesystem::path& path) {
-  struct Kind {
-    std::string_view begin;
-    const char* extension;
-    const char* advice;
-  };
-  constexpr std::array<Kind, 10> kKinds = {{
-      {"HIERARCHY", ".bvh",
-       "it looks like a BVH clip, motion and no hair: strandcast-ctl feed --motion plays it"},
-      {"version 2", ".tfx", "it looks like a TressFX 2 file: call it .tfx"},
-      {{"\0\0\x40\x40", 4}, ".tfx", "it looks like a TressFX file: call it .tfx"},
-      {{"\0\0\x80\x40", 4}, ".tfx", "it looks like a TressFX 4 file: call it .tfx"},
-      {"HAIR", ".hair", "it looks like a .hair file: call it that"},
-      {"ply", ".ply", "it looks like a .ply file: call it that"},
-      {"#usda", ".usda", "it looks like USD as text: call it .usda"},
-      {"PXR-USDC", ".usdc", "it looks like USD in binary: call it .usdc"},
-      {"PK\x03\x04", ".usdz", "it is a zip archive, as USD is packed in: call it .usdz, or unpack it"},
-      {"Ogawa", ".abc", "it looks like Alembic: call it .abc"},
-  }};
-  std::string begin(16, '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
-  begin.resize(static_cast<size_t>(file.gcount()));
-  for (const Kind& kind : kKinds)
-    if (begin.starts_with(kind.begin) && path.extension() != kind.extension) return kind.advice;
-  return {};
 }
 
 /// A file of another kind than its name says is called that.
@@ -132,12 +103,13 @@ Result<StatedGroom> load_by_extension(const std::filesystem::path& path, const G
   if (extension == ".abc") return of_its_kind(path, load_abc(path, options.guides));
   if (extension == ".ply") return of_its_kind(path, load_ply(path, options.strand_vertex_count));
   if (is_usd_extension(extension)) return of_its_kind(path, load_usd(path, options.guides));
-  return at(
-      path.string(),
-      make_error(
-          ErrorCode::Unsupported,
-          "unknown groom file extension '{}', known: .tfx, .hair, .ply, .usd, .usda, .usdc, .usdz, .abc",
-          extension));
+  return of_its_kind(
+      path,
+      at(path.string(),
+         make_error(
+             ErrorCode::Unsupported,
+             "unknown groom file extension '{}', known: .tfx, .hair, .ply, .usd, .usda, .usdc, .usdz, .abc",
+             extension)));
 }
 
 uint32_t most_vertices(const Groom& groom) {
@@ -154,18 +126,9 @@ uint32_t target_vertex_count(uint32_t most, uint32_t wanted) {
 
 /// Adds a part of the hair behind the others.
 void join(StatedGroom& hair, StatedGroom part) {
-  Groom& whole = hair.groom;
-  const uint32_t strands = whole.strand_count();
-  const auto first = static_cast<uint32_t>(whole.rest_position_m.size());
-  join_labels(hair.labels, strands,
-              named(std::move(part.labels), part.groom.strand_count(), part.groom.name));
-  join_list(whole.root_uv, strands, part.groom.root_uv);
-  whole.name += " + " + part.groom.name;
-  for (size_t strand = 1; strand < part.groom.offset.size(); ++strand)
-    whole.offset.push_back(first + part.groom.offset[strand]);
-  whole.rest_position_m.insert(whole.rest_position_m.end(), part.groom.rest_position_m.begin(),
-                               part.groom.rest_position_m.end());
-  whole.pinned.insert(whole.pinned.end(), part.groom.pinned.begin(), part.groom.pinned.end());
+  hair.groom.name += " + " + part.groom.name;
+  append_strands(hair.groom, hair.labels, part.groom,
+                 named(std::move(part.labels), part.groom.strand_count(), part.groom.name));
 }
 
 /// All files of the options in file units, each with what it says.
@@ -219,6 +182,7 @@ Result<JoinedParts> load_parts(const GroomFileOptions& options) {
     whole.notes.insert(whole.notes.end(), part.notes.begin(), part.notes.end());
     join(whole, std::move(part));
   }
+  add_note(whole.notes, settle_labels(whole.groom, whole.labels));
   return JoinedParts{std::move(whole), std::move(apart)};
 }
 
@@ -446,6 +410,19 @@ void turn_ahead(const Groom& groom, const GroomFileOptions& options, PlacedGroom
   }
 }
 
+/// The file's origin; where hair lies as far from it as in a shot, a point of the hair instead.
+glm::vec3 near_origin(const Groom& groom, float unit_m, std::vector<std::string>& notes) {
+  constexpr float kFarM = 20.0f;
+  const glm::vec3 root = groom.rest_position_m.front();
+  const float away_m = glm::length(root) * unit_m;
+  if (!(away_m > kFarM) || glm::length(size_of(groom)) * unit_m > kFarM) return glm::vec3(0.0f);
+  notes.push_back(fmt::format(
+      "the hair lies {:.0f} m from the file's origin and is brought to the head (groom.file.origin states "
+      "where that is)",
+      away_m));
+  return root;
+}
+
 /// Turns, moves and scales a groom in file units. What the options do not say the file may; the rest is
 /// guessed.
 PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
@@ -480,7 +457,7 @@ PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
   }
   placed.material = usable_material(stated.material.scaled(placement.unit_m), placed.notes);
   placed.is_of_head = is_hair_of_head(groom);
-  placement.origin = options.origin;
+  placement.origin = options.origin ? *options.origin : near_origin(groom, placement.unit_m, placed.notes);
   GroomPlacement rest = placement;  // upright by now
   rest.is_z_up = rest.is_upside_down = false;
   for (glm::vec3& point : groom.rest_position_m) point = rest.place(point);

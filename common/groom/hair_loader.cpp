@@ -47,8 +47,8 @@ Result<HairHeader> read_hair_header(const ByteView& file) {
                           file.get<uint32_t>(kArraysAt), file.get<uint32_t>(kDefaultSegmentsAt)};
   if (header.strand_count == 0) return make_error(ErrorCode::BadInput, "0 strands");
   if (header.strand_count > kMaxStrandCount) {
-    return make_error(ErrorCode::LimitExceeded, "{} strands, at most {} are allowed", header.strand_count,
-                      kMaxStrandCount);
+    return make_error(ErrorCode::LimitExceeded, "{} strands, at most {} are allowed: export fewer of them",
+                      header.strand_count, kMaxStrandCount);
   }
   if (header.point_count > kMaxGroomVertices) {
     return make_error(ErrorCode::LimitExceeded, "{} points, at most {} are allowed", header.point_count,

@@ -15,13 +15,19 @@ namespace strandcast {
 
 inline constexpr uint64_t kMaxMeshFileBytes = 64ull << 20;
 
+/// A mesh, and a sentence for each kind of what was left out of its file.
+struct ObjMesh : Mesh {
+  std::vector<std::string> notes;
+};
+
 /// Loads a Wavefront OBJ file: v, vn and f (polygons become triangle fans); other statements are skipped.
 /// Normals are computed if absent, and averaged if a vertex has several. Coordinates are multiplied by
-/// unit_m. BadInput names file and line.
-Result<Mesh> load_obj(const std::filesystem::path& path, float unit_m);
+/// unit_m, and reach up to 1000 kMaxMeshExtentM. Bad lines are left out (common/base/mercy.h). BadInput names
+/// file and line.
+Result<ObjMesh> load_obj(const std::filesystem::path& path, float unit_m);
 
 /// Parses OBJ text like load_obj(); `place` names it in errors.
-Result<Mesh> parse_obj(std::string_view text, const std::string& place, float unit_m);
+Result<ObjMesh> parse_obj(std::string_view text, const std::string& place, float unit_m);
 
 /// Returns area-weighted unit normals of the vertices; +Y for a vertex without triangles.
 std::vector<glm::vec3> compute_normals(const std::vector<glm::vec3>& position_m,

@@ -85,8 +85,8 @@ Status read_strands(PlyRows& rows, const PlyElement& element, PlyRowsRead& read)
                       "element {} has neither a list 'vertex_indices' nor a number 'nsegs' or 'nverts'",
                       strandcast::quoted(element.name));
   if (element.row_count > kMaxStrandCount)
-    return make_error(ErrorCode::LimitExceeded, "{} strands, at most {} are allowed", element.row_count,
-                      kMaxStrandCount);
+    return make_error(ErrorCode::LimitExceeded, "{} strands, at most {} are allowed: export fewer of them",
+                      element.row_count, kMaxStrandCount);
   return take_rows(rows, element, read.notes, [&](uint64_t row) -> Status {
     const double count = list ? static_cast<double>(rows.list(*list).size())
                               : rows.value(segments ? *segments : *vertices) + (segments ? 1.0 : 0.0);
@@ -313,8 +313,8 @@ Result<Groom> strands_of_points(std::vector<glm::vec3> points, uint32_t count,
                       "strand has",
                       points.size(), count);
   if (points.size() / count > kMaxStrandCount)
-    return make_error(ErrorCode::LimitExceeded, "{} strands, at most {} are allowed", points.size() / count,
-                      kMaxStrandCount);
+    return make_error(ErrorCode::LimitExceeded, "{} strands, at most {} are allowed: export fewer of them",
+                      points.size() / count, kMaxStrandCount);
   const std::vector<uint32_t> counts(points.size() / count, count);
   return strands_of_counts(std::move(points), counts, notes);
 }

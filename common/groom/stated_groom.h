@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -49,23 +50,37 @@ struct StrandNames {
   std::vector<uint32_t> of_strand;  // in `name`
 };
 
-/// Adds a list of further strands or vertices to that of the `count` before: kept where all have it.
+/// Of a strand that states none where others do; NaN is a width or coordinate that is not stated.
+inline constexpr int32_t kNoLabel = std::numeric_limits<int32_t>::min();
+
+/// Adds a list of `part_count` further strands or vertices to that of the `count` before. Where one of both
+/// states nothing, all of its are `lacking`.
 template <class T>
-void join_list(std::vector<T>& whole, size_t count, const std::vector<T>& part) {
-  if (count > 0 && (whole.empty() || part.empty()))
-    whole.clear();
-  else
-    whole.insert(whole.end(), part.begin(), part.end());
+void join_list(std::vector<T>& whole, size_t count, const std::vector<T>& part, size_t part_count,
+               const T& lacking) {
+  if (whole.empty() && part.empty()) return;
+  whole.resize(count, lacking);
+  whole.insert(whole.end(), part.begin(), part.end());
+  whole.resize(count + part_count, lacking);
 }
 
-/// Adds the labels of further strands to those of the `strand_count` before.
-inline void join_labels(StrandLabels& whole, size_t strand_count, const StrandLabels& part) {
-  join_list(whole.id, strand_count, part.id);
-  join_list(whole.group, strand_count, part.group);
-  join_list(whole.width, strand_count, part.width);
-  const auto first = static_cast<uint32_t>(whole.object_name.size());
-  for (const uint32_t object : part.object) whole.object.push_back(first + object);
-  whole.object_name.insert(whole.object_name.end(), part.object_name.begin(), part.object_name.end());
+/// Adds strands and their labels behind those of `whole`.
+inline void append_strands(Groom& whole, StrandLabels& labels, const Groom& part, const StrandLabels& own) {
+  const size_t strands = whole.strand_count(), vertices = whole.rest_position_m.size();
+  const size_t more = part.strand_count(), more_vertices = part.rest_position_m.size();
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  join_list(labels.id, strands, own.id, more, kNoLabel);
+  join_list(labels.group, strands, own.group, more, kNoLabel);
+  join_list(labels.width, vertices, own.width, more_vertices, kNone);
+  join_list(whole.root_uv, strands, part.root_uv, more, glm::vec2(kNone));
+  const auto first = static_cast<uint32_t>(labels.object_name.size());
+  for (const uint32_t object : own.object) labels.object.push_back(first + object);
+  labels.object_name.insert(labels.object_name.end(), own.object_name.begin(), own.object_name.end());
+  for (size_t strand = 1; strand < part.offset.size(); ++strand)
+    whole.offset.push_back(static_cast<uint32_t>(vertices) + part.offset[strand]);
+  whole.rest_position_m.insert(whole.rest_position_m.end(), part.rest_position_m.begin(),
+                               part.rest_position_m.end());
+  whole.pinned.insert(whole.pinned.end(), part.pinned.begin(), part.pinned.end());
 }
 
 /// Returns labels in which all strands belong to objects: to this one, if they belong to none.

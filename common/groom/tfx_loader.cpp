@@ -43,8 +43,8 @@ struct TfxHeader {
 Status check_counts(uint32_t strand_count, uint32_t vertex_count) {
   if (strand_count == 0) return make_error(ErrorCode::BadInput, "0 strands");
   if (strand_count > kMaxStrandCount) {
-    return make_error(ErrorCode::LimitExceeded, "{} strands, at most {} are allowed", strand_count,
-                      kMaxStrandCount);
+    return make_error(ErrorCode::LimitExceeded, "{} strands, at most {} are allowed: export fewer of them",
+                      strand_count, kMaxStrandCount);
   }
   if (vertex_count < kMinVertexCount || vertex_count > kMaxSourceVertexCount) {
     return make_error(ErrorCode::BadInput, "{} vertices per strand, allowed are {} to {}", vertex_count,

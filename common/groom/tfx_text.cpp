@@ -73,8 +73,9 @@ Result<TextHeader> read_text_header(TextScan& scan) {
       has_count = true;
       if (header.strand_count == 0) return line_error(scan, ErrorCode::BadInput, "0 strands");
       if (header.strand_count > kMaxStrandCount) {
-        return line_error(scan, ErrorCode::LimitExceeded, "{} strands, at most {} are allowed",
-                          header.strand_count, kMaxStrandCount);
+        return line_error(scan, ErrorCode::LimitExceeded,
+                          "{} strands, at most {} are allowed: export fewer of them", header.strand_count,
+                          kMaxStrandCount);
       }
     } else if (key == "bothEndsImmovable") {
       ASSIGN_OR_RETURN(const uint32_t flag, read_count(scan, "bothEndsImmovable"));

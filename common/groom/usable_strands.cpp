@@ -253,6 +253,43 @@ std::string part_guides(Groom& groom, StrandLabels& labels, std::vector<uint8_t>
                                 : count + " left out (groom.file.guides takes guides alone)";
 }
 
+std::string settle_labels(Groom& groom, StrandLabels& labels) {
+  size_t most = 0;
+  std::string names;
+  // `value_of` makes the next value of what those that are stated say.
+  const auto settle = [&](auto& list, const char* name, size_t strand_share, const auto& is_stated,
+                          auto value_of) {
+    const auto lacking = static_cast<size_t>(
+        std::count_if(list.begin(), list.end(), [&](const auto& value) { return !is_stated(value); }));
+    if (lacking == list.size()) list.clear();
+    if (lacking == 0 || list.empty()) return;
+    most = std::max(most, lacking / strand_share);
+    names += (names.empty() ? "" : ", ") + std::string(name);
+    for (auto& value : list)
+      if (!is_stated(value)) value = value_of();
+  };
+  const auto is_label = [](int32_t value) { return value != kNoLabel; };
+  const auto is_number = [](float value) { return !std::isnan(value); };
+  int64_t next = 0;
+  for (const int32_t id : labels.id) next = std::max(next, int64_t{id} + 1);
+  settle(labels.id, "ids", 1, is_label, [&] {
+    return static_cast<int32_t>(std::min(next++, int64_t{std::numeric_limits<int32_t>::max()}));
+  });
+  settle(labels.group, "groups", 1, is_label, [] { return 0; });
+  std::vector<float> widths;
+  std::copy_if(labels.width.begin(), labels.width.end(), std::back_inserter(widths), is_number);
+  const float usual = widths.empty() ? 0.0f : quantile(std::move(widths), 0.5);
+  const size_t points =
+      std::max<size_t>(1, groom.rest_position_m.size() / std::max(1u, groom.strand_count()));
+  settle(labels.width, "widths", points, is_number, [&] { return usual; });
+  settle(
+      groom.root_uv, "coordinates of roots", 1, [](const glm::vec2& uv) { return !std::isnan(uv.x); },
+      [] { return glm::vec2(0.0f); });
+  if (names.empty()) return {};
+  return fmt::format("{} of {} strands do not state what others do ({}): it is filled in",
+                     std::max<size_t>(most, 1), groom.strand_count(), names);
+}
+
 void keep_strands(Groom& groom, StrandLabels& labels, std::span<const uint8_t> is_kept) {
   const auto keep = [&](auto& list, const auto& begin_of) {
     if (list.empty()) return;

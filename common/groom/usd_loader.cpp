@@ -164,11 +164,11 @@ HairMaterial material_of(const UsdStage& stage, std::vector<std::string>& notes)
   return material;
 }
 
-Status add_curves(UsdStage& stage, size_t prim, Groom& groom, StrandLabels& labels, Tally& tally) {
+Status add_curves(UsdStage& stage, size_t prim, Groom& whole, StrandLabels& labels, Tally& tally) {
   UsdCurves& curves = *stage.prim[prim].curves;
   RETURN_IF_ERROR(check_counts(curves, stage.notes));
-  if (groom.strand_count() + curves.vertex_counts.size() > kMaxStrandCount ||
-      groom.rest_position_m.size() + curves.points.size() > kMaxGroomVertices)
+  if (whole.strand_count() + curves.vertex_counts.size() > kMaxStrandCount ||
+      whole.rest_position_m.size() + curves.points.size() > kMaxGroomVertices)
     return make_error(ErrorCode::LimitExceeded, "more than {} strands or {} vertices", kMaxStrandCount,
                       kMaxGroomVertices);
   ASSIGN_OR_RETURN(const CurveKind kind, kind_of(curves));
@@ -177,6 +177,8 @@ Status add_curves(UsdStage& stage, size_t prim, Groom& groom, StrandLabels& labe
   if (rest == RestShape::Elsewhere) ++tally.rests_elsewhere;
   if (rest == RestShape::InPlace) ++tally.rests;
   const std::span<const glm::vec3> points(rest == RestShape::InPlace ? curves.rest_points : curves.points);
+  Groom groom;
+  groom.offset.push_back(0);
   size_t first = 0;
   for (size_t curve = 0; curve < curves.vertex_counts.size(); ++curve) {
     const auto control = points.subspan(first, curves.vertex_counts[curve]);
@@ -198,14 +200,12 @@ Status add_curves(UsdStage& stage, size_t prim, Groom& groom, StrandLabels& labe
   const StrandLabels own =
       labels_of(curves, std::cbrt(std::abs(glm::determinant(glm::dmat3(world)))), stage.prim[prim].name);
   if (own.width.empty() && !curves.widths.empty()) ++tally.unfit_widths;
-  join_labels(labels, groom.strand_count() - strands, own);
-  std::vector<glm::vec2> uv;
   const auto is_finite_number = [](auto value) { return std::isfinite(value); };
   const bool has_uv = curves.root_uv.size() == 2 * strands &&
                       std::all_of(curves.root_uv.begin(), curves.root_uv.end(), is_finite_number);
   for (size_t i = 0; has_uv && i < strands; ++i)
-    uv.emplace_back(curves.root_uv[2 * i], curves.root_uv[2 * i + 1]);
-  join_list(groom.root_uv, groom.strand_count() - strands, uv);
+    groom.root_uv.emplace_back(curves.root_uv[2 * i], curves.root_uv[2 * i + 1]);
+  append_strands(whole, labels, groom, own);
   const auto is_guide = [&](size_t strand) {
     const std::vector<double>& told = curves.guides;
     const bool fits = told.size() == strands || told.size() == 1;
@@ -374,6 +374,7 @@ Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source, GuideUse gu
   stated.notes = notes_of(stage, tally);
   stated.material = material_of(stage, stated.notes);
   add_note(stated.notes, part_guides(stated.groom, stated.labels, std::move(tally.is_guide), guides));
+  add_note(stated.notes, settle_labels(stated.groom, stated.labels));
   stated.groom = with_pinning(std::move(stated.groom), Pinning::Root);
   return with_usable_strands(std::move(stated));
 }

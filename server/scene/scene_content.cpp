@@ -81,16 +81,17 @@ Result<Groom> load_target_of(const SceneDesc& scene, const Groom& groom) {
 }
 
 /// Meshes of the groom's file: the same unit, axes and origin. Several are joined.
-Result<Mesh> load_head_meshes(const HeadDesc& head, const GroomPlacement& placement) {
+Result<ObjMesh> load_head_meshes(const HeadDesc& head, const GroomPlacement& placement) {
   std::vector<std::filesystem::path> paths = {head.mesh_path};
   paths.insert(paths.end(), head.more_mesh_paths.begin(), head.more_mesh_paths.end());
   // A file in centimetres has its head at 160: limits are of metres.
   GroomPlacement of_metres = placement;
   of_metres.unit_m = 1.0f;
   of_metres.origin *= placement.unit_m;
-  Mesh whole;
+  ObjMesh whole;
   for (const std::filesystem::path& path : paths) {
-    ASSIGN_OR_RETURN(const Mesh part, load_obj(path, placement.unit_m));
+    ASSIGN_OR_RETURN(const ObjMesh part, load_obj(path, placement.unit_m));
+    for (const std::string& note : part.notes) whole.notes.push_back(path.string() + ": " + note);
     if (whole.triangle.size() + part.triangle.size() > kMaxMeshTriangles)
       return at(path.string(), make_error(ErrorCode::LimitExceeded,
                                           "{} triangles with the meshes before it, at most {} are allowed",
@@ -104,19 +105,30 @@ Result<Mesh> load_head_meshes(const HeadDesc& head, const GroomPlacement& placem
 }
 
 /// The head under the hair as loaded, drawn or not.
-Result<Mesh> make_head_under(const SceneDesc& scene, const Groom& groom, const GroomPlacement& placement) {
+Result<ObjMesh> make_head_under(const SceneDesc& scene, const Groom& groom, const GroomPlacement& placement) {
   const HeadDesc& desc = scene.head;
   if (!desc.mesh_path.empty()) return load_head_meshes(desc, placement);
   if (!std::holds_alternative<FileGroomDesc>(scene.groom)) {
     const FittedSphere skull{head_center(desc), desc.radius_m > 0.0f ? desc.radius_m : kDefaultHeadRadiusM};
-    return HeadShape(groom, skull, HeadFit::BustOnly).mesh();
+    return ObjMesh{HeadShape(groom, skull, HeadFit::BustOnly).mesh(), {}};
   }
   // Under a groom from a file the built-in head is fitted, but for what the scene says of it.
   FittedSphere fitted = fit_head(groom);
   if (desc.has_center) fitted.center_m = desc.center_m;
   const HeadFit fit = desc.radius_m > 0.0f ? HeadFit::BustOnly : HeadFit::Whole;
   if (fit == HeadFit::BustOnly) fitted.radius_m = desc.radius_m;
-  return HeadShape(groom, fitted, fit).mesh();
+  return ObjMesh{HeadShape(groom, fitted, fit).mesh(), {}};
+}
+
+/// A mesh beyond what a head's may reach is of another unit: `unlikely` may say of which.
+Status check_extent(const Mesh& head, const SceneDesc& scene, const std::string& unlikely) {
+  float largest = 0.0f;
+  for (const glm::vec3& point : head.position_m)
+    for (int axis = 0; axis < 3; ++axis) largest = std::max(largest, std::abs(point[axis]));
+  if (largest <= kMaxMeshExtentM) return {};
+  return at(scene.head.mesh_path.string(),
+            make_error(ErrorCode::BadInput, "a coordinate of {} m, allowed is +-{} m: check the unit{}{}",
+                       largest, kMaxMeshExtentM, unlikely.empty() ? "" : "; ", unlikely));
 }
 
 }  // namespace
@@ -164,9 +176,14 @@ Result<SceneContent> load_scene_content(const SceneDesc& scene) {
   }
   Mesh head;
   if (has_head) {
-    ASSIGN_OR_RETURN(head, make_head_under(scene, content.groom, placement));
-    if (!scene.head.mesh_path.empty())
-      add_sentence(content.unlikely, unfit_mesh(head, content.groom, placement.place(glm::vec3(0.0f))));
+    ASSIGN_OR_RETURN(ObjMesh under, make_head_under(scene, content.groom, placement));
+    content.notes.insert(content.notes.end(), under.notes.begin(), under.notes.end());
+    head = std::move(under);
+    const bool is_of_file = !scene.head.mesh_path.empty();
+    const std::string unlikely =
+        is_of_file ? unfit_mesh(head, content.groom, placement.place(glm::vec3(0.0f))) : std::string();
+    RETURN_IF_ERROR(check_extent(head, scene, unlikely));
+    add_sentence(content.unlikely, unlikely);
   }
   if (std::holds_alternative<FileGroomDesc>(scene.groom))
     content.groom = restyled(std::move(content.groom), scene.hair.length, scene.hair.curl);

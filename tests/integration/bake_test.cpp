@@ -306,6 +306,17 @@ TEST_F(Bake, AClipIsNumberedFilesOfPly) {
   EXPECT_GT(entries("out"), 15u) << said();
 }
 
+/// One of the numbered files would be the hair itself.
+TEST_F(Bake, AFileOfTheSequenceThatIsReadIsNotWrittenOver) {
+  std::filesystem::copy_file(path("hair.usda"), path("out_0001.ply"));
+  EXPECT_EQ(run({path("out_0001.ply"), "--motion", path("walk.bvh"), path("out.ply")}), 2);
+  EXPECT_THAT(said(), HasSubstr("out_0001.ply is read, and would be written over"));
+  EXPECT_EQ(*load_text(path("out_0001.ply"), 1 << 20), *load_text(path("hair.usda"), 1 << 20));
+  std::filesystem::create_directory(path("folder.abc"));
+  EXPECT_EQ(run({"--at", "0", path("folder.abc")}), 2);
+  EXPECT_THAT(said(), HasSubstr("folder.abc is a folder"));
+}
+
 TEST_F(Bake, WhatWasLeftOutAndAssumedOfTheHairIsSaidFirst) {
   std::string text = *load_text(path("hair.usda"), 1 << 20);
   const std::string points = "point3f[] points = [(";

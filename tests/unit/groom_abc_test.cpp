@@ -302,7 +302,8 @@ TEST_F(AbcTest, GuidesOfAnObjectOfTheirOwnNeedNoRootCoordinates) {
     const auto groom = read_abc(file.finish({std::move(hair), std::move(other)}));
     ASSERT_TRUE(groom) << groom.error().to_string();
     EXPECT_EQ(groom->groom.strand_count(), is_guide == 1 ? 2u : 4u);
-    EXPECT_EQ(groom->groom.root_uv, is_guide == 1 ? uv : std::vector<glm::vec2>());
+    const std::vector<glm::vec2> filled = {uv[0], uv[1], glm::vec2(0.0f), glm::vec2(0.0f)};
+    EXPECT_EQ(groom->groom.root_uv, is_guide == 1 ? uv : filled);
   }
 }
 

@@ -362,7 +362,7 @@ TEST(GroomFile, NamesTheKnownExtensionsAndWrongOptions) {
   options.vertex_count = 65;
   EXPECT_THAT(load_groom(options).error().message, HasSubstr("vertex_count is 65"));
   options.vertex_count = 0;
-  options.origin.y = kNan;
+  options.origin = glm::vec3(0.0f, kNan, 0.0f);
   EXPECT_THAT(load_groom(options).error().message, HasSubstr("origin is (0, nan, 0)"));
 }
 
@@ -373,7 +373,7 @@ TEST(GroomFile, TurnsMovesAndScalesInThatOrder) {
   GroomFileOptions options;
   options.path = folder.write("a.tfx", file.text());
   options.unit_m = 0.1f;
-  options.origin = {0.0f, 1.0f, 0.0f};
+  options.origin = glm::vec3(0.0f, 1.0f, 0.0f);
   const auto upright = load_groom(options);
   ASSERT_TRUE(upright);
   EXPECT_NEAR(glm::distance(upright->rest_position_m[1], glm::vec3(0.1f, 0.1f, 0.3f)), 0.0f, 1e-6f);
@@ -383,6 +383,33 @@ TEST(GroomFile, TurnsMovesAndScalesInThatOrder) {
   EXPECT_NEAR(glm::distance(turned->rest_position_m[1], glm::vec3(0.1f, 0.2f, -0.2f)), 0.0f, 1e-6f);
   options.pinning = Pinning::RootPair;
   EXPECT_EQ(load_groom(options)->pinned, (std::vector<uint8_t>{1, 1, 0, 0, 1, 1, 0, 0}));
+}
+
+/// A character of a shot stands anywhere.
+TEST(GroomFile, HairFarFromItsOriginIsBroughtToTheHead) {
+  const TemporaryFolder folder;
+  ByteFile file = small_v4();
+  GroomFileOptions options;
+  options.path = folder.write("near.tfx", file.text());
+  options.unit_m = 1.0f;
+  const auto near = load_placed_groom(options);
+  ASSERT_TRUE(near) << near.error().to_string();
+  const glm::vec3 away(120.0f, 0.0f, -40.0f);
+  for (size_t vertex = 0; vertex < near->groom.rest_position_m.size(); ++vertex)
+    for (int axis = 0; axis < 3; ++axis)
+      file.patch(160 + 16 * vertex + 4 * static_cast<size_t>(axis),
+                 near->groom.rest_position_m[vertex][axis] + away[axis]);
+  options.path = folder.write("far.tfx", file.text());
+  const auto far = load_placed_groom(options);
+  ASSERT_TRUE(far) << far.error().to_string();
+  EXPECT_THAT(far->notes, Contains(HasSubstr("126 m from the file's origin")));
+  for (size_t vertex = 0; vertex < far->groom.rest_position_m.size(); ++vertex) {
+    const glm::vec3 in_file = far->groom.rest_position_m[vertex] + far->placement.origin;
+    EXPECT_NEAR(glm::distance(in_file, near->groom.rest_position_m[vertex] + away), 0.0f, 1e-4f);
+  }
+  options.origin = glm::vec3(0.0f);
+  EXPECT_THAT(load_placed_groom(options).error().message, HasSubstr("allowed is +-100 m"))
+      << "as it is stated";
 }
 
 TEST(GroomBrokenFiles, TextUnderTheWrongNameIsCalledText) {
@@ -425,6 +452,9 @@ TEST(GroomBrokenFiles, AFileUnderAnotherNameIsCalledWhatItIs) {
   EXPECT_THAT(refused("ply\nformat ascii 1.0\n", "c.hair"), HasSubstr("a .ply file: call it that"));
   EXPECT_THAT(refused("Ogawa" + std::string(40, '\1'), "d.ply"), HasSubstr("Alembic: call it .abc"));
   EXPECT_THAT(refused("Ogawa" + std::string(40, '\1'), "d.abc"), Not(HasSubstr("looks like")));
+  EXPECT_THAT(refused("\x1f\x8b" + std::string(40, '\1'), "hair.ply.gz"), HasSubstr("packed by gzip"));
+  EXPECT_THAT(refused("ply\nformat ascii 1.0\n", "hair"), HasSubstr("looks like a .ply file"));
+  EXPECT_THAT(refused("", "hair.ply"), HasSubstr("it is empty"));
   EXPECT_THAT(refused("noise", "e.ply"), Not(HasSubstr("looks like")));
 }
 

@@ -14,7 +14,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-Result<Mesh> load(const std::string& text, float unit_m = 1.0f) {
+Result<ObjMesh> load(const std::string& text, float unit_m = 1.0f) {
   static const TemporaryFolder folder;
   return load_obj(folder.write("made.obj", text), unit_m);
 }
@@ -58,8 +58,6 @@ TEST(Obj, NamesLineAndOffendingWord) {
   EXPECT_THAT(refusal(kSquare + "f -5 1 2\n"), HasSubstr("vertex index -5"));
   EXPECT_THAT(refusal(kSquare + "f 1 2 99999999999999999999\n"), HasSubstr("'99999999999999999999'"));
   EXPECT_THAT(refusal(kSquare + "f 1 2 -9223372036854775808\n"), HasSubstr("does not exist"));
-  EXPECT_THAT(refusal(kSquare + "f 1//1 2//1 3//1\n"), HasSubstr("normal index 1 does not exist, 0 are"));
-  EXPECT_THAT(refusal(kSquare + "f 1/1/ 2/1/ 3/1/\n"), HasSubstr("normal index is ''"));
   EXPECT_THAT(refusal(kSquare + "f a b c\n"), HasSubstr("'a'"));
   EXPECT_THAT(refusal(kSquare + "f /1 /2 /3\n"), HasSubstr("vertex index is ''"));
   EXPECT_THAT(refusal(kSquare + "f 1 2\n"), HasSubstr("2 corners"));
@@ -74,6 +72,45 @@ TEST(Obj, NamesLineAndOffendingWord) {
   EXPECT_THAT(refusal(""), HasSubstr("no faces"));
   EXPECT_FALSE(load(kSquare + "f 1 2 3", 0.0f));
   EXPECT_FALSE(load(kSquare + "f 1 2 3", NAN));
+}
+
+TEST(Obj, BadLinesAreLeftOutAndCounted) {
+  std::string square = kSquare;
+  for (int i = 0; i < 40; ++i) square += "f 1 2 3\n";
+  const auto whole = load(square);
+  ASSERT_TRUE(whole);
+  EXPECT_TRUE(whole->notes.empty());
+  const auto mesh = load(square + "v nan 0 0\nf 1 2 99\nf 5 2 3\nf 1 2");
+  ASSERT_TRUE(mesh) << mesh.error().to_string();
+  EXPECT_EQ(mesh->triangle, whole->triangle);
+  ASSERT_EQ(mesh->notes.size(), 1u);
+  EXPECT_THAT(mesh->notes.front(),
+              AllOf(HasSubstr("4 of 48 lines"), HasSubstr("made.obj:45"), HasSubstr("'nan'")));
+  // Faces of a vertex that cannot be read go with it: too many here.
+  EXPECT_THAT(refusal("v nan 0 0\n" + square), HasSubstr("made.obj:1"));
+}
+
+TEST(Obj, NormalsThatAreNotThereAreComputed) {
+  const auto mesh = load(kSquare + "f 1//1 2/1/ 3/3/3\n");
+  ASSERT_TRUE(mesh) << mesh.error().to_string();
+  EXPECT_EQ(mesh->normal.front(), load(kSquare + "f 1 2 3\n")->normal.front());
+}
+
+TEST(Obj, DecimalCommasAreRead) {
+  EXPECT_EQ(load("v 0,125 1,5 -0,25\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")->position_m.front(),
+            glm::vec3(0.125f, 1.5f, -0.25f));
+  EXPECT_EQ(load("v 1,2,3\nv 1, 0, 0\nv 0 1 0\nf 1 2 3\n")->position_m.front(), glm::vec3(1, 2, 3));
+}
+
+TEST(Obj, OtherFilesAreToldWhatIsRead) {
+  const TemporaryFolder folder;
+  for (const auto& [name, text, said] :
+       {std::tuple("head.glb", "glTF", "it is binary glTF, which is not read"),
+        {"head.stl", "solid", "only Wavefront .obj is read"}}) {
+    const auto mesh = load_obj(folder.write(name, text), 1.0f);
+    ASSERT_FALSE(mesh);
+    EXPECT_THAT(mesh.error().to_string(), HasSubstr(said));
+  }
 }
 
 TEST(Obj, StopsAtTheTriangleLimit) {
