@@ -59,6 +59,32 @@ Result<std::optional<HairOrigin>> origin_of(const BakedStates& states) {
   return std::optional(std::move(origin));
 }
 
+/// Refuses a file to write that is read.
+Status keep_inputs(const BakeCommand& command, const std::filesystem::path& out) {
+  std::vector<std::string> read(command.exported.paths.begin(), command.exported.paths.end() - 1);
+  read.insert(read.end(), {command.feed.motion, command.feed.wind});
+  std::error_code failure;
+  for (const std::string& path : read)
+    if (std::filesystem::equivalent(path, out, failure))
+      return make_error(ErrorCode::BadInput,
+                        "{} is read, and would be written over: name another file to write", out.string());
+  return {};
+}
+
+/// Likewise of numbered files beside a name: "hair_0001.ply" of "hair.ply".
+Status keep_numbered_inputs(const BakeCommand& command, const std::filesystem::path& out) {
+  const std::filesystem::path folder = out.has_parent_path() ? out.parent_path() : ".";
+  const std::string begin = out.stem().string() + "_";
+  std::error_code failure;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, failure)) {
+    const std::string name = entry.path().stem().string();
+    const bool is_numbered = entry.path().extension() == out.extension() && name.starts_with(begin) &&
+                             name.find_first_not_of("0123456789", begin.size()) == std::string::npos;
+    if (is_numbered) RETURN_IF_ERROR(keep_inputs(command, entry.path()));
+  }
+  return {};
+}
+
 /// No file of a person's is written over: neither one that is read, nor one that stands where the file to
 /// write was left out.
 Status check_paths(const BakeCommand& command) {
@@ -75,12 +101,9 @@ Status check_paths(const BakeCommand& command) {
   });
   if (motion != hair.end())
     return make_error(ErrorCode::BadInput, "{} is motion, not hair: --motion {}", *motion, *motion);
-  std::vector<std::string> read = hair;
-  read.insert(read.end(), {command.feed.motion, command.feed.wind});
-  for (const std::string& path : read)
-    if (std::filesystem::equivalent(path, out, failure))
-      return make_error(ErrorCode::BadInput,
-                        "{} is read, and would be written over: name another file to write", out);
+  if (std::filesystem::is_directory(out, failure))
+    return make_error(ErrorCode::BadInput, "{} is a folder: name a file to write", out);
+  RETURN_IF_ERROR(keep_inputs(command, out));
   if (names_none && std::filesystem::exists(out, failure))
     return make_error(
         ErrorCode::BadInput,
@@ -99,6 +122,8 @@ Result<ExportReport> bake(const BakeCommand& command, const std::atomic<bool>& s
   }
   ASSIGN_OR_RETURN(const ExportOptions options,
                    bake_export(command, curves ? curves->duration_s() : plan.motion_s));
+  if (options.path.extension() == ".ply" && !options.is_one_frame)
+    RETURN_IF_ERROR(keep_numbered_inputs(command, options.path));
   ASSIGN_OR_RETURN(const std::filesystem::path server, find_server_program(command.server));
   ASSIGN_OR_RETURN(auto states, BakedStates::start(server, server_words(command), stop));
   for (const std::string& note : states->hair_notes()) std::cerr << note << '\n';
