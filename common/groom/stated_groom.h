@@ -50,7 +50,7 @@ struct StrandNames {
   std::vector<uint32_t> of_strand;  // in `name`
 };
 
-/// Of a strand that states none where others do; NaN is a width or coordinate that is not stated.
+/// The label of a strand that states none where others do. A width or coordinate that is not stated is NaN.
 inline constexpr int32_t kNoLabel = std::numeric_limits<int32_t>::min();
 
 /// Adds a list of `part_count` further strands or vertices to that of the `count` before. Where one of both
