@@ -45,7 +45,8 @@ Result<ExportOptions> bake_export(const BakeCommand& command, double motion_s) {
   // A clip's frames are numbered files of .ply.
   if (!exported.at_s && motion_s > 0.0) options.is_one_frame = false;
   if (options.is_one_frame) options.to_s = options.from_s;
-  if (!options.to_s && motion_s > 0.0) options.to_s = std::max(motion_s, options.from_s);
+  if (!options.to_s && motion_s > 0.0)
+    options.to_s = std::max(bake_end_s(motion_s, options.fps.hz()), options.from_s);
   if (!options.to_s)
     return make_error(ErrorCode::BadInput,
                       "this motion has no end: say --seconds, or give a clip with --motion FILE.bvh");
@@ -57,6 +58,16 @@ Result<std::optional<HairOrigin>> origin_of(const BakedStates& states) {
   if (files == nullptr) return std::optional<HairOrigin>();
   ASSIGN_OR_RETURN(HairOrigin origin, load_origin(*files, *states.scene().asset));
   return std::optional(std::move(origin));
+}
+
+/// Whether a path may be a frame of the numbered files that a clip in .ply is.
+bool is_frame_of(const std::filesystem::path& path, const std::filesystem::path& out) {
+  std::error_code failure;
+  const std::string name = path.stem().string(), begin = out.stem().string() + "_";
+  return out.extension() == ".ply" && path.extension() == ".ply" && name.starts_with(begin) &&
+         name.find_first_not_of("0123456789", begin.size()) == std::string::npos &&
+         std::filesystem::equivalent(std::filesystem::absolute(path).parent_path(),
+                                     std::filesystem::absolute(out).parent_path(), failure);
 }
 
 /// No file of a person's is written over: neither one that is read, nor one that stands where the file to
@@ -75,10 +86,12 @@ Status check_paths(const BakeCommand& command) {
   });
   if (motion != hair.end())
     return make_error(ErrorCode::BadInput, "{} is motion, not hair: --motion {}", *motion, *motion);
+  if (std::filesystem::is_directory(out, failure))
+    return make_error(ErrorCode::BadInput, "{} is a folder: name the file to write", out);
   std::vector<std::string> read = hair;
   read.insert(read.end(), {command.feed.motion, command.feed.wind});
   for (const std::string& path : read)
-    if (std::filesystem::equivalent(path, out, failure))
+    if (std::filesystem::equivalent(path, out, failure) || (!command.exported.at_s && is_frame_of(path, out)))
       return make_error(ErrorCode::BadInput,
                         "{} is read, and would be written over: name another file to write", out);
   if (names_none && std::filesystem::exists(out, failure))
@@ -97,7 +110,7 @@ Result<ExportReport> bake(const BakeCommand& command, const std::atomic<bool>& s
   if (is_of_curves(command.feed.motion)) {
     ASSIGN_OR_RETURN(curves, load_abc_motion(command.feed.motion));
   }
-  ASSIGN_OR_RETURN(const ExportOptions options,
+  ASSIGN_OR_RETURN(ExportOptions options,
                    bake_export(command, curves ? curves->duration_s() : plan.motion_s));
   ASSIGN_OR_RETURN(const std::filesystem::path server, find_server_program(command.server));
   ASSIGN_OR_RETURN(auto states, BakedStates::start(server, server_words(command), stop));
@@ -107,10 +120,11 @@ Result<ExportReport> bake(const BakeCommand& command, const std::atomic<bool>& s
     if (!origin)
       return make_error(ErrorCode::BadInput,
                         "curves move the hair of a file: name it before the file to write");
-    for (const std::string& note : notes_of(*curves, *origin))
-      std::cerr << fmt::format("{}: {}\n", command.feed.motion, note);
+    MotionFile head = head_motion(*curves, *origin, command.feed.motion, command.feed.motion_file);
+    for (const std::string& note : head.notes) std::cerr << note << '\n';
     origin->is_world_at_rest = true;
-    plan.motion = head_motion(std::move(*curves), *origin);
+    ASSIGN_OR_RETURN(options, bake_export(command, head.clip.duration_s()));
+    plan.motion = [clip = std::move(head.clip)](double t_s) { return clip.sample(t_s); };
   }
   states->begin({plan, command.lead_s, options.fps.hz()});
   const LookDesc look = states->simulated().look;
@@ -120,6 +134,7 @@ Result<ExportReport> bake(const BakeCommand& command, const std::atomic<bool>& s
 }  // namespace
 
 void declare_motion_file(CLI::App& app, MotionFileOptions& options, const std::string& prefix) {
+  options.prefix = prefix;
   app.add_option(prefix + "unit", options.unit_m,
                  "Metres per unit of the BVH file, 0 = guessed from the length of the bones")
       ->check(without_nan(CLI::Range(0.0, 1e3)))
@@ -168,6 +183,12 @@ void declare_bake(CLI::App& app, BakeCommand& command) {
       ->allow_extra_args(false);
   app.add_option("--server", command.server, "Server program (default: strandcast-server beside this one)");
   declare_export_options(app, command.exported);
+}
+
+double bake_end_s(double motion_s, double fps) {
+  constexpr double kSameFrame = 0.05;
+  const double frames = motion_s * fps, whole = std::round(frames);
+  return std::abs(frames - whole) < kSameFrame ? whole / fps : motion_s;
 }
 
 std::vector<std::string> server_words(const BakeCommand& command) {

@@ -35,6 +35,10 @@ void declare_motion_file(CLI::App& app, MotionFileOptions& options, const std::s
 /// parsed.
 void declare_bake(CLI::App& app, BakeCommand& command);
 
+/// Returns the end of what a motion of this length makes: its last frame is a whole one, however the clip's
+/// frame time is rounded.
+double bake_end_s(double motion_s, double fps);
+
 /// Returns the words of the server's command line.
 std::vector<std::string> server_words(const BakeCommand& command);
 

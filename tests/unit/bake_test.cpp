@@ -52,6 +52,38 @@ TEST(BakeLead, TheHeadComesFromRestAndArrivesWithTheSpeedOfTheStart) {
   EXPECT_GT(glm::length(mps_of(with_lead(plain, 0.0), 0.0)), 1.0);
 }
 
+// As files have it: 0.0333333, 0.033333.
+TEST(BakeEnd, NoFrameIsLostToARoundedFrameTime) {
+  for (const double fps : {24.0, 30.0, 60.0, 120.0, 24000.0 / 1001.0, 30000.0 / 1001.0})
+    for (const int frames : {2, 60, 89, 300, 600})
+      for (const double digits : {1e6, 1e7, 1e9}) {
+        const double frame_s = std::floor(digits / fps) / digits;
+        const double end_s = bake_end_s(frame_s * (frames - 1), fps);
+        EXPECT_NEAR(end_s * fps, frames - 1, 1e-9) << frames << " at " << fps;
+      }
+  EXPECT_EQ(bake_end_s(1.5 / 30.0, 30.0), 1.5 / 30.0) << "between frames";
+}
+
+TEST(BakePaths, NumberedFilesAreNotWrittenOverTheHairThatIsRead) {
+  const TemporaryFolder folder;
+  const auto said_of = [&](const char* hair, const char* out) {
+    BakeCommand command;
+    command.exported.paths = {folder.write(hair, "no hair").string(), (folder.path() / out).string()};
+    command.server = folder.path() / "none";
+    command.feed.motion = "builtin";
+    command.exported.seconds = 1.0;
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(run_bake(command, false), kBadInputExit);
+    return testing::internal::GetCapturedStderr();
+  };
+  const auto is_caught = testing::HasSubstr("is read, and would be written over");
+  EXPECT_THAT(said_of("hair_0001.ply", "hair.ply"), is_caught);
+  EXPECT_THAT(said_of("hair_12345.ply", "hair.ply"), is_caught);
+  EXPECT_THAT(said_of("hair_a1.ply", "hair.ply"), Not(is_caught));
+  EXPECT_THAT(said_of("hair_0001.ply", "hair.abc"), Not(is_caught));
+  EXPECT_THAT(said_of("other_0001.ply", "hair.ply"), Not(is_caught));
+}
+
 TEST(BakeSteps, AStateIsAskedForWhereAFrameIs) {
   EXPECT_EQ(steps_between(60.0, 30.0), 2u);
   EXPECT_EQ(steps_between(120.0, 24.0), 5u);

@@ -546,6 +546,10 @@ TEST(MotionFile, DoubtsAStatedUnitAndAxisThatMakeNoBody) {
   const auto z_up = load_motion_file(clip, {.unit_m = 0.0, .up = "z", .joint = ""});
   ASSERT_TRUE(z_up) << z_up.error().to_string();
   EXPECT_THAT(z_up->notes, testing::Contains(HasSubstr("degrees off upright: +Y is likely (--up)")));
+  MotionFileOptions of_bake;
+  of_bake.prefix = "--motion-";
+  EXPECT_THAT(load_motion_file(clip, of_bake)->notes,
+              testing::Contains(HasSubstr("(--motion-unit states another)")));
   const auto right = load_motion_file(clip, {.unit_m = 0.01, .up = "y", .joint = ""});
   ASSERT_TRUE(right) << right.error().to_string();
   EXPECT_THAT(right->notes, Not(testing::Contains(HasSubstr("is likely"))));
