@@ -132,7 +132,10 @@ std::vector<glm::vec3> compute_normals(const std::vector<glm::vec3>& position_m,
 
 Result<Mesh> load_obj(const std::filesystem::path& path, float unit_m) {
   ASSIGN_OR_RETURN(const std::string text, load_text(path, kMaxMeshFileBytes));
-  return parse_obj(text, path.string(), unit_m);
+  auto mesh = parse_obj(text, path.string(), unit_m);
+  if (mesh || path.extension() == ".obj" || path.extension() == ".OBJ") return mesh;
+  return at(path.string(), make_error(ErrorCode::Unsupported,
+                                      "a head's mesh has to be a Wavefront .obj: export it as that"));
 }
 
 Result<Mesh> parse_obj(std::string_view text, const std::string& place, float unit_m) {

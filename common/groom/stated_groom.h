@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,6 +30,9 @@ struct HairMaterial {
   }
 };
 
+/// Stands for an id or a group that a strand lacks, until all strands are known.
+inline constexpr int32_t kNoLabel = std::numeric_limits<int32_t>::min();
+
 inline constexpr size_t kMaxGroupNameChars = 80;  // that are kept of what a file says
 
 /// What files say of strands besides their shape, in their order; a list is empty where they do not say it.
@@ -49,23 +53,22 @@ struct StrandNames {
   std::vector<uint32_t> of_strand;  // in `name`
 };
 
-/// Adds a list of further strands or vertices to that of the `count` before: kept where all have it.
-template <class T>
-void join_list(std::vector<T>& whole, size_t count, const std::vector<T>& part) {
-  if (count > 0 && (whole.empty() || part.empty()))
-    whole.clear();
-  else
-    whole.insert(whole.end(), part.begin(), part.end());
+/// Makes lists as long as strands and vertices are many; what is added is lacking.
+inline void pad_labels(StrandLabels& labels, size_t strand_count, size_t vertex_count) {
+  labels.id.resize(strand_count, kNoLabel);
+  labels.group.resize(strand_count, kNoLabel);
+  labels.width.resize(vertex_count, std::numeric_limits<float>::quiet_NaN());
 }
 
-/// Adds the labels of further strands to those of the `strand_count` before.
-inline void join_labels(StrandLabels& whole, size_t strand_count, const StrandLabels& part) {
-  join_list(whole.id, strand_count, part.id);
-  join_list(whole.group, strand_count, part.group);
-  join_list(whole.width, strand_count, part.width);
+/// Adds the labels of further strands; lists of both are as long as strands and vertices are many.
+inline void join_labels(StrandLabels& whole, const StrandLabels& part) {
+  const auto join = [](auto& list, const auto& more) { list.insert(list.end(), more.begin(), more.end()); };
+  join(whole.id, part.id);
+  join(whole.group, part.group);
+  join(whole.width, part.width);
   const auto first = static_cast<uint32_t>(whole.object_name.size());
   for (const uint32_t object : part.object) whole.object.push_back(first + object);
-  whole.object_name.insert(whole.object_name.end(), part.object_name.begin(), part.object_name.end());
+  join(whole.object_name, part.object_name);
 }
 
 /// Returns labels in which all strands belong to objects: to this one, if they belong to none.

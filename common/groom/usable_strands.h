@@ -38,6 +38,9 @@ Status settle_empty(const BadItems& empty, uint64_t strand_count, std::vector<st
 /// Returns what to say of it. `by` names what flags them: " (groom_guide)".
 std::string part_guides(Groom& groom, StrandLabels& labels, std::vector<uint8_t> is_guide, GuideUse use,
                         const char* by = "");
+/// Gives strands that lack what others have further ids, a group of their own, the usual width and the
+/// nearest root's coordinates; lists that all lack are cleared. Returns what to say of it.
+std::string fill_lacking(Groom& groom, StrandLabels& labels);
 /// Adds what there is to say.
 inline void add_note(std::vector<std::string>& notes, std::string note) {
   if (!note.empty()) notes.push_back(std::move(note));

@@ -82,7 +82,7 @@ std::vector<std::string> group_names_of(const UsdCurves& curves) {
   return names;
 }
 
-/// Labels of these strands; lists that fit nothing are left out. `scale`: of widths. `own_name`: of strands
+/// Labels of these strands; lists that fit nothing are lacking. `scale`: of widths. `own_name`: of strands
 /// whose group has no name.
 StrandLabels labels_of(const UsdCurves& curves, double scale, const std::string& own_name) {
   const size_t strands = curves.vertex_counts.size();
@@ -195,17 +195,18 @@ Status add_curves(UsdStage& stage, size_t prim, Groom& groom, StrandLabels& labe
     groom.offset.push_back(static_cast<uint32_t>(groom.rest_position_m.size()));
   }
   const size_t strands = curves.vertex_counts.size();
-  const StrandLabels own =
+  StrandLabels own =
       labels_of(curves, std::cbrt(std::abs(glm::determinant(glm::dmat3(world)))), stage.prim[prim].name);
-  if (own.width.empty() && !curves.widths.empty()) ++tally.unfit_widths;
-  join_labels(labels, groom.strand_count() - strands, own);
-  std::vector<glm::vec2> uv;
+  const bool has_widths = !own.width.empty();
+  if (!has_widths && !curves.widths.empty()) ++tally.unfit_widths;
+  pad_labels(own, strands, groom.rest_position_m.size() - groom.offset[groom.strand_count() - strands]);
+  join_labels(labels, own);
   const auto is_finite_number = [](auto value) { return std::isfinite(value); };
   const bool has_uv = curves.root_uv.size() == 2 * strands &&
                       std::all_of(curves.root_uv.begin(), curves.root_uv.end(), is_finite_number);
-  for (size_t i = 0; has_uv && i < strands; ++i)
-    uv.emplace_back(curves.root_uv[2 * i], curves.root_uv[2 * i + 1]);
-  join_list(groom.root_uv, groom.strand_count() - strands, uv);
+  for (size_t i = 0; i < strands; ++i)
+    groom.root_uv.push_back(has_uv ? glm::vec2(curves.root_uv[2 * i], curves.root_uv[2 * i + 1])
+                                   : glm::vec2(NAN));
   const auto is_guide = [&](size_t strand) {
     const std::vector<double>& told = curves.guides;
     const bool fits = told.size() == strands || told.size() == 1;
@@ -215,7 +216,7 @@ Status add_curves(UsdStage& stage, size_t prim, Groom& groom, StrandLabels& labe
   ++tally.curves_prims;
   if (curves.time_code) tally.time_code = curves.time_code;
   if (is_moving(stage, prim)) ++tally.moving_prims;
-  for (const float width : own.width.empty() ? std::vector<float>() : curves.widths) {
+  for (const float width : has_widths ? curves.widths : std::vector<float>()) {
     tally.least_width = tally.most_width == 0.0f ? width : std::min(tally.least_width, width);
     tally.most_width = std::max(tally.most_width, width);
   }
@@ -374,6 +375,7 @@ Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source, GuideUse gu
   stated.notes = notes_of(stage, tally);
   stated.material = material_of(stage, stated.notes);
   add_note(stated.notes, part_guides(stated.groom, stated.labels, std::move(tally.is_guide), guides));
+  add_note(stated.notes, fill_lacking(stated.groom, stated.labels));
   stated.groom = with_pinning(std::move(stated.groom), Pinning::Root);
   return with_usable_strands(std::move(stated));
 }

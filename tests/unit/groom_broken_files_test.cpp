@@ -362,7 +362,7 @@ TEST(GroomFile, NamesTheKnownExtensionsAndWrongOptions) {
   options.vertex_count = 65;
   EXPECT_THAT(load_groom(options).error().message, HasSubstr("vertex_count is 65"));
   options.vertex_count = 0;
-  options.origin.y = kNan;
+  options.origin->y = kNan;
   EXPECT_THAT(load_groom(options).error().message, HasSubstr("origin is (0, nan, 0)"));
 }
 
