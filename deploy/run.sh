@@ -129,7 +129,7 @@ until grep -q '^feeding ' "$out/feed.log"; do
   kill -0 "$feed" 2>/dev/null || { cat "$out/feed.log" >&2; exit 2; }
   sleep 0.1
 done
-grep -v '^feeding ' "$out/feed.log" || true
+sed -e '/^feeding /d' -e 's/\([( ]\)--\(unit\|up\)\b/\1--motion-\2/' "$out/feed.log"  # by the names of options here
 
 if [ -n "$web" ]; then
   link="http://127.0.0.1:$port/"

@@ -59,30 +59,14 @@ Result<std::optional<HairOrigin>> origin_of(const BakedStates& states) {
   return std::optional(std::move(origin));
 }
 
-/// Refuses a file to write that is read.
-Status keep_inputs(const BakeCommand& command, const std::filesystem::path& out) {
-  std::vector<std::string> read(command.exported.paths.begin(), command.exported.paths.end() - 1);
-  read.insert(read.end(), {command.feed.motion, command.feed.wind});
+/// Whether a path may be a frame of the numbered files that a clip in .ply is.
+bool is_frame_of(const std::filesystem::path& path, const std::filesystem::path& out) {
   std::error_code failure;
-  for (const std::string& path : read)
-    if (std::filesystem::equivalent(path, out, failure))
-      return make_error(ErrorCode::BadInput,
-                        "{} is read, and would be written over: name another file to write", out.string());
-  return {};
-}
-
-/// Likewise of numbered files beside a name: "hair_0001.ply" of "hair.ply".
-Status keep_numbered_inputs(const BakeCommand& command, const std::filesystem::path& out) {
-  const std::filesystem::path folder = out.has_parent_path() ? out.parent_path() : ".";
-  const std::string begin = out.stem().string() + "_";
-  std::error_code failure;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, failure)) {
-    const std::string name = entry.path().stem().string();
-    const bool is_numbered = entry.path().extension() == out.extension() && name.starts_with(begin) &&
-                             name.find_first_not_of("0123456789", begin.size()) == std::string::npos;
-    if (is_numbered) RETURN_IF_ERROR(keep_inputs(command, entry.path()));
-  }
-  return {};
+  const std::string name = path.stem().string(), begin = out.stem().string() + "_";
+  return out.extension() == ".ply" && path.extension() == ".ply" && name.starts_with(begin) &&
+         name.find_first_not_of("0123456789", begin.size()) == std::string::npos &&
+         std::filesystem::equivalent(std::filesystem::absolute(path).parent_path(),
+                                     std::filesystem::absolute(out).parent_path(), failure);
 }
 
 /// No file of a person's is written over: neither one that is read, nor one that stands where the file to
@@ -102,8 +86,13 @@ Status check_paths(const BakeCommand& command) {
   if (motion != hair.end())
     return make_error(ErrorCode::BadInput, "{} is motion, not hair: --motion {}", *motion, *motion);
   if (std::filesystem::is_directory(out, failure))
-    return make_error(ErrorCode::BadInput, "{} is a folder: name a file to write", out);
-  RETURN_IF_ERROR(keep_inputs(command, out));
+    return make_error(ErrorCode::BadInput, "{} is a folder: name the file to write", out);
+  std::vector<std::string> read = hair;
+  read.insert(read.end(), {command.feed.motion, command.feed.wind});
+  for (const std::string& path : read)
+    if (std::filesystem::equivalent(path, out, failure) || (!command.exported.at_s && is_frame_of(path, out)))
+      return make_error(ErrorCode::BadInput,
+                        "{} is read, and would be written over: name another file to write", out);
   if (names_none && std::filesystem::exists(out, failure))
     return make_error(
         ErrorCode::BadInput,
@@ -120,10 +109,8 @@ Result<ExportReport> bake(const BakeCommand& command, const std::atomic<bool>& s
   if (is_of_curves(command.feed.motion)) {
     ASSIGN_OR_RETURN(curves, load_abc_motion(command.feed.motion));
   }
-  ASSIGN_OR_RETURN(const ExportOptions options,
+  ASSIGN_OR_RETURN(ExportOptions options,
                    bake_export(command, curves ? curves->duration_s() : plan.motion_s));
-  if (options.path.extension() == ".ply" && !options.is_one_frame)
-    RETURN_IF_ERROR(keep_numbered_inputs(command, options.path));
   ASSIGN_OR_RETURN(const std::filesystem::path server, find_server_program(command.server));
   ASSIGN_OR_RETURN(auto states, BakedStates::start(server, server_words(command), stop));
   for (const std::string& note : states->hair_notes()) std::cerr << note << '\n';
@@ -132,10 +119,11 @@ Result<ExportReport> bake(const BakeCommand& command, const std::atomic<bool>& s
     if (!origin)
       return make_error(ErrorCode::BadInput,
                         "curves move the hair of a file: name it before the file to write");
-    for (const std::string& note : notes_of(*curves, *origin))
-      std::cerr << fmt::format("{}: {}\n", command.feed.motion, note);
+    MotionFile head = head_motion(*curves, *origin, command.feed.motion, command.feed.motion_file);
+    for (const std::string& note : head.notes) std::cerr << note << '\n';
     origin->is_world_at_rest = true;
-    plan.motion = head_motion(std::move(*curves), *origin);
+    ASSIGN_OR_RETURN(options, bake_export(command, head.clip.duration_s()));
+    plan.motion = [clip = std::move(head.clip)](double t_s) { return clip.sample(t_s); };
   }
   states->begin({plan, command.lead_s, options.fps.hz()});
   const LookDesc look = states->simulated().look;
@@ -145,6 +133,7 @@ Result<ExportReport> bake(const BakeCommand& command, const std::atomic<bool>& s
 }  // namespace
 
 void declare_motion_file(CLI::App& app, MotionFileOptions& options, const std::string& prefix) {
+  options.prefix = prefix;
   app.add_option(prefix + "unit", options.unit_m,
                  "Metres per unit of the BVH file, 0 = guessed from the length of the bones")
       ->check(without_nan(CLI::Range(0.0, 1e3)))

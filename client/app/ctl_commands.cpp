@@ -77,47 +77,66 @@ double wrapped(double t_s, double duration_s, bool is_looped) {
   return is_looped && duration_s > 0.0 ? std::fmod(t_s, duration_s) : t_s;
 }
 
-/// Where the head looks on the mean, rad from +Z towards +X; 0 where it looks all around.
-double mean_facing_rad(const MotionClip& clip) {
+/// Where the head looks on the mean, rad from +Z towards +X; nothing where it looks all around.
+std::optional<double> mean_facing_rad(const MotionClip& clip) {
   constexpr double kLeastTogether = 0.5;
   glm::dvec3 sum(0.0);
   for (const Pose& pose : clip.world_from_head) sum += pose.rotation * glm::dvec3(0, 0, 1);
   const double count = static_cast<double>(clip.world_from_head.size());
-  return std::hypot(sum.x, sum.z) < kLeastTogether * count ? 0.0 : std::atan2(sum.x, sum.z);
+  if (std::hypot(sum.x, sum.z) < kLeastTogether * count) return std::nullopt;
+  return std::atan2(sum.x, sum.z);
+}
+
+/// What a clip was taken for, in one sentence.
+std::string taken_for(const MotionClip& clip) {
+  const auto [lowest, highest] =
+      std::minmax_element(clip.world_from_head.begin(), clip.world_from_head.end(),
+                          [](const Pose& a, const Pose& b) { return a.position_m.y < b.position_m.y; });
+  const std::optional<double> facing_rad = mean_facing_rad(clip);
+  return fmt::format(
+      "{} frames, {} per second; one unit is {:.4g} m and {} is up: the head is {:.2f} to {:.2f} m up, and "
+      "looks {}",
+      clip.world_from_head.size(), frame_rate_text(1.0 / clip.frame_s), clip.file_unit_m, clip.up,
+      lowest->position_m.y, highest->position_m.y,
+      facing_rad ? fmt::format("{:.0f} degrees from +Z towards +X on the mean", glm::degrees(*facing_rad))
+                 : "all around");
+}
+
+void print_notes(const FeedOptions& options, const MotionFile& file) {
+  const auto is_told_last = [&](const std::string& note) {
+    return options.is_checking &&
+           std::find(file.unlikely.begin(), file.unlikely.end(), note) != file.unlikely.end();
+  };
+  for (const std::string& note : file.notes)
+    if (!is_told_last(note)) std::cerr << note << '\n';
 }
 
 /// What is called front, left, right and back of the head is so of the clip's mean facing. Returns the turn.
 glm::dquat turned_ahead(MotionClip& clip) {
   constexpr double kAsideRad = 0.02;  // less is ahead
-  const double facing_rad = mean_facing_rad(clip);
+  const double facing_rad = mean_facing_rad(clip).value_or(0.0);
   if (std::abs(facing_rad) < kAsideRad) return {1, 0, 0, 0};
   const Pose turn{{}, glm::angleAxis(-facing_rad, glm::dvec3(0, 1, 0))};
   for (Pose& pose : clip.world_from_head) pose = {turn * pose.position_m, turn.rotation * pose.rotation};
   return turn.rotation;
 }
 
-/// The head under curves that move as one, with as many poses as they have samples.
-Result<MotionClip> clip_of_curves(const FeedOptions& options, const FindHair& find_hair) {
-  auto curves = load_abc_motion(options.motion);
+/// The head under curves that move as one.
+Result<MotionFile> clip_of_curves(const FeedOptions& options, const FindHair& find_hair) {
+  const auto curves = load_abc_motion(options.motion);
   if (!curves) return curves.error();
   if (!find_hair)
     return at(options.motion, make_error(ErrorCode::BadInput,
                                          "curves move the hair of a server's file: only feed to a server, "
                                          "and bake, know it"));
   ASSIGN_OR_RETURN(const HairOrigin hair, find_hair());
-  for (const std::string& note : notes_of(*curves, hair))
-    std::cerr << fmt::format("{}: {}\n", options.motion, note);
-  const size_t count = curves->time_s.size();
-  MotionClip clip;
-  clip.frame_s = curves->duration_s() / static_cast<double>(count - 1);
-  const auto pose_at = head_motion(std::move(*curves), hair);
-  for (size_t i = 0; i < count; ++i)
-    clip.world_from_head.push_back(pose_at(clip.frame_s * static_cast<double>(i)));
-  return clip;
+  MotionFile loaded = head_motion(*curves, hair, options.motion, options.motion_file);
+  print_notes(options, loaded);
+  return loaded;
 }
 
 /// The motion of a BVH file; `turn` is what it was turned by.
-Result<MotionClip> clip_of_file(const FeedOptions& options, glm::dquat& turn) {
+Result<MotionFile> clip_of_file(const FeedOptions& options, glm::dquat& turn) {
   MotionFileOptions file = options.motion_file;
   file.has_body = true;
   if (!options.fps.empty()) {
@@ -131,14 +150,14 @@ Result<MotionClip> clip_of_file(const FeedOptions& options, glm::dquat& turn) {
       std::abs(own_hz / file.fps - 1.0) > kSameRate)
     std::cerr << fmt::format("{}: it has {} frames per second, and --fps {} is left out\n", options.motion,
                              frame_rate_text(own_hz), options.fps);
-  for (const std::string& note : loaded.notes) std::cerr << note << '\n';
+  print_notes(options, loaded);
   if (!options.is_keeping_facing) turn = turned_ahead(loaded.clip);
   if (turn.w < 1.0)
     std::cerr << fmt::format(
         "{}: turned by {:.0f} degrees, and a file of wind with it: then the head looks ahead "
         "on the mean (--keep-facing leaves it)\n",
         options.motion, glm::degrees(2.0 * std::atan2(turn.y, turn.w)));
-  return std::move(loaded.clip);
+  return loaded;
 }
 
 /// Adds motion; `turn` is what it was turned by.
@@ -151,10 +170,12 @@ Status add_motion(const FeedOptions& options, const FindHair& find_hair, FeedPla
     };
     return {};
   }
-  ASSIGN_OR_RETURN(MotionClip clip, is_of_curves(options.motion) ? clip_of_curves(options, find_hair)
+  ASSIGN_OR_RETURN(MotionFile file, is_of_curves(options.motion) ? clip_of_curves(options, find_hair)
                                                                  : clip_of_file(options, turn));
-  const auto path =
-      std::make_shared<const ClipPath>(std::move(clip), ClipPathOptions{options.is_looped, options.blend_s});
+  plan.taken = fmt::format("{}: {}", options.motion, taken_for(file.clip));
+  plan.unlikely = std::move(file.unlikely);
+  const auto path = std::make_shared<const ClipPath>(std::move(file.clip),
+                                                     ClipPathOptions{options.is_looped, options.blend_s});
   length_s = path->duration_s();
   if (path->clip().world_from_head.size() == 1) {
     length_s = 0.0;
@@ -342,6 +363,13 @@ std::string timecode_line(const FeedOptions& options) {
   return options.timecode.empty() ? "" : fmt::format("timecode from {} on\n", options.timecode);
 }
 
+/// Says what a check has found. Returns the exit code.
+int tell_taken(const FeedPlan& plan) {
+  std::cout << plan.taken << '\n';
+  if (plan.unlikely.empty()) return kDoneExit;
+  return ctl_failure(make_error(ErrorCode::BadInput, "{}", fmt::join(plan.unlikely, "; ")), kRefusedExit);
+}
+
 /// As a program of motion capture would.
 int run_mocap_feed(const FeedOptions& options, const FeedPlan& plan, const std::atomic<bool>& stop) {
   const auto encoding = find_mocap_encoding(options.as);
@@ -400,6 +428,7 @@ int run_feed(const CtlTarget& target, const FeedOptions& options, const std::ato
   // Files first: a typing error must not need a server to be found.
   auto plan = make_feed_plan(options, options.as.empty() ? [&] { return hair_of(target); } : FindHair());
   if (!plan) return ctl_failure(plan.error());
+  if (options.is_checking) return tell_taken(*plan);
   if (!options.as.empty()) return run_mocap_feed(options, *plan, stop);
   if (options.rate_hz > kMaxFeedRateHz)
     return ctl_failure(make_error(ErrorCode::BadInput,

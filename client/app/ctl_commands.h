@@ -51,6 +51,7 @@ struct FeedOptions {
   glm::vec3 wind_mps{1.5f, 0.0f, 1.0f};  // mean of the gusts, world
   float gust_intensity = 0.6f;
   uint32_t seed = 1;
+  bool is_checking = false;      // says what files are taken for, and feeds nothing
   std::string as = {};           // protocol of motion capture; empty: to a server as its source
   std::string to = "127.0.0.1";  // HOST or HOST:PORT that gets it
 };

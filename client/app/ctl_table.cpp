@@ -26,6 +26,9 @@ void declare_feed(CLI::App& app, CtlCommandLine& line) {
       ->capture_default_str();
   app.add_option("--wind", feed.wind, "CSV file, gusts or none")->capture_default_str();
   declare_motion_file(app, feed.motion_file, "--");
+  app.add_flag("--check", feed.is_checking,
+               "Say what the files are taken for and leave, with exit code 1 for what no head does; without "
+               "a server, but for .abc");
   app.add_flag("--keep-facing", feed.is_keeping_facing,
                "Do not turn a BVH file that looks aside so that it looks ahead on the mean");
   app.add_flag("--loop", feed.is_looped,

@@ -33,6 +33,8 @@ struct FeedPlan {
   double motion_s = 0.0;                                        // motion time; 0 = without end
   std::function<std::optional<Timecode>(double t_s)> timecode;  // of the motion; empty = none
   bool is_live = false;                                         // in real time whatever the simulation does
+  std::string taken = "no file of motion is named";             // what one is taken for
+  std::vector<std::string> unlikely = {};                       // why no head moves so, a sentence each
 };
 
 /// A simulation that is slower than real time by less than this is not followed.

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -82,6 +84,31 @@ std::vector<glm::vec3> own_rest_points(const FileGroom& hair, const SceneAsset& 
   return rounded == asset.rest_position_m ? points : std::vector<glm::vec3>();
 }
 
+/// Sentences of what was assumed of curves as motion.
+std::vector<std::string> notes_of(const CurveMotion& motion, const HairOrigin& origin) {
+  std::vector<std::string> notes = {
+      fmt::format(
+          "the head goes as {} roots of {} curves object{} do, which move as one: it has no joints of a "
+          "body",
+          motion.root_count, motion.object_count, motion.object_count == 1 ? "" : "s"),
+      fmt::format("one unit is taken as {:.4g} m and +{} as up, as of the hair that it moves", origin.unit_m,
+                  origin.is_z_up ? 'Z' : 'Y')};
+  if (motion.is_behind_rest)
+    notes.emplace_back("its first sample is the rest shape, and the motion begins with the next");
+  return notes;
+}
+
+/// How many even steps follow these times: one for each, or none longer than the shortest between two.
+uint64_t even_steps(const std::vector<double>& time_s) {
+  constexpr double kEven = 0.99, kRounding = 1e-6;
+  const auto count = static_cast<double>(time_s.size() - 1);
+  double shortest_s = time_s.back();
+  for (size_t i = 1; i < time_s.size(); ++i) shortest_s = std::min(shortest_s, time_s[i] - time_s[i - 1]);
+  if (shortest_s > kEven * time_s.back() / count) return time_s.size() - 1;
+  const double most = std::min(time_s.back() / shortest_s, static_cast<double>(kMaxCurveMotionSamples));
+  return static_cast<uint64_t>(std::ceil(most - kRounding));
+}
+
 }  // namespace
 
 Result<HairOrigin> load_origin(const FileGroomDesc& file, const SceneAsset& asset) {
@@ -109,28 +136,25 @@ Result<HairOrigin> load_place(const FileGroomDesc& file) {
   return origin_of(hair.placed.placement, nullptr);
 }
 
-std::function<Pose(double t_s)> head_motion(CurveMotion motion, const HairOrigin& origin) {
+MotionFile head_motion(const CurveMotion& motion, const HairOrigin& origin, const std::string& name,
+                       const MotionFileOptions& options) {
+  MotionFile file;
+  for (const std::string& note : notes_of(motion, origin))
+    file.notes.push_back(fmt::format("{}: {}", name, note));
   const glm::dmat4 head_from_file = glm::inverse(origin.file_from_head);
   const glm::dquat turn = glm::normalize(glm::quat_cast(glm::dmat3(head_from_file) / origin.unit_m));
-  return [motion = std::move(motion), head_from_file, turn,
-          head_in_file = glm::dvec3(origin.file_from_head[3])](double t_s) {
-    const Pose moved = motion.sample(t_s);
-    return Pose{glm::dvec3(head_from_file * glm::dvec4(moved * head_in_file, 1.0)),
-                turn * moved.rotation * glm::conjugate(turn)};
-  };
-}
-
-std::vector<std::string> notes_of(const CurveMotion& motion, const HairOrigin& origin) {
-  std::vector<std::string> notes = {
-      fmt::format(
-          "the head goes as {} roots of {} curves object{} do, which move as one: it has no joints of a "
-          "body",
-          motion.root_count, motion.object_count, motion.object_count == 1 ? "" : "s"),
-      fmt::format("one unit is taken as {:.4g} m and +{} as up, as of the hair that it moves", origin.unit_m,
-                  origin.is_z_up ? 'Z' : 'Y')};
-  if (motion.is_behind_rest)
-    notes.emplace_back("its first sample is the rest shape, and the motion begins with the next");
-  return notes;
+  const auto head_in_file = glm::dvec3(origin.file_from_head[3]);
+  const uint64_t step_count = even_steps(motion.time_s);
+  file.clip.file_unit_m = origin.unit_m;
+  file.clip.up = origin.is_z_up ? "+Z" : "+Y";
+  file.clip.frame_s = motion.duration_s() / static_cast<double>(step_count);
+  for (uint64_t i = 0; i <= step_count; ++i) {
+    const Pose moved = motion.sample(file.clip.frame_s * static_cast<double>(i));
+    file.clip.world_from_head.push_back({glm::dvec3(head_from_file * glm::dvec4(moved * head_in_file, 1.0)),
+                                         turn * moved.rotation * glm::conjugate(turn)});
+  }
+  judge_frames(file, name, options);
+  return file;
 }
 
 Result<SceneDesc> ask_scene(const CtlTarget& target) {

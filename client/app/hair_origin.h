@@ -2,7 +2,6 @@
 // widths, coordinates, unit and axes. A stream has none of it. One thread.
 #pragma once
 
-#include <functional>
 #include <glm/glm.hpp>
 #include <memory>
 #include <string>
@@ -11,6 +10,7 @@
 #include "client/app/ctl_commands.h"
 #include "client/export/export_source.h"
 #include "common/groom/abc_motion.h"
+#include "common/motion/motion_file.h"
 #include "common/scene/scene_desc.h"
 
 namespace strandcast {
@@ -29,12 +29,11 @@ Result<HairOrigin> load_origin(const FileGroomDesc& file, const SceneAsset& asse
 /// Loads where the files have their head, and nothing of the strands.
 Result<HairOrigin> load_place(const FileGroomDesc& file);
 
-/// Returns head motion from curves that lie where these files have their hair. The head is at the world's
-/// origin and unturned with the first sample.
-std::function<Pose(double t_s)> head_motion(CurveMotion motion, const HairOrigin& origin);
-
-/// Returns sentences of what was assumed of curves as motion, as load_motion_file() has them of a clip.
-std::vector<std::string> notes_of(const CurveMotion& motion, const HairOrigin& origin);
+/// Returns the motion of the head under curves that lie where these files have their hair, judged and noted
+/// as that of a clip. The head is at the world's origin and unturned with the file's first sample. Frames are
+/// as far apart as samples; where these are uneven, as the nearest two.
+MotionFile head_motion(const CurveMotion& motion, const HairOrigin& origin, const std::string& name,
+                       const MotionFileOptions& options);
 
 /// Asks a server for the scene of the target's head, as who controls it.
 Result<SceneDesc> ask_scene(const CtlTarget& target);

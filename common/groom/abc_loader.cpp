@@ -108,9 +108,7 @@ class AbcLoading {
     }
     RETURN_IF_ERROR(settle_empty(tally_.empty_strands, tally_.read_strands, notes_));
     guide_note_ = part_guides(groom_, labels_, std::move(is_guide_), guide_use_, " (groom_guide)");
-    if (tally_.groups.empty()) labels_.group.clear();
-    if (!tally_.has_ids) labels_.id.clear();
-    label_note_ = settle_labels(groom_, labels_);
+    lack_note_ = fill_lacking(groom_, labels_);
     if (groom_.strand_count() > 0) return {};
     return make_error(ErrorCode::BadInput, "there are no curves with strands to read{}",
                       tally_.hidden_objects + tally_.closed_objects + tally_.unknown_objects > 0
@@ -184,7 +182,7 @@ class AbcLoading {
     const size_t known = groom_.rest_position_m.size();
     if (curves.points.size() > known) groom_.rest_position_m.reserve(known + curves.points.size());
     tally_.read_strands += curves.vertex_counts.size();
-    if (id) tally_.has_ids = true;
+    tally_.has_ids = tally_.has_ids || id.has_value();
     size_t first = 0;
     for (size_t strand = 0; strand < curves.vertex_counts.size(); ++strand) {
       const size_t count = curves.vertex_counts[strand];
@@ -209,7 +207,7 @@ class AbcLoading {
       constexpr size_t kMostGroups = 1'000;  // that are told apart
       const double group_id = group ? value_of(group, 0) : NAN;
       if (std::isfinite(group_id) && tally_.groups.size() < kMostGroups) tally_.groups.insert(group_id);
-      labels_.group.push_back(group ? whole_number(group_id) : kNoLabel);
+      labels_.group.push_back(std::isfinite(group_id) ? whole_number(group_id) : kNoLabel);
       labels_.id.push_back(id ? whole_number(value_of(id, 0)) : kNoLabel);
       labels_.object.push_back(first_object + names.of_strand[strand]);
       for (size_t i = 0; i < count; ++i) {
@@ -358,7 +356,7 @@ class AbcLoading {
     note(t.unknown_objects,
          left_out(t.unknown_objects, "cubic curves without a basis, Hermite and power curves are not read"));
     add_note(notes, guide_note_);
-    add_note(notes, label_note_);
+    add_note(notes, lack_note_);
     note(t.groups.size() > 1,
          fmt::format("{} groups (groom_group_id) are one head of hair", t.groups.size()));
     note(t.has_ids,
@@ -372,8 +370,7 @@ class AbcLoading {
   StrandLabels labels_;             // of all strands; NaN for widths that are not there
   std::vector<uint8_t> is_guide_;   // of each strand
   const GuideUse guide_use_;
-  std::string label_note_;
-  std::string guide_note_;
+  std::string guide_note_, lack_note_;
   size_t lost_instances_ = 0;
   AbcTally tally_;
 };

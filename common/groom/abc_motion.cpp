@@ -7,13 +7,10 @@
 
 #include "common/groom/abc_curves.h"
 #include "common/groom/abc_tree.h"
-#include "common/math/turn.h"
+#include "common/math/rigid_fit.h"
 
 namespace strandcast {
 namespace {
-
-constexpr int kMostTurns = 100;  // of the search for a rotation
-constexpr double kLastTurnRad = 1e-12;
 
 /// One object of curves, and the sample that was read last.
 struct MovedCurves {
@@ -26,30 +23,6 @@ glm::dvec3 middle_of(std::span<const glm::dvec3> points) {
   glm::dvec3 sum(0.0);
   for (const glm::dvec3& point : points) sum += point;
   return sum / static_cast<double>(points.size());
-}
-
-/// The rotation nearest to what takes `from` to `to` about their middles, found from `guess` on: Mueller,
-/// Bender, Chentanez, Macklin, "A Robust Method to Extract the Rotational Part of Deformations", 2016, eq. 7.
-glm::dquat rotation_between(std::span<const glm::dvec3> from, std::span<const glm::dvec3> to,
-                            glm::dquat guess) {
-  const glm::dvec3 from_middle = middle_of(from), to_middle = middle_of(to);
-  glm::dmat3 moment(0.0);
-  for (size_t i = 0; i < from.size(); ++i)
-    moment += glm::outerProduct(to[i] - to_middle, from[i] - from_middle);
-  for (int turn = 0; turn < kMostTurns; ++turn) {
-    const glm::dmat3 rotation = glm::mat3_cast(guess);
-    glm::dvec3 torque(0.0);
-    double along = 0.0;
-    for (int axis = 0; axis < 3; ++axis) {
-      torque += glm::cross(rotation[axis], moment[axis]);
-      along += glm::dot(rotation[axis], moment[axis]);
-    }
-    if (along == 0.0) break;
-    const glm::dvec3 turn_rad = torque / std::abs(along);
-    guess = turned(guess, turn_rad);
-    if (glm::length(turn_rad) < kLastTurnRad) break;
-  }
-  return guess;
 }
 
 class CurveMotionReading {
@@ -72,8 +45,8 @@ class CurveMotionReading {
       if (roots.size() != first.size())
         return make_error(ErrorCode::BadInput, "{} strands at {:.6g} s, but {} at first: they come and go",
                           roots.size(), time_s, first.size());
-      rotation = rotation_between(first, roots, rotation);
-      const Pose pose{middle_of(roots) - rotation * middle_of(first), rotation};
+      const Pose pose = rigid_fit(first, roots, rotation);
+      rotation = pose.rotation;
       RETURN_IF_ERROR(check_rigid(first, roots, pose, time_s));
       motion.time_s.push_back(time_s - times[begin]);
       motion.from_first.push_back(pose);

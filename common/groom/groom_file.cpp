@@ -30,10 +30,9 @@ Status check_options(const GroomFileOptions& options) {
                       options.unit_m);
   }
   const glm::vec3 origin = options.origin.value_or(glm::vec3(0.0f));
-  if (!std::isfinite(origin.x) || !std::isfinite(origin.y) || !std::isfinite(origin.z)) {
+  if (!std::isfinite(origin.x) || !std::isfinite(origin.y) || !std::isfinite(origin.z))
     return make_error(ErrorCode::BadInput, "origin is ({}, {}, {}), it has to be finite", origin.x, origin.y,
                       origin.z);
-  }
   if (options.yaw_deg && !std::isfinite(*options.yaw_deg)) {
     return make_error(ErrorCode::BadInput, "yaw_deg is {}, it has to be finite", *options.yaw_deg);
   }
@@ -103,13 +102,11 @@ Result<StatedGroom> load_by_extension(const std::filesystem::path& path, const G
   if (extension == ".abc") return of_its_kind(path, load_abc(path, options.guides));
   if (extension == ".ply") return of_its_kind(path, load_ply(path, options.strand_vertex_count));
   if (is_usd_extension(extension)) return of_its_kind(path, load_usd(path, options.guides));
-  return of_its_kind(
-      path,
-      at(path.string(),
-         make_error(
-             ErrorCode::Unsupported,
-             "unknown groom file extension '{}', known: .tfx, .hair, .ply, .usd, .usda, .usdc, .usdz, .abc",
-             extension)));
+  const Error unknown = make_error(
+      ErrorCode::Unsupported,
+      "unknown groom file extension '{}', known: .tfx, .hair, .ply, .usd, .usda, .usdc, .usdz, .abc",
+      extension);
+  return of_its_kind(path, at(path.string(), unknown));
 }
 
 uint32_t most_vertices(const Groom& groom) {
@@ -126,9 +123,22 @@ uint32_t target_vertex_count(uint32_t most, uint32_t wanted) {
 
 /// Adds a part of the hair behind the others.
 void join(StatedGroom& hair, StatedGroom part) {
-  hair.groom.name += " + " + part.groom.name;
-  append_strands(hair.groom, hair.labels, part.groom,
-                 named(std::move(part.labels), part.groom.strand_count(), part.groom.name));
+  Groom& whole = hair.groom;
+  const auto first = static_cast<uint32_t>(whole.rest_position_m.size());
+  const uint32_t strands = part.groom.strand_count();
+  part.labels = named(std::move(part.labels), strands, part.groom.name);
+  pad_labels(hair.labels, whole.strand_count(), first);
+  pad_labels(part.labels, strands, part.groom.rest_position_m.size());
+  join_labels(hair.labels, part.labels);
+  whole.root_uv.resize(whole.strand_count(), glm::vec2(NAN));
+  part.groom.root_uv.resize(strands, glm::vec2(NAN));
+  whole.root_uv.insert(whole.root_uv.end(), part.groom.root_uv.begin(), part.groom.root_uv.end());
+  whole.name += " + " + part.groom.name;
+  for (size_t strand = 1; strand < part.groom.offset.size(); ++strand)
+    whole.offset.push_back(first + part.groom.offset[strand]);
+  whole.rest_position_m.insert(whole.rest_position_m.end(), part.groom.rest_position_m.begin(),
+                               part.groom.rest_position_m.end());
+  whole.pinned.insert(whole.pinned.end(), part.groom.pinned.begin(), part.groom.pinned.end());
 }
 
 /// All files of the options in file units, each with what it says.
@@ -182,7 +192,9 @@ Result<JoinedParts> load_parts(const GroomFileOptions& options) {
     whole.notes.insert(whole.notes.end(), part.notes.begin(), part.notes.end());
     join(whole, std::move(part));
   }
-  add_note(whole.notes, settle_labels(whole.groom, whole.labels));
+  if (parts.size() > 1)
+    if (std::string note = fill_lacking(whole.groom, whole.labels); !note.empty())
+      whole.notes.push_back(std::move(note));
   return JoinedParts{std::move(whole), std::move(apart)};
 }
 
@@ -190,15 +202,6 @@ constexpr std::array kUsualUnitsM = {1.0f, 0.01f, 0.001f, 0.0254f};
 
 std::string unit_text(float unit_m) {
   return unit_m < 0.5f ? fmt::format("{:.4g} mm", unit_m * kMmPerM) : fmt::format("{:.4g} m", unit_m);
-}
-
-glm::vec3 size_of(const Groom& groom) {
-  glm::vec3 low = groom.rest_position_m.front(), high = low;
-  for (const glm::vec3& point : groom.rest_position_m) {
-    low = glm::min(low, point);
-    high = glm::max(high, point);
-  }
-  return high - low;
 }
 
 /// What to say of a unit with which the head under this hair is none of a person; empty where it may be one.
@@ -339,7 +342,7 @@ HairMaterial usable_material(HairMaterial material, std::vector<std::string>& no
 }
 
 std::string size_text(const Groom& groom) {
-  const glm::vec3 size_m = size_of(groom);
+  const glm::vec3 size_m = box_size_of(groom.rest_position_m);
   return fmt::format("{:.2f} x {:.2f} x {:.2f} m", size_m.x, size_m.y, size_m.z);
 }
 
@@ -410,17 +413,20 @@ void turn_ahead(const Groom& groom, const GroomFileOptions& options, PlacedGroom
   }
 }
 
-/// The file's origin; where hair lies as far from it as in a shot, a point of the hair instead.
-glm::vec3 near_origin(const Groom& groom, float unit_m, std::vector<std::string>& notes) {
-  constexpr float kFarM = 20.0f;
-  const glm::vec3 root = groom.rest_position_m.front();
-  const float away_m = glm::length(root) * unit_m;
-  if (!(away_m > kFarM) || glm::length(size_of(groom)) * unit_m > kFarM) return glm::vec3(0.0f);
-  notes.push_back(fmt::format(
-      "the hair lies {:.0f} m from the file's origin and is brought to the head (groom.file.origin states "
-      "where that is)",
-      away_m));
-  return root;
+/// What becomes the origin where nobody states it: of a character far away on its stage the middle of the
+/// roots. Hair that is far for its unit is left there.
+glm::vec3 find_origin(const Groom& groom, PlacedGroom& placed) {
+  constexpr double kFarM = 50.0;
+  glm::dvec3 middle(0.0);
+  for (const glm::vec3& root : roots_of(groom))
+    middle += glm::dvec3(root) / static_cast<double>(groom.strand_count());
+  const double away_m = glm::length(middle) * static_cast<double>(placed.placement.unit_m);
+  if (!placed.unlikely.empty() || !(away_m > kFarM) || !std::isfinite(away_m)) return glm::vec3(0.0f);
+  placed.notes.push_back(
+      fmt::format("it stands {:.4g} m from the origin, and is brought here (groom.file.origin states where "
+                  "the head's joint is)",
+                  away_m));
+  return glm::vec3(middle);
 }
 
 /// Turns, moves and scales a groom in file units. What the options do not say the file may; the rest is
@@ -433,7 +439,7 @@ PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
   Groom& groom = stated.groom;
   GroomPlacement& placement = placed.placement;
   const auto judge_unit = [&](float unit_m) {
-    std::string unlikely = unlikely_unit(unit_m, size_of(groom));
+    std::string unlikely = unlikely_unit(unit_m, box_size_of(groom.rest_position_m));
     // What is guessed is so from that head.
     const bool is_stated = options.unit_m > 0.0f || stated.unit_m;
     if (unlikely.empty() && is_stated) unlikely = unlikely_head(unit_m, groom);
@@ -457,7 +463,7 @@ PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
   }
   placed.material = usable_material(stated.material.scaled(placement.unit_m), placed.notes);
   placed.is_of_head = is_hair_of_head(groom);
-  placement.origin = options.origin ? *options.origin : near_origin(groom, placement.unit_m, placed.notes);
+  placement.origin = options.origin ? *options.origin : find_origin(groom, placed);
   GroomPlacement rest = placement;  // upright by now
   rest.is_z_up = rest.is_upside_down = false;
   for (glm::vec3& point : groom.rest_position_m) point = rest.place(point);

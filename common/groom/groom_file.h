@@ -25,7 +25,8 @@ struct GroomFileOptions {
   std::optional<bool> is_z_up = false;  // as GroomPlacement; empty = as the file says, else guessed
   bool is_upside_down = false;          // likewise, where is_z_up is stated
   std::optional<float> yaw_deg = 0.0f;  // as GroomPlacement; empty = guessed
-  std::optional<glm::vec3> origin;  // as GroomPlacement; empty = that of the file, or near hair far from it
+  // As GroomPlacement; empty = 0, or the middle of likely hair that is far from there.
+  std::optional<glm::vec3> origin = glm::vec3(0.0f);
   // Resample to this many, 2..kMaxVertexCount; 0 = keep, as far as a uniform groom can.
   uint32_t vertex_count = 0;
   std::optional<Pinning> pinning;    // empty: as the file says

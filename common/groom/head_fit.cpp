@@ -94,13 +94,17 @@ std::vector<glm::vec3> roots_of(const Groom& groom) {
   return roots;
 }
 
-float extent_of(const std::vector<glm::vec3>& points) {
+glm::vec3 box_size_of(const std::vector<glm::vec3>& points) {
   glm::vec3 low = points.front(), high = points.front();
   for (const glm::vec3& point : points) {
     low = glm::min(low, point);
     high = glm::max(high, point);
   }
-  return glm::length(high - low);
+  return high - low;
+}
+
+float extent_of(const std::vector<glm::vec3>& points) {
+  return glm::length(box_size_of(points));
 }
 
 FittedSphere fit_head_sphere(const Groom& groom) {
@@ -137,7 +141,9 @@ HairPlace hair_place(const Groom& groom) {
   if (roots.size() < kMinFittedRoots) return HairPlace::Head;
   const FittedSphere fitted = fit_sphere(roots);
   if (are_on_jaw(fitted, roots)) return HairPlace::Jaw;
-  if (!(extent_of(roots) >= 2.0f * fitted.radius_m) || are_on_a_disc(roots)) return HairPlace::Head;
+  // Hair of a disc grows to one side of it; fur of a slender body, which is as flat, to all.
+  const bool is_disc = are_on_a_disc(roots) && glm::length(growth_direction(groom)) >= kMinTogether;
+  if (!(extent_of(roots) >= 2.0f * fitted.radius_m) || is_disc) return HairPlace::Head;
   return are_near(fitted, roots) && !is_covered(fitted, roots) ? HairPlace::Head : HairPlace::Body;
 }
 

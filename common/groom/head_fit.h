@@ -16,7 +16,8 @@ std::vector<glm::vec3> roots_of(const Groom& groom);
 /// sphere, only the upper roots count. Falls back to all roots.
 FittedSphere fit_head_sphere(const Groom& groom);
 
-/// Returns the diagonal of the box around points.
+/// Returns the size of the box around points, and its diagonal.
+glm::vec3 box_size_of(const std::vector<glm::vec3>& points);
 float extent_of(const std::vector<glm::vec3>& points);
 
 /// Returns whether points lie in or near a plane or a line, on a sphere or not.

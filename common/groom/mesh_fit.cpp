@@ -6,12 +6,14 @@
 #include <array>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
+#include <utility>
 #include <vector>
 
 #include "common/base/quantile.h"
 #include "common/base/units.h"
 #include "common/groom/head_fit.h"
 #include "common/math/point_tree.h"
+#include "common/math/rigid_fit.h"
 
 namespace strandcast {
 namespace {
@@ -24,6 +26,8 @@ constexpr float kFarM = 0.02f, kFarthestM = 0.03f;
 /// ones are where they belong.
 constexpr float kNearM = 0.008f, kCloseM = 0.005f;
 constexpr double kNearlyAll = 0.95;
+/// Likewise a movement, of half of the roots so far: less is what hair stands off.
+constexpr float kMovedM = 0.015f;
 
 /// Points all over a surface, by area.
 std::vector<glm::vec3> spread_over(const Mesh& mesh) {
@@ -59,6 +63,10 @@ struct Change {
   glm::mat3 turn{1.0f};
 };
 
+/// What a mesh may have been moved by: a skull is nearly round, so that turns are only asked for where no
+/// shift will do.
+enum class Freedom { Shift, ShiftAndTurn };
+
 class MeshFit {
  public:
   MeshFit(const Mesh& head, const Groom& groom, const glm::vec3& origin_m)
@@ -77,7 +85,52 @@ class MeshFit {
     return quantile(distances, share);
   }
 
+  /// A movement that takes roots onto the mesh, from a first shift on: Besl, McKay, "A Method for
+  /// Registration of 3-D Shapes", 1992.
+  Pose onto_mesh(const glm::dvec3& first_shift_m, Freedom freedom) const {
+    constexpr int kMostFits = 60;
+    constexpr double kStillM = 1e-4;
+    const std::vector<glm::dvec3> from(roots_m_.begin(), roots_m_.end());
+    std::vector<glm::dvec3> to(from.size());
+    Pose pose{first_shift_m, {1, 0, 0, 0}};
+    for (int i = 0; i < kMostFits; ++i) {
+      for (size_t root = 0; root < from.size(); ++root)
+        to[root] = surface_m_[tree_.nearest(glm::vec3(pose * from[root]), 1).front().index];
+      const Pose shifted{middle_of(to) - middle_of(from), {1, 0, 0, 0}};
+      const Pose before =
+          std::exchange(pose, freedom == Freedom::Shift ? shifted : rigid_fit(from, to, pose.rotation));
+      double moved_m = 0.0;
+      for (const glm::dvec3& root : from)
+        moved_m = std::max(moved_m, glm::distance(before * root, pose * root));
+      if (moved_m < kStillM) break;
+    }
+    return pose;
+  }
+  /// How far nearly all roots are from the mesh then.
+  float distance_m(const Pose& pose) const {
+    std::vector<float> distances;
+    for (const glm::vec3& root : roots_m_)
+      distances.push_back(
+          std::sqrt(tree_.nearest(glm::vec3(pose * glm::dvec3(root)), 1).front().distance_squared));
+    return quantile(distances, kNearlyAll);
+  }
+  /// How far half of the roots go.
+  float moved_m(const Pose& pose) const {
+    std::vector<float> distances;
+    for (const glm::vec3& root : roots_m_)
+      distances.push_back(glm::distance(root, glm::vec3(pose * glm::dvec3(root))));
+    return median(std::move(distances));
+  }
+  glm::dvec3 middle_of_roots_m() const { return middle_of(roots_m_); }
+  glm::dvec3 middle_of_mesh_m() const { return middle_of(surface_m_); }
+
  private:
+  template <class Point>
+  static glm::dvec3 middle_of(const std::vector<Point>& points) {
+    glm::dvec3 sum(0.0);
+    for (const Point& point : points) sum += glm::dvec3(point) / static_cast<double>(points.size());
+    return sum;
+  }
   const std::vector<glm::vec3> surface_m_;
   const PointTree tree_;
   const glm::vec3 origin_m_;
@@ -118,6 +171,32 @@ std::vector<Named> usual_scales() {
   return scales;
 }
 
+/// "1600 mm", "3.2 mm".
+std::string text_mm(float distance_m) {
+  const double mm = static_cast<double>(distance_m) * kMmPerM;
+  return mm < 10.0 ? fmt::format("{:.2g} mm", mm) : fmt::format("{:.0f} mm", mm);
+}
+
+/// The movement of the mesh that brings nearly all roots nearer to it than `least_m`, in words; empty where
+/// there is none that is one.
+std::string likely_movement(const MeshFit& fit, float least_m) {
+  const glm::dvec3 middle_m = fit.middle_of_roots_m();
+  for (const Freedom freedom : {Freedom::Shift, Freedom::ShiftAndTurn})
+    for (const glm::dvec3& first_m : {glm::dvec3(0.0), fit.middle_of_mesh_m() - middle_m}) {
+      const Pose pose = fit.onto_mesh(first_m, freedom);
+      const float distance_m = fit.distance_m(pose);
+      if (!(distance_m < least_m) || fit.moved_m(pose) < kMovedM) continue;
+      const glm::dvec3 off_mm = kMmPerM * (middle_m - pose * middle_m);
+      const double turned_deg = glm::degrees(angle_between_rad(pose.rotation, {1, 0, 0, 0}));
+      return fmt::format("{} if it is moved by about ({:.0f}, {:.0f}, {:.0f}) mm{}", text_mm(distance_m),
+                         off_mm.x, off_mm.y, off_mm.z,
+                         freedom == Freedom::Shift
+                             ? std::string()
+                             : fmt::format(" and turned by {:.0f} degrees", turned_deg));
+    }
+  return {};
+}
+
 }  // namespace
 
 std::string unfit_mesh(const Mesh& head, const Groom& groom, const glm::vec3& file_origin_m) {
@@ -137,12 +216,12 @@ std::string unfit_mesh(const Mesh& head, const Groom& groom, const glm::vec3& fi
     best = &other;
     least_m = distance_m;
   }
-  if (best == nullptr && !is_far) return {};
-  const std::string apart = fmt::format("the head's mesh does not fit: roots are up to {:.3g} mm from it",
-                                        static_cast<double>(most_m) * kMmPerM);
-  if (best == nullptr) return apart + ", and no usual turn or size brings it there";
-  return fmt::format("{}, and {:.2g} mm if it is {}", apart, static_cast<double>(least_m) * kMmPerM,
-                     best->text);
+  const std::string apart =
+      fmt::format("the head's mesh does not fit: roots are up to {} from it", text_mm(most_m));
+  if (best != nullptr) return fmt::format("{}, and {} if it is {}", apart, text_mm(least_m), best->text);
+  if (const std::string moved = likely_movement(fit, least_m); !moved.empty())
+    return apart + ", and " + moved;
+  return is_far ? apart + ", and no usual turn, size or movement brings it there" : std::string();
 }
 
 }  // namespace strandcast

@@ -43,6 +43,9 @@ constexpr double kQuarterTurnDeg = 90.0;
 /// not quite alike on both sides, or where it is nothing like that by the hairline alone, up to 29 degrees
 /// off.
 constexpr double kSnapDeg = 8.0, kLopsidedSnapDeg = 10.0, kHairlineSnapDeg = 32.0;
+/// Of fewer roots than so many the mirror is up to 23 degrees off.
+constexpr double kSparseSnapDeg = 25.0;
+constexpr size_t kSparseRoots = 120;
 /// The mirror is looked for so far from where the hairline is highest.
 constexpr double kMirrorReachDeg = 45.0, kMirrorStepDeg = 0.25;
 /// Hair whose two sides differ more, 0 to 1, is no mirror image: whole heads of 143 strands and more have up
@@ -132,7 +135,9 @@ FaceAngle face_by_mirror(const std::vector<glm::dvec3>& directions, double hairl
     best_deg = std::remainder(deg, 360.0);
     least = skew;
   }
-  if (least < kMostSkew) return {best_deg, least < kAlikeSkew ? kSnapDeg : kLopsidedSnapDeg};
+  const bool is_sparse = directions.size() < kSparseRoots;
+  if (least < kMostSkew)
+    return {best_deg, is_sparse ? kSparseSnapDeg : least < kAlikeSkew ? kSnapDeg : kLopsidedSnapDeg};
   const double off_deg = std::abs(std::remainder(best_deg, kQuarterTurnDeg));
   if (least < kLopsidedSkew && off_deg <= kLopsidedSnapDeg) return {best_deg, kLopsidedSnapDeg};
   return {hairline_deg};
@@ -304,13 +309,8 @@ double usual_length(const Groom& groom) {
 Guess<float> unit_of_fur(const Groom& groom) {
   constexpr double kShortestM = 0.002, kLongestM = 0.25, kSmallestM = 0.05, kLargestM = 4.0;
   const double length = usual_length(groom);
-  const std::vector<glm::vec3> roots = roots_of(groom);
-  glm::vec3 low = roots.front(), high = low;
-  for (const glm::vec3& root : roots) {
-    low = glm::min(low, root);
-    high = glm::max(high, root);
-  }
-  const double size = static_cast<double>(std::max({high.x - low.x, high.y - low.y, high.z - low.z}));
+  const glm::vec3 box = box_size_of(roots_of(groom));
+  const double size = static_cast<double>(std::max({box.x, box.y, box.z}));
   for (const CommonUnit& unit : kCommonUnits) {
     const double length_m = length * static_cast<double>(unit.unit_m),
                  size_m = size * static_cast<double>(unit.unit_m);
@@ -338,11 +338,11 @@ Guess<float> unit_by_length(const Groom& groom, const char* why) {
 }  // namespace
 
 Guess<float> guess_unit(const Groom& groom) {
+  const HairPlace place = hair_place(groom);
+  if (place == HairPlace::Body) return unit_of_fur(groom);
   if (const char* const why = unlike_a_head(groom)) {
     if (Guess<float> by_length = unit_by_length(groom, why); !by_length.reason.empty()) return by_length;
   }
-  const HairPlace place = hair_place(groom);
-  if (place == HairPlace::Body) return unit_of_fur(groom);
   const float radius = fit_head_sphere(groom).radius_m;
   if (!std::isfinite(radius) || radius <= 0.0f) return {1.0f, {}};
   for (const CommonUnit& unit : kCommonUnits) {

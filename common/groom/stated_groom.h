@@ -30,6 +30,9 @@ struct HairMaterial {
   }
 };
 
+/// Stands for an id or a group that a strand lacks, until all strands are known.
+inline constexpr int32_t kNoLabel = std::numeric_limits<int32_t>::min();
+
 inline constexpr size_t kMaxGroupNameChars = 80;  // that are kept of what a file says
 
 /// What files say of strands besides their shape, in their order; a list is empty where they do not say it.
@@ -50,37 +53,22 @@ struct StrandNames {
   std::vector<uint32_t> of_strand;  // in `name`
 };
 
-/// The label of a strand that states none where others do. A width or coordinate that is not stated is NaN.
-inline constexpr int32_t kNoLabel = std::numeric_limits<int32_t>::min();
-
-/// Adds a list of `part_count` further strands or vertices to that of the `count` before. Where one of both
-/// states nothing, all of its are `lacking`.
-template <class T>
-void join_list(std::vector<T>& whole, size_t count, const std::vector<T>& part, size_t part_count,
-               const T& lacking) {
-  if (whole.empty() && part.empty()) return;
-  whole.resize(count, lacking);
-  whole.insert(whole.end(), part.begin(), part.end());
-  whole.resize(count + part_count, lacking);
+/// Makes lists as long as strands and vertices are many; what is added is lacking.
+inline void pad_labels(StrandLabels& labels, size_t strand_count, size_t vertex_count) {
+  labels.id.resize(strand_count, kNoLabel);
+  labels.group.resize(strand_count, kNoLabel);
+  labels.width.resize(vertex_count, std::numeric_limits<float>::quiet_NaN());
 }
 
-/// Adds strands and their labels behind those of `whole`.
-inline void append_strands(Groom& whole, StrandLabels& labels, const Groom& part, const StrandLabels& own) {
-  const size_t strands = whole.strand_count(), vertices = whole.rest_position_m.size();
-  const size_t more = part.strand_count(), more_vertices = part.rest_position_m.size();
-  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-  join_list(labels.id, strands, own.id, more, kNoLabel);
-  join_list(labels.group, strands, own.group, more, kNoLabel);
-  join_list(labels.width, vertices, own.width, more_vertices, kNone);
-  join_list(whole.root_uv, strands, part.root_uv, more, glm::vec2(kNone));
-  const auto first = static_cast<uint32_t>(labels.object_name.size());
-  for (const uint32_t object : own.object) labels.object.push_back(first + object);
-  labels.object_name.insert(labels.object_name.end(), own.object_name.begin(), own.object_name.end());
-  for (size_t strand = 1; strand < part.offset.size(); ++strand)
-    whole.offset.push_back(static_cast<uint32_t>(vertices) + part.offset[strand]);
-  whole.rest_position_m.insert(whole.rest_position_m.end(), part.rest_position_m.begin(),
-                               part.rest_position_m.end());
-  whole.pinned.insert(whole.pinned.end(), part.pinned.begin(), part.pinned.end());
+/// Adds the labels of further strands; lists of both are as long as strands and vertices are many.
+inline void join_labels(StrandLabels& whole, const StrandLabels& part) {
+  const auto join = [](auto& list, const auto& more) { list.insert(list.end(), more.begin(), more.end()); };
+  join(whole.id, part.id);
+  join(whole.group, part.group);
+  join(whole.width, part.width);
+  const auto first = static_cast<uint32_t>(whole.object_name.size());
+  for (const uint32_t object : part.object) whole.object.push_back(first + object);
+  join(whole.object_name, part.object_name);
 }
 
 /// Returns labels in which all strands belong to objects: to this one, if they belong to none.

@@ -21,6 +21,16 @@ bool is_finite_point(const glm::vec3& point) {
   return std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z);
 }
 
+/// Gives the bad strands the coordinates of the nearest good ones.
+void take_nearest_uv(Groom& groom, std::span<const uint32_t> good, std::span<const uint32_t> bad) {
+  const auto root = [&](uint32_t strand) { return groom.rest_position_m[groom.offset[strand]]; };
+  std::vector<glm::vec3> roots;
+  for (const uint32_t strand : good) roots.push_back(root(strand));
+  const PointTree tree(roots);
+  for (const uint32_t strand : bad)
+    groom.root_uv[strand] = groom.root_uv[good[tree.nearest(root(strand), 1).front().index]];
+}
+
 /// Gives strands without a usable coordinate that of the nearest root which has one; all go where more than a
 /// tenth is bad. Returns what to say of it.
 std::string bridge_root_uv(Groom& groom) {
@@ -36,12 +46,7 @@ std::string bridge_root_uv(Groom& groom) {
     groom.root_uv.clear();
     return count + " all are left out";
   }
-  const auto root = [&](uint32_t strand) { return groom.rest_position_m[groom.offset[strand]]; };
-  std::vector<glm::vec3> roots;
-  for (const uint32_t strand : good) roots.push_back(root(strand));
-  const PointTree tree(roots);
-  for (const uint32_t strand : bad)
-    groom.root_uv[strand] = groom.root_uv[good[tree.nearest(root(strand), 1).front().index]];
+  take_nearest_uv(groom, good, bad);
   return count + " those are as of the nearest root";
 }
 
@@ -125,9 +130,29 @@ void leave_out_further(float furthest, const std::vector<float>& reaches, std::v
   }
 }
 
+/// Of reaches beyond `furthest` those of roots that stand alone, none being nearer than so; else 0.
+std::vector<float> lone(const Groom& groom, const std::vector<float>& reaches, float furthest,
+                        std::span<const uint8_t> is_kept) {
+  std::vector<float> lone(reaches.size());
+  if (std::none_of(reaches.begin(), reaches.end(), [&](float reach) { return reach > furthest; }))
+    return lone;
+  std::vector<glm::vec3> roots;
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand)
+    if (is_kept[strand] != 0) roots.push_back(groom.rest_position_m[groom.offset[strand]]);
+  const PointTree tree(roots);
+  const float apart = 0.5f * furthest;
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
+    if (!(reaches[strand] > furthest) || is_kept[strand] == 0) continue;
+    const auto nearest = tree.nearest(groom.rest_position_m[groom.offset[strand]], 2);
+    if (nearest.back().distance_squared > apart * apart) lone[strand] = reaches[strand];
+  }
+  return lone;
+}
+
 /// Takes out strands with a point where no hair is, and those whose root stands apart.
 void find_strays(const Groom& groom, std::vector<uint8_t>& is_kept, BadItems& broken) {
-  constexpr float kStrayRoots = 10.0f;  // times what half of the roots are off, or half of what hair reaches
+  // Times what half of the roots are off, or half of what hair reaches; of one that stands alone.
+  constexpr float kStrayRoots = 10.0f, kLoneRoots = 4.0f;
   const Reaches reaches = reaches_of(groom, is_kept);
   const float usual = usual_of(reaches.all, is_kept), usual_root = usual_of(reaches.root, is_kept);
   leave_out_further(kStrayReaches * usual, reaches.all, is_kept, broken, [&](size_t strand) {
@@ -135,12 +160,16 @@ void find_strays(const Groom& groom, std::vector<uint8_t>& is_kept, BadItems& br
                       "strand {} goes {:.4g} units from the middle of the roots, half of all at most {:.4g}",
                       strand, reaches.all[strand], usual);
   });
-  const float furthest_root = kStrayRoots * std::max(usual_root, 0.5f * usual);
-  leave_out_further(furthest_root, reaches.root, is_kept, broken, [&](size_t strand) {
+  const auto grows_apart = [&](size_t strand) {
     return make_error(ErrorCode::BadInput,
                       "strand {} grows {:.4g} units from the middle of the roots, half of all at most {:.4g}",
                       strand, reaches.root[strand], usual_root);
-  });
+  };
+  const float usual_way = std::max(usual_root, 0.5f * usual);
+  leave_out_further(kStrayRoots * usual_way, reaches.root, is_kept, broken, grows_apart);
+  const float furthest_lone = kLoneRoots * usual_way;
+  leave_out_further(furthest_lone, lone(groom, reaches.root, furthest_lone, is_kept), is_kept, broken,
+                    grows_apart);
 }
 
 /// With what is said of coordinates of roots, which come last: roots are finite by then.
@@ -253,41 +282,52 @@ std::string part_guides(Groom& groom, StrandLabels& labels, std::vector<uint8_t>
                                 : count + " left out (groom.file.guides takes guides alone)";
 }
 
-std::string settle_labels(Groom& groom, StrandLabels& labels) {
-  size_t most = 0;
-  std::string names;
-  // `value_of` makes the next value of what those that are stated say.
-  const auto settle = [&](auto& list, const char* name, size_t strand_share, const auto& is_stated,
-                          auto value_of) {
-    const auto lacking = static_cast<size_t>(
-        std::count_if(list.begin(), list.end(), [&](const auto& value) { return !is_stated(value); }));
-    if (lacking == list.size()) list.clear();
-    if (lacking == 0 || list.empty()) return;
-    most = std::max(most, lacking / strand_share);
-    names += (names.empty() ? "" : ", ") + std::string(name);
-    for (auto& value : list)
-      if (!is_stated(value)) value = value_of();
+std::string fill_lacking(Groom& groom, StrandLabels& labels) {
+  std::vector<uint8_t> is_filled(groom.strand_count());
+  const auto fill = [&](auto& list, const auto& lacks, const auto& strand_of, const auto& value_of) {
+    if (std::all_of(list.begin(), list.end(), lacks)) list.clear();
+    for (size_t i = 0; i < list.size(); ++i) {
+      if (!lacks(list[i])) continue;
+      list[i] = value_of(i);
+      is_filled[strand_of(i)] = 1;
+    }
   };
-  const auto is_label = [](int32_t value) { return value != kNoLabel; };
-  const auto is_number = [](float value) { return !std::isnan(value); };
-  int64_t next = 0;
-  for (const int32_t id : labels.id) next = std::max(next, int64_t{id} + 1);
-  settle(labels.id, "ids", 1, is_label, [&] {
-    return static_cast<int32_t>(std::min(next++, int64_t{std::numeric_limits<int32_t>::max()}));
-  });
-  settle(labels.group, "groups", 1, is_label, [] { return 0; });
+  const auto itself = [](size_t i) { return i; };
+  const auto has_none = [](int32_t label) { return label == kNoLabel; };
+  const auto most = [](const std::vector<int32_t>& list) {
+    return list.empty() ? 0 : *std::max_element(list.begin(), list.end());
+  };
+  int32_t last_id = most(labels.id);
+  fill(labels.id, has_none, itself,
+       [&](size_t) { return last_id < std::numeric_limits<int32_t>::max() ? ++last_id : last_id; });
+  const int32_t last_group = most(labels.group);
+  fill(labels.group, has_none, itself,
+       [&](size_t) { return last_group < std::numeric_limits<int32_t>::max() ? last_group + 1 : 0; });
   std::vector<float> widths;
-  std::copy_if(labels.width.begin(), labels.width.end(), std::back_inserter(widths), is_number);
-  const float usual = widths.empty() ? 0.0f : quantile(std::move(widths), 0.5);
-  const size_t points =
-      std::max<size_t>(1, groom.rest_position_m.size() / std::max(1u, groom.strand_count()));
-  settle(labels.width, "widths", points, is_number, [&] { return usual; });
-  settle(
-      groom.root_uv, "coordinates of roots", 1, [](const glm::vec2& uv) { return !std::isnan(uv.x); },
-      [] { return glm::vec2(0.0f); });
-  if (names.empty()) return {};
-  return fmt::format("{} of {} strands do not state what others do ({}): it is filled in",
-                     std::max<size_t>(most, 1), groom.strand_count(), names);
+  for (const float width : labels.width)
+    if (!std::isnan(width)) widths.push_back(width);
+  const float usual_width = widths.empty() ? 0.0f : median(std::move(widths));
+  const auto strand_of_vertex = [&](size_t vertex) {
+    return static_cast<size_t>(std::upper_bound(groom.offset.begin(), groom.offset.end(), vertex) -
+                               groom.offset.begin()) -
+           1;
+  };
+  fill(
+      labels.width, [](float width) { return std::isnan(width); }, strand_of_vertex,
+      [&](size_t) { return usual_width; });
+  std::vector<uint32_t> known, lacking;
+  for (uint32_t strand = 0; strand < groom.root_uv.size(); ++strand)
+    (std::isnan(groom.root_uv[strand].x) ? lacking : known).push_back(strand);
+  if (known.empty()) groom.root_uv.clear();
+  if (!known.empty() && !lacking.empty()) take_nearest_uv(groom, known, lacking);
+  for (const uint32_t strand : known.empty() ? std::vector<uint32_t>() : lacking) is_filled[strand] = 1;
+  const auto count = std::count(is_filled.begin(), is_filled.end(), uint8_t{1});
+  if (count == 0) return {};
+  return fmt::format(
+      "{} of {} strands lack an id, a group, widths or root coordinates that others have: they get further "
+      "ids, a "
+      "group of their own, the usual width and the nearest root's coordinates",
+      count, is_filled.size());
 }
 
 void keep_strands(Groom& groom, StrandLabels& labels, std::span<const uint8_t> is_kept) {

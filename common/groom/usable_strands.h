@@ -33,15 +33,13 @@ Status fit_points(std::vector<glm::vec3>& points, std::span<const uint32_t> coun
 /// tenth are so.
 Error empty_strand(size_t strand);
 Status settle_empty(const BadItems& empty, uint64_t strand_count, std::vector<std::string>& notes);
-
-/// Fills in labels that some strands lack beside others: the next ids, group 0, the usual width, (0, 0) as
-/// the root's place. A list that all lack is emptied. Returns what to say of it; empty where nothing lacks.
-std::string settle_labels(Groom& groom, StrandLabels& labels);
-
 /// Leaves guides out of the hair, or takes them alone; where there is nothing but guides, they are the hair.
 /// Returns what to say of it. `by` names what flags them: " (groom_guide)".
 std::string part_guides(Groom& groom, StrandLabels& labels, std::vector<uint8_t> is_guide, GuideUse use,
                         const char* by = "");
+/// Gives strands that lack what others have further ids, a group of their own, the usual width and the
+/// nearest root's coordinates; lists that all lack are cleared. Returns what to say of it.
+std::string fill_lacking(Groom& groom, StrandLabels& labels);
 /// Adds what there is to say.
 inline void add_note(std::vector<std::string>& notes, std::string note) {
   if (!note.empty()) notes.push_back(std::move(note));

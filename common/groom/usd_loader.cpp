@@ -82,7 +82,7 @@ std::vector<std::string> group_names_of(const UsdCurves& curves) {
   return names;
 }
 
-/// Labels of these strands; lists that fit nothing are left out. `scale`: of widths. `own_name`: of strands
+/// Labels of these strands; lists that fit nothing are lacking. `scale`: of widths. `own_name`: of strands
 /// whose group has no name.
 StrandLabels labels_of(const UsdCurves& curves, double scale, const std::string& own_name) {
   const size_t strands = curves.vertex_counts.size();
@@ -164,11 +164,11 @@ HairMaterial material_of(const UsdStage& stage, std::vector<std::string>& notes)
   return material;
 }
 
-Status add_curves(UsdStage& stage, size_t prim, Groom& whole, StrandLabels& labels, Tally& tally) {
+Status add_curves(UsdStage& stage, size_t prim, Groom& groom, StrandLabels& labels, Tally& tally) {
   UsdCurves& curves = *stage.prim[prim].curves;
   RETURN_IF_ERROR(check_counts(curves, stage.notes));
-  if (whole.strand_count() + curves.vertex_counts.size() > kMaxStrandCount ||
-      whole.rest_position_m.size() + curves.points.size() > kMaxGroomVertices)
+  if (groom.strand_count() + curves.vertex_counts.size() > kMaxStrandCount ||
+      groom.rest_position_m.size() + curves.points.size() > kMaxGroomVertices)
     return make_error(ErrorCode::LimitExceeded, "more than {} strands or {} vertices", kMaxStrandCount,
                       kMaxGroomVertices);
   ASSIGN_OR_RETURN(const CurveKind kind, kind_of(curves));
@@ -177,8 +177,6 @@ Status add_curves(UsdStage& stage, size_t prim, Groom& whole, StrandLabels& labe
   if (rest == RestShape::Elsewhere) ++tally.rests_elsewhere;
   if (rest == RestShape::InPlace) ++tally.rests;
   const std::span<const glm::vec3> points(rest == RestShape::InPlace ? curves.rest_points : curves.points);
-  Groom groom;
-  groom.offset.push_back(0);
   size_t first = 0;
   for (size_t curve = 0; curve < curves.vertex_counts.size(); ++curve) {
     const auto control = points.subspan(first, curves.vertex_counts[curve]);
@@ -197,15 +195,18 @@ Status add_curves(UsdStage& stage, size_t prim, Groom& whole, StrandLabels& labe
     groom.offset.push_back(static_cast<uint32_t>(groom.rest_position_m.size()));
   }
   const size_t strands = curves.vertex_counts.size();
-  const StrandLabels own =
+  StrandLabels own =
       labels_of(curves, std::cbrt(std::abs(glm::determinant(glm::dmat3(world)))), stage.prim[prim].name);
-  if (own.width.empty() && !curves.widths.empty()) ++tally.unfit_widths;
+  const bool has_widths = !own.width.empty();
+  if (!has_widths && !curves.widths.empty()) ++tally.unfit_widths;
+  pad_labels(own, strands, groom.rest_position_m.size() - groom.offset[groom.strand_count() - strands]);
+  join_labels(labels, own);
   const auto is_finite_number = [](auto value) { return std::isfinite(value); };
   const bool has_uv = curves.root_uv.size() == 2 * strands &&
                       std::all_of(curves.root_uv.begin(), curves.root_uv.end(), is_finite_number);
-  for (size_t i = 0; has_uv && i < strands; ++i)
-    groom.root_uv.emplace_back(curves.root_uv[2 * i], curves.root_uv[2 * i + 1]);
-  append_strands(whole, labels, groom, own);
+  for (size_t i = 0; i < strands; ++i)
+    groom.root_uv.push_back(has_uv ? glm::vec2(curves.root_uv[2 * i], curves.root_uv[2 * i + 1])
+                                   : glm::vec2(NAN));
   const auto is_guide = [&](size_t strand) {
     const std::vector<double>& told = curves.guides;
     const bool fits = told.size() == strands || told.size() == 1;
@@ -215,7 +216,7 @@ Status add_curves(UsdStage& stage, size_t prim, Groom& whole, StrandLabels& labe
   ++tally.curves_prims;
   if (curves.time_code) tally.time_code = curves.time_code;
   if (is_moving(stage, prim)) ++tally.moving_prims;
-  for (const float width : own.width.empty() ? std::vector<float>() : curves.widths) {
+  for (const float width : has_widths ? curves.widths : std::vector<float>()) {
     tally.least_width = tally.most_width == 0.0f ? width : std::min(tally.least_width, width);
     tally.most_width = std::max(tally.most_width, width);
   }
@@ -374,7 +375,7 @@ Result<StatedGroom> read(const std::shared_ptr<GroomSource>& source, GuideUse gu
   stated.notes = notes_of(stage, tally);
   stated.material = material_of(stage, stated.notes);
   add_note(stated.notes, part_guides(stated.groom, stated.labels, std::move(tally.is_guide), guides));
-  add_note(stated.notes, settle_labels(stated.groom, stated.labels));
+  add_note(stated.notes, fill_lacking(stated.groom, stated.labels));
   stated.groom = with_pinning(std::move(stated.groom), Pinning::Root);
   return with_usable_strands(std::move(stated));
 }

@@ -188,7 +188,7 @@ class HierarchyParser {
 bool is_head_name(std::string_view name) {
   constexpr std::string_view kDigits = "0123456789";
   while (!name.empty()) {
-    const size_t separator = name.find_last_of(":_ .");
+    const size_t separator = name.find_last_of(":_ .-|");
     std::string_view word = separator == std::string_view::npos ? name : name.substr(separator + 1);
     word = word.substr(0, word.find_last_not_of(kDigits) + 1);
     if (equals_ignoring_case(word, "head")) return true;
@@ -280,6 +280,7 @@ Upward guess_up(const std::vector<const Joint*>& path) {
 /// Axes of a file.
 struct FileUp {
   Upward at_rest, in_motion;
+  double facing_rad = 0.0;  // of the rest pose, once it is upright: from +Z towards +X
 };
 
 constexpr double kLeastLegShare = 0.1;  // of the height above the hips
@@ -358,11 +359,18 @@ BodyHeight body_height(const Skeleton& skeleton, uint32_t head, const FileUp& ax
 /// Sets the clip's unit to the one that makes a body of this height about as tall as people are.
 void guess_unit(MotionClip& clip, const BodyHeight& height) {
   const double guess_m = kAssumedBodyHeightM / height.units;
-  for (const LengthUnit& unit : kClipUnits) {
-    if (std::abs(guess_m / unit.m - 1.0) > kUnitSnap) continue;
-    clip.file_unit_m = unit.m;
+  const auto is_near = [&](const LengthUnit& unit) { return std::abs(guess_m / unit.m - 1.0) <= kUnitSnap; };
+  const auto is_of_child = [&](const LengthUnit& unit) {
+    const double height_m = height.units * unit.m;
+    return unit.is_common && height_m >= kSmallestBodyM && height_m <= kAssumedBodyHeightM;
+  };
+  const auto* unit = std::find_if(std::begin(kClipUnits), std::end(kClipUnits), is_near);
+  if (unit == std::end(kClipUnits))
+    unit = std::find_if(std::begin(kClipUnits), std::end(kClipUnits), is_of_child);
+  if (unit != std::end(kClipUnits)) {
+    clip.file_unit_m = unit->m;
     clip.unit_reason = fmt::format("one unit is taken as {:.4g} m: {}, {:.4g} units, are {:.2f} m in {}",
-                                   unit.m, height.of, height.units, height.units * unit.m, unit.name);
+                                   unit->m, height.of, height.units, height.units * unit->m, unit->name);
     return;
   }
   clip.file_unit_m = guess_m;
@@ -491,7 +499,7 @@ struct Rows {
   std::vector<double> first;           // the first good one
   std::array<double, 2> rest_share{};  // of the first two good ones
   glm::dvec3 lift{0.0};                // sums of good ones: from the root to the head, and the root's place
-  glm::dvec3 root{0.0};
+  glm::dvec3 root{0.0}, root_low{0.0}, root_high{0.0};
   BadItems bad;
   BadItems idle;  // values in channels that nobody uses
 };
@@ -542,6 +550,8 @@ Result<Rows> read_rows(TextCursor& cursor, const Skeleton& skeleton, const Joint
     const glm::dvec3 root = place_of(*head.front(), row);
     rows.lift += at_frame.position_m - root;
     rows.root += root;
+    rows.root_low = good_count == 1 ? root : glm::min(rows.root_low, root);
+    rows.root_high = good_count == 1 ? root : glm::max(rows.root_high, root);
     for (const JointPath& joint : body)
       clip.joint_m.push_back(glm::conjugate(at_frame.rotation) *
                              (evaluate(joint, row).position_m - at_frame.position_m));
@@ -584,11 +594,14 @@ bool begins_with_t_pose(const std::vector<Pose>& poses, double rest_share_first,
 }
 
 /// What is up in the motion, which need not be up at rest: who stands has the head above the hips, and these
-/// above the floor.
+/// above the floor, where they stay. Who crawls goes where the head is from the hips.
 Upward guess_up_in_motion(const Rows& rows, const Upward& at_rest) {
+  constexpr double kMostClimb = 1.5;  // times the way from hips to head
+  const auto frames = static_cast<double>(rows.is_good.size() - rows.bad.count());
   for (const Upward& up : kUpwards)
     if (up != at_rest && up.of(rows.lift) > kUpClearly * up.beside(rows.lift) &&
-        up.of(rows.root) > 0.5 * up.of(rows.lift))
+        up.of(rows.root) > 0.5 * up.of(rows.lift) &&
+        std::abs(up.of(rows.root_high - rows.root_low)) * frames < kMostClimb * up.of(rows.lift))
       return up;
   return at_rest;
 }
@@ -606,10 +619,47 @@ glm::dquat upright_from(const Upward& up) {
   return up.sign > 0.0 ? turn : glm::dquat(0, 0, 0, 1) * turn;
 }
 
+/// Where left and right joints of the head's tree say that a rest pose looks, in quarter turns from +Z
+/// towards +X; nothing where they say nothing.
+std::optional<int> facing_at_rest(const Skeleton& skeleton, uint32_t head, const Upward& up,
+                                  std::span<const double> first_row) {
+  constexpr double kMostOff = 0.35;
+  std::vector<glm::dvec3> places;
+  std::vector<std::string> names;
+  for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
+    const Joint& joint = skeleton.joints[i];
+    const bool is_own = root_of(skeleton, i) == root_of(skeleton, head);
+    names.push_back(is_own ? joint.name : std::string());
+    places.push_back(place_of(joint, first_row) +
+                     (joint.parent == kNoJoint ? glm::dvec3(0.0) : places[joint.parent]));
+  }
+  glm::dvec3 to_left(0.0);
+  for (const auto& [left, right] : sided_pairs(names)) to_left += places[left] - places[right];
+  if (!(glm::length(to_left) > 0.0)) return std::nullopt;
+  to_left = upright_from(up) * glm::normalize(to_left);
+  const double turns = std::atan2(-to_left.z, to_left.x) / glm::radians(90.0), whole = std::round(turns);
+  if (std::abs(to_left.y) > kMostOff || std::abs(turns - whole) > kMostOff) return std::nullopt;
+  return static_cast<int>(whole);
+}
+
+/// Takes the rest pose's facing, which is +Z of most, into the axes of a file.
+void take_facing(MotionClip& clip, std::optional<int> quarters, FileUp& up) {
+  constexpr std::array kNames = {"-Z", "-X", "+Z", "+X", "-Z"};
+  if (quarters.value_or(0) != 0) {
+    up.facing_rad = glm::radians(90.0 * *quarters);
+    clip.facing_reason =
+        fmt::format("its rest pose faces {}, once it is upright: its left and right joints lie so",
+                    kNames[static_cast<size_t>(*quarters + 2)]);
+  } else if (up.at_rest.axis == 0 && !quarters) {
+    clip.up_reason += ", and its face is taken to be at +Z there (feed turns it ahead by the motion alone)";
+  }
+}
+
 /// From the file's axes and units to world axes and metres.
 void to_world(std::vector<Pose>& poses, double unit_m, const FileUp& up, bool recentre) {
   const glm::dquat world_from_file = upright_from(up.in_motion);
-  const glm::dquat rest_from_upright = glm::conjugate(upright_from(up.at_rest));
+  const glm::dquat rest_from_upright =
+      glm::conjugate(upright_from(up.at_rest)) * glm::angleAxis(up.facing_rad, kAxis[1]);
   for (Pose& pose : poses) {
     pose.position_m = world_from_file * (pose.position_m * unit_m);
     // On both sides: the file's rest pose is turned upright too, so that it becomes the identity.
@@ -621,8 +671,8 @@ void to_world(std::vector<Pose>& poses, double unit_m, const FileUp& up, bool re
 }
 
 /// Likewise: seen from the head, whose rest pose is upright.
-void to_head_space(std::vector<glm::dvec3>& places, double unit_m, const Upward& up) {
-  const glm::dquat upright = upright_from(up);
+void to_head_space(std::vector<glm::dvec3>& places, double unit_m, const FileUp& up) {
+  const glm::dquat upright = glm::angleAxis(-up.facing_rad, kAxis[1]) * upright_from(up.at_rest);
   for (glm::dvec3& place : places) place = upright * (place * unit_m);
 }
 
@@ -697,7 +747,8 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
     leave_out_first_frames(clip, 1);
   clip.head_reason = taken_head(skeleton, *head);
   const Upward stated{options.is_z_up.value_or(false) ? 2 : 1};
-  const FileUp up = options.is_z_up ? FileUp{stated, stated} : guess_both(path, rows);
+  FileUp up = options.is_z_up ? FileUp{stated, stated} : guess_both(path, rows);
+  clip.up = up.in_motion.name();
   if (up.at_rest != up.in_motion)
     clip.up_reason = fmt::format(
         "{} is taken as up: there the head is above the hips in the motion, though {} is up in the rest pose",
@@ -705,8 +756,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   else if (up.at_rest != Upward{} && !options.is_z_up)
     clip.up_reason = fmt::format("{} is taken as up: there the head is above the hips in the rest pose",
                                  up.at_rest.name());
-  if (up.at_rest.axis == 0)
-    clip.up_reason += ", and its face is taken to be at +Z there (feed turns it ahead by the motion alone)";
+  take_facing(clip, facing_at_rest(skeleton, *head, up.at_rest, rows.first), up);
   const BodyHeight height = body_height(skeleton, *head, up, rows.first);
   const bool is_guessed = options.unit_m == 0.0;
   if (is_guessed && !(height.units > 0.0))
@@ -718,7 +768,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
     take_unit(clip, height, options.unit_m);
   to_world(clip.world_from_head, clip.file_unit_m, up, options.recentre);
   if (options.is_z_up) doubt_up(clip, stated, guess_both(path, rows).in_motion);
-  to_head_space(clip.joint_m, clip.file_unit_m, up.at_rest);
+  to_head_space(clip.joint_m, clip.file_unit_m, up);
   return clip;
 }
 

@@ -27,15 +27,19 @@ inline constexpr size_t kMaxBodyJoints = 12;
 
 struct LengthUnit {
   double m = 1.0;
-  const char* name = "";  // of several, as in "bones of 180 cm"
+  const char* name = "";   // of several, as in "bones of 180 cm"
+  bool is_common = false;  // taken for children too
 };
 /// Known units of clips. CMU's unit, 1 / 0.45 of an inch, is that of its Acclaim files; some conversions keep
 /// its numbers.
 inline constexpr LengthUnit kClipUnits[] = {
-    {1e-3, "mm"}, {1e-2, "cm"},     {0.0254, "inches"}, {0.0254 / 0.45, "CMU's units"},
-    {0.1, "dm"},  {0.3048, "feet"}, {1.0, "m"}};
+    {1e-3, "mm", true}, {1e-2, "cm", true}, {0.0254, "inches"}, {0.0254 / 0.45, "CMU's units"},
+    {0.1, "dm"},        {0.3048, "feet"},   {1.0, "m", true}};
 /// Relative distance within which a guessed unit is replaced by a known one.
 inline constexpr double kUnitSnap = 0.25;
+
+/// Height down to which a body in a common unit is a child's.
+inline constexpr double kSmallestBodyM = 0.85;
 
 /// Factor by which the resting head must be farther above the hips than beside them for an axis to count as
 /// up.
@@ -56,8 +60,8 @@ struct BvhOptions {
 };
 
 /// Loads world poses of the head joint, one per frame. Rotations are applied in the order of CHANNELS; a
-/// position channel of any joint replaces that axis of its OFFSET. The rest pose (all rotations zero) is
-/// assumed to look along +Z if +Y is up, and along -Y if +Z is up, as in all known files. It becomes the
+/// position channel of any joint replaces that axis of its OFFSET. The rest pose (all rotations zero) looks
+/// where its left and right joints say, else along +Z if +Y is up, and along -Y if +Z is up. It becomes the
 /// identity: +Z forward, +Y up. The up axis of the motion may differ from that of the rest pose, and is
 /// guessed by itself: where the head is above the hips. Of several performers the first with a head counts.
 /// Frames that cannot be read are bridged, and there are as many as there are rows; MotionClip's repairs say

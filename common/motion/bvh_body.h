@@ -1,5 +1,5 @@
-// Finds neck, chest, shoulders and elbows among a clip's joints by their usual names, as CMU's files and most
-// programs use them. Any thread.
+// Finds joints of a body by their usual names, as CMU's files and most programs use them: neck, chest,
+// shoulders and elbows, and which are a left and a right one. Any thread.
 #pragma once
 
 #include <string>
@@ -11,5 +11,9 @@ namespace strandcast {
 /// Returns pairs of a joint name of the body presets (common/scene/body_desc.h) and its index in the file's
 /// names. Joints without a usual name are missing. Case and a prefix ending in ':' or '_' are ignored.
 std::vector<std::pair<std::string, size_t>> usual_body(const std::vector<std::string>& joint_names);
+
+/// Returns pairs of indices of names that say left and right and are alike otherwise: "LeftFoot" and
+/// "RightFoot", "thigh_l" and "thigh_r", "Bip01 L Hand" and "Bip01 R Hand", "lShldr" and "rShldr".
+std::vector<std::pair<size_t, size_t>> sided_pairs(const std::vector<std::string>& joint_names);
 
 }  // namespace strandcast

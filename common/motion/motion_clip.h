@@ -20,11 +20,13 @@ struct MotionClip {
   std::vector<std::string> joint_name;
   std::vector<glm::dvec3> joint_m;   // (frames x joints) head space
   double file_unit_m = 1.0;          // metres per unit of the file it came from
+  std::string up = "+Y";             // of the file it came from
   std::string unit_reason;           // why this unit, when nobody stated it; else empty
   std::string unit_doubt;            // why the stated unit is none of a body's; else empty
   std::string up_doubt;              // likewise, the stated up axis
   std::vector<std::string> repairs;  // what a file needed to be read, a sentence for each kind
   std::string up_reason;             // likewise why not +Y, of a file with another up axis
+  std::string facing_reason;         // why its rest pose faces another side than most; else empty
   std::string head_reason;           // which joint of a file is taken as the head
 
   /// Returns the time of the last pose, s; 0 for an empty clip.

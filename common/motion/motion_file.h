@@ -1,5 +1,5 @@
-// Loads head motion from a user's file, with sentences that state the assumptions made. Feeder and reports
-// use it. Any thread.
+// Loads head motion from a user's file, and judges its frames, with sentences that state the assumptions
+// made. Feeder, bake and reports use it. Any thread.
 #pragma once
 
 #include <filesystem>
@@ -21,12 +21,18 @@ struct MotionFileOptions {
   std::vector<std::string> body_joints = {};  // --body-joint: these besides
   bool is_filtering_glitches = false;         // --filter-glitches
   bool is_keeping_first_frames = false;       // --keep-first-frames
+  std::string prefix = "--";                  // of the names of unit and up, as a person gives them
 };
 
 struct MotionFile {
   MotionClip clip;
-  std::vector<std::string> notes;  // each begins with the file's name
+  std::vector<std::string> notes;     // each begins with the file's name
+  std::vector<std::string> unlikely;  // those of them that no head or body fits: a check refuses these
 };
+
+/// Leaves out frames before the motion and filters glitches, as the options say, of whatever file the clip
+/// came from. Adds sentences. Returns the number of frames that were left out.
+uint32_t judge_frames(MotionFile& file, const std::string& name, const MotionFileOptions& options);
 
 /// Loads a file. Returns the errors of load_bvh(), and BadInput for an unknown axis.
 Result<MotionFile> load_motion_file(const std::filesystem::path& path, const MotionFileOptions& options);

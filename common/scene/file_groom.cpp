@@ -15,7 +15,7 @@ Result<FileGroom> load_file_groom(const FileGroomDesc& file) {
   options.is_z_up = file.has_up_axis ? std::optional(up == UpAxis::Z || up == UpAxis::MinusZ) : std::nullopt;
   options.is_upside_down = up == UpAxis::MinusY || up == UpAxis::MinusZ;
   options.yaw_deg = file.has_yaw ? std::optional(file.yaw_deg) : std::nullopt;
-  if (file.has_origin) options.origin = file.origin;
+  options.origin = file.has_origin ? std::optional(file.origin) : std::nullopt;
   options.vertex_count = file.vertex_count;
   options.strand_vertex_count = file.strand_vertex_count;
   options.guides = file.guides ? GuideUse::Alone : GuideUse::LeaveOut;

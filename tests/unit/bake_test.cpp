@@ -52,6 +52,26 @@ TEST(BakeLead, TheHeadComesFromRestAndArrivesWithTheSpeedOfTheStart) {
   EXPECT_GT(glm::length(mps_of(with_lead(plain, 0.0), 0.0)), 1.0);
 }
 
+TEST(BakePaths, NumberedFilesAreNotWrittenOverTheHairThatIsRead) {
+  const TemporaryFolder folder;
+  const auto said_of = [&](const char* hair, const char* out) {
+    BakeCommand command;
+    command.exported.paths = {folder.write(hair, "no hair").string(), (folder.path() / out).string()};
+    command.server = folder.path() / "none";
+    command.feed.motion = "builtin";
+    command.exported.seconds = 1.0;
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(run_bake(command, false), kBadInputExit);
+    return testing::internal::GetCapturedStderr();
+  };
+  const auto is_caught = testing::HasSubstr("is read, and would be written over");
+  EXPECT_THAT(said_of("hair_0001.ply", "hair.ply"), is_caught);
+  EXPECT_THAT(said_of("hair_12345.ply", "hair.ply"), is_caught);
+  EXPECT_THAT(said_of("hair_a1.ply", "hair.ply"), Not(is_caught));
+  EXPECT_THAT(said_of("hair_0001.ply", "hair.abc"), Not(is_caught));
+  EXPECT_THAT(said_of("other_0001.ply", "hair.ply"), Not(is_caught));
+}
+
 TEST(BakeSteps, AStateIsAskedForWhereAFrameIs) {
   EXPECT_EQ(steps_between(60.0, 30.0), 2u);
   EXPECT_EQ(steps_between(120.0, 24.0), 5u);

@@ -202,7 +202,7 @@ TEST(Bvh, UnitUpAxisAndRecentring) {
 TEST(Bvh, FindsTheHeadByCommonNames) {
   const std::string rows = "0 0 0 0 0 0 0 0 0 0 0 0\n0 0 0 0 0 0 0 0 0 0 0 0\n";
   for (const char* name : {"head", "mixamorig:Head", "joint_Head", "Bip01 Head", "HEAD", "head_01", "Head1",
-                           "Head_M", "C_head_JNT", "root.head"}) {
+                           "Head_M", "C_head_JNT", "DEF-head"}) {
     std::string text = small_with(rows);
     text.replace(text.find("JOINT Head"), 10, std::string("JOINT ") + name);
     EXPECT_EQ(error_of(text), "no error") << name;
@@ -442,7 +442,7 @@ MotionClip clip_with_bones(double units) {
 
 TEST(Bvh, GuessedUnitsAreThoseThatPeopleUse) {
   for (const LengthUnit& unit : kClipUnits) {
-    // People from 1.37 m (with which the guess is a quarter too large) to 2.25 m.
+    // People from 1.37 m (with which the guess is a quarter too large) to 2.25 m. Children: motion_test.cpp.
     for (const double body_m : {1.37, 1.5, 1.7, 2.0, 2.25}) {
       const MotionClip clip = clip_with_bones(body_m / unit.m);
       EXPECT_EQ(clip.file_unit_m, unit.m) << unit.name << ", " << body_m;
@@ -638,14 +638,14 @@ TEST(Bvh, ABodyIsAsHighAsItsHipsStand) {
     const std::string end = "End Site\n{\nOFFSET 0 0 0\n}\n}\n";
     return parsed(
                "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\nJOINT "
-               "Head\n{\nOFFSET 0 78 0\nCHANNELS 0\n" +
-                   end + "JOINT Knee\n{\nOFFSET 0 -45 0\nCHANNELS 0\n" + end +
+               "Head\n{\nOFFSET 0 50 0\nCHANNELS 0\n" +
+                   end + "JOINT Knee\n{\nOFFSET 0 -30 0\nCHANNELS 0\n" + end +
                    fmt::format("}}\nMOTION\nFrames: 1\nFrame Time: .01\n0 {} 0\n", hips),
                options)
         .file_unit_m;
   };
-  EXPECT_EQ(unit_at(95.0), 0.01);
-  EXPECT_NE(unit_at(0.0), 0.01) << "by 123 units of bones alone";
+  EXPECT_EQ(unit_at(70.0), 0.01);
+  EXPECT_NE(unit_at(0.0), 0.01) << "by 80 units of bones alone";
   EXPECT_EQ(unit_at(0.0), unit_at(500.0)) << "on a roof";
 }
 

@@ -14,11 +14,11 @@ inline void tell(FieldTexts& told, const std::string& where, const CtlTarget& al
 }
 inline void tell(FieldTexts& told, const std::string& where, const MotionFileOptions& all) {
   OPTION_FIELDS(all, unit_m, up, joint, fps, has_body, body_joints, is_filtering_glitches,
-                is_keeping_first_frames);
+                is_keeping_first_frames, prefix);
 }
 inline void tell(FieldTexts& told, const std::string& where, const FeedOptions& all) {
   OPTION_FIELDS(all, motion, wind, motion_file, is_looped, is_keeping_facing, blend_s, is_live, speed,
-                seconds, rate_hz, timecode, ltc, fps, wind_mps, gust_intensity, seed, as, to);
+                seconds, rate_hz, timecode, ltc, fps, wind_mps, gust_intensity, seed, is_checking, as, to);
 }
 inline void tell(FieldTexts& told, const std::string& where, const ExportCommand& all) {
   OPTION_FIELDS(all, paths, fps, grooms, unit, up, space, is_guides, is_drawn, has_followers, has_head, from,
@@ -96,6 +96,7 @@ const OptionRow kCommandRows[] = {
     {"--body-joint", {"Hip", "Knee"}, {{"feed.motion_file.body_joints", "Hip Knee"}}, {}, "feed"},
     {"--filter-glitches", {}, {{"feed.motion_file.is_filtering_glitches", "true"}}, {}, "feed"},
     {"--keep-first-frames", {}, {{"feed.motion_file.is_keeping_first_frames", "true"}}, {}, "feed"},
+    {"--check", {}, {{"feed.is_checking", "true"}}, {}, "feed"},
     {"--keep-facing", {}, {{"feed.is_keeping_facing", "true"}}, {}, "feed"},
     {"--loop", {}, {{"feed.is_looped", "true"}}, {}, "feed"},
     {"--live", {}, {{"feed.is_live", "true"}}, {}, "feed"},

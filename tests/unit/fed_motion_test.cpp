@@ -3,14 +3,17 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <span>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "client/app/ctl_commands.h"
+#include "client/app/hair_origin.h"
 #include "common/base/file.h"
 #include "common/motion/clip_path.h"
 #include "common/motion/motion_glitches.h"
@@ -302,6 +305,72 @@ TEST(FirstFrames, AreNoneOfAMotionThatIsItself) {
   EXPECT_EQ(find_first_frames(held).count, 61u) << "held for 0.6 s";
   clip.world_from_head.resize(20);
   EXPECT_EQ(find_first_frames(clip).count, 0u) << "too short to judge";
+}
+
+TEST_F(FedMotion, ACheckSaysWhatAClipIsTakenForAndFailsForWhatNoHeadDoes) {
+  const std::atomic<bool> stop = false;
+  FeedOptions options = options_for(clips_.front());
+  options.is_checking = true;
+  const auto check = [&] {
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    const int code = run_feed({"127.0.0.1:1", {}, {}, false, {}, nullptr, {}}, options, stop);
+    return std::tuple(code, testing::internal::GetCapturedStdout(), testing::internal::GetCapturedStderr());
+  };
+  const auto [good, taken, noted] = check();
+  EXPECT_EQ(good, kDoneExit) << "without a server";
+  EXPECT_THAT(taken, HasSubstr("walk.bvh: 360 frames, 120 per second; one unit is 1 m and +Y is up: the head "
+                               "is 1.57 to 1.63 m up, and looks 30 degrees from +Z towards +X on the mean"));
+  EXPECT_THAT(noted, AllOf(HasSubstr("the head is Head"), HasSubstr("1 of its frames left out")));
+  options.motion_file.unit_m = 0.01;
+  const auto [wrong, small, doubted] = check();
+  EXPECT_EQ(wrong, kRefusedExit);
+  EXPECT_THAT(small, HasSubstr("one unit is 0.01 m"));
+  EXPECT_EQ(doubted.find("as of no body"), doubted.rfind("as of no body")) << doubted;
+  EXPECT_THAT(doubted, HasSubstr("strandcast-ctl: "));
+  options.motion_file.joint = "Nose";
+  EXPECT_EQ(std::get<0>(check()), kBadInputExit);
+}
+
+/// Hair that walks, with these times of its samples.
+CurveMotion walk_of_curves(const std::vector<double>& time_s) {
+  CurveMotion motion{time_s, {}, 1, 9};
+  for (const double t_s : time_s)
+    motion.from_first.push_back({{0.7 * t_s, 0.03 * std::sin(6.3 * t_s), 0.2},
+                                 glm::angleAxis(0.3 * std::sin(4.0 * t_s), glm::dvec3(0.0, 1.0, 0.0))});
+  return motion;
+}
+
+// Curves leave another program as often with a T-pose as a clip does.
+TEST(HeadUnderCurves, IsJudgedAsThatOfAClip) {
+  std::vector<double> time_s;
+  for (int i = 0; i < 60; ++i) time_s.push_back(i / 24.0);
+  CurveMotion motion = walk_of_curves(time_s);
+  const MotionFile walk = head_motion(motion, {}, "a.abc", {});
+  EXPECT_EQ(walk.clip.world_from_head.size(), 60u);
+  EXPECT_THAT(walk.unlikely, testing::IsEmpty());
+  motion.from_first[0] = {{-0.5, 0.0, 0.3}, glm::angleAxis(0.7, glm::dvec3(1.0, 0.0, 0.0))};
+  const MotionFile judged = head_motion(motion, {}, "a.abc", {});
+  ASSERT_EQ(judged.clip.world_from_head.size(), 59u);
+  EXPECT_LT(glm::distance(judged.clip.world_from_head[0].position_m, motion.from_first[1].position_m), 1e-9)
+      << "where the file has it";
+  EXPECT_THAT(judged.notes, testing::Contains(HasSubstr("a.abc: 1 of its frames left out")));
+  MotionFileOptions keeps, filters;
+  keeps.is_keeping_first_frames = filters.is_filtering_glitches = true;
+  EXPECT_EQ(head_motion(motion, {}, "a.abc", keeps).clip.world_from_head.size(), 60u);
+  motion.from_first[30].position_m.y += 3.0;
+  EXPECT_THAT(head_motion(motion, {}, "a.abc", {}).unlikely,
+              testing::ElementsAre(HasSubstr("the head makes 2 steps faster")));
+  EXPECT_THAT(head_motion(motion, {}, "a.abc", filters).unlikely, testing::IsEmpty());
+}
+
+TEST(HeadUnderCurves, PassesSamplesAtTheirUnevenTimes) {
+  const CurveMotion motion = walk_of_curves({0.0, 0.1, 0.15, 0.3, 0.35, 0.6});
+  const MotionClip clip = head_motion(motion, {}, "a.abc", {}).clip;
+  EXPECT_DOUBLE_EQ(clip.duration_s(), 0.6);
+  for (size_t i = 0; i < motion.time_s.size(); ++i)
+    EXPECT_LT(glm::distance(clip.sample(motion.time_s[i]).position_m, motion.from_first[i].position_m), 1e-9)
+        << i;
 }
 
 TEST_F(FedMotion, CurvesMoveNothingWhereNobodyKnowsTheirHair) {

@@ -291,19 +291,24 @@ TEST_F(AbcTest, GuidesAreHairOnlyWhereTheyAreAlone) {
   EXPECT_THAT(none->notes, Not(Contains(HasSubstr("guides"))));
 }
 
-TEST_F(AbcTest, GuidesOfAnObjectOfTheirOwnNeedNoRootCoordinates) {
+TEST_F(AbcTest, GuidesOfAnObjectOfTheirOwnNeedNoIdsAndRootCoordinates) {
   for (const int16_t is_guide : {int16_t{1}, int16_t{0}}) {
     MadeAbc file(path());
     const std::vector<glm::vec2> uv = {{0.25f, 0.5f}, {0.75f, 1.0f}};
     const std::vector<int16_t> flag = {is_guide};
     auto other = file.curves({}, {}, {file.param("groom_guide", AbcType::I16, 1, flag)});
     other.name = "other";
-    auto hair = file.curves({}, {}, {file.param("groom_root_uv", AbcType::Float, 2, uv, "uni")});
+    const std::vector<int32_t> id = {7, 8};
+    auto hair = file.curves({}, {},
+                            {file.param("groom_root_uv", AbcType::Float, 2, uv, "uni"),
+                             file.param("groom_id", AbcType::I32, 1, id, "uni")});
     const auto groom = read_abc(file.finish({std::move(hair), std::move(other)}));
     ASSERT_TRUE(groom) << groom.error().to_string();
+    EXPECT_EQ(groom->labels.id, is_guide == 1 ? id : (std::vector<int32_t>{7, 8, 9, 10}));
     EXPECT_EQ(groom->groom.strand_count(), is_guide == 1 ? 2u : 4u);
-    const std::vector<glm::vec2> filled = {uv[0], uv[1], glm::vec2(0.0f), glm::vec2(0.0f)};
-    EXPECT_EQ(groom->groom.root_uv, is_guide == 1 ? uv : filled);
+    std::vector<glm::vec2> all = uv;
+    if (is_guide == 0) all.insert(all.end(), uv.begin(), uv.end());  // they lie where the others do
+    EXPECT_EQ(groom->groom.root_uv, all);
   }
 }
 

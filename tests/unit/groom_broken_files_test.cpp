@@ -385,33 +385,6 @@ TEST(GroomFile, TurnsMovesAndScalesInThatOrder) {
   EXPECT_EQ(load_groom(options)->pinned, (std::vector<uint8_t>{1, 1, 0, 0, 1, 1, 0, 0}));
 }
 
-/// A character of a shot stands anywhere.
-TEST(GroomFile, HairFarFromItsOriginIsBroughtToTheHead) {
-  const TemporaryFolder folder;
-  ByteFile file = small_v4();
-  GroomFileOptions options;
-  options.path = folder.write("near.tfx", file.text());
-  options.unit_m = 1.0f;
-  const auto near = load_placed_groom(options);
-  ASSERT_TRUE(near) << near.error().to_string();
-  const glm::vec3 away(120.0f, 0.0f, -40.0f);
-  for (size_t vertex = 0; vertex < near->groom.rest_position_m.size(); ++vertex)
-    for (int axis = 0; axis < 3; ++axis)
-      file.patch(160 + 16 * vertex + 4 * static_cast<size_t>(axis),
-                 near->groom.rest_position_m[vertex][axis] + away[axis]);
-  options.path = folder.write("far.tfx", file.text());
-  const auto far = load_placed_groom(options);
-  ASSERT_TRUE(far) << far.error().to_string();
-  EXPECT_THAT(far->notes, Contains(HasSubstr("126 m from the file's origin")));
-  for (size_t vertex = 0; vertex < far->groom.rest_position_m.size(); ++vertex) {
-    const glm::vec3 in_file = far->groom.rest_position_m[vertex] + far->placement.origin;
-    EXPECT_NEAR(glm::distance(in_file, near->groom.rest_position_m[vertex] + away), 0.0f, 1e-4f);
-  }
-  options.origin = glm::vec3(0.0f);
-  EXPECT_THAT(load_placed_groom(options).error().message, HasSubstr("allowed is +-100 m"))
-      << "as it is stated";
-}
-
 TEST(GroomBrokenFiles, TextUnderTheWrongNameIsCalledText) {
   const TemporaryFolder folder;
   const auto refused = [&](const std::string& text, const std::string& name) {

@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <functional>
+#include <random>
 
 #include "common/base/file.h"
 #include "common/groom/groom_file.h"
@@ -118,6 +120,58 @@ TEST(FurAndBeards, FurOfABodyNeverGetsAHeadsUnit) {
   const PlacedGroom stated = placed({write(folder, "doll.ply", fur, 0.1f, "comment unit_m 0.1\n")});
   EXPECT_EQ(stated.placement.unit_m, 0.1f);
   EXPECT_EQ(stated.unlikely, "");
+}
+
+// As flat as a disc is, but its hair grows to all sides.
+TEST(FurAndBeards, FurOfASlenderBodyKeepsTheUnitThatIsStated) {
+  const TemporaryFolder folder;
+  std::vector<Strand> fur;
+  for (int i = 0; i < 400; ++i) {
+    const glm::vec3 out(std::sin(2.399963f * static_cast<float>(i)), 0.0f,
+                        std::cos(2.399963f * static_cast<float>(i)));
+    const glm::vec3 root = 0.15f * out + glm::vec3(0.0f, 1.7f * static_cast<float>(i) / 400.0f, 0.0f);
+    fur.push_back({root, root + 0.02f * out, root + 0.04f * out});
+  }
+  for (const char* const said : {"comment unit_m 1\n", ""}) {
+    const PlacedGroom found = placed({write(folder, "fuzz.ply", fur, 1.0f, said)});
+    EXPECT_FALSE(found.is_of_head);
+    EXPECT_EQ(found.unlikely, "");
+    EXPECT_EQ(found.placement.unit_m, 1.0f);
+  }
+}
+
+TEST(GroomParts, AStrandWhoseRootStandsAloneIsLeftOut) {
+  const TemporaryFolder folder;
+  const std::vector<Strand> strands = hair(is_of_scalp);
+  const auto count_with = [&](size_t moved, float off_m, const char* note) {
+    std::vector<Strand> other = strands;
+    for (size_t i = 0; i < moved; ++i)
+      for (glm::vec3& point : other[40 + i]) point.x += off_m;
+    const PlacedGroom found = placed({write(folder, "off.ply", other, 1.0f, "comment unit_m 1\n")});
+    EXPECT_THAT(found.notes, Contains(HasSubstr(note)));
+    EXPECT_TRUE(off_m < 0.9f || found.unlikely.empty()) << "the others say how large the head is";
+    return found.groom.strand_count();
+  };
+  const auto all = static_cast<uint32_t>(strands.size());
+  EXPECT_EQ(count_with(1, 1.0f, "1 of 4"), all - 1);
+  EXPECT_EQ(count_with(1, 0.2f, "strands x 6"), all) << "beside the head";
+  EXPECT_EQ(count_with(12, 0.6f, "strands x 6"), all) << "a patch, which is meant";
+}
+
+TEST(GroomParts, HairFarAwayOnItsStageIsBroughtHere) {
+  const TemporaryFolder folder;
+  GroomFileOptions options;
+  options.path =
+      write(folder, "far.ply", hair(is_of_scalp, 0.25f, {100.0f, 1.6f, -40.0f}), 1.0f, "comment unit_m 1\n");
+  EXPECT_THAT(load_placed_groom(options).error().to_string(), HasSubstr("allowed is +-100 m"))
+      << "where its origin is stated";
+  options.origin.reset();
+  const auto found = load_placed_groom(options);
+  ASSERT_TRUE(found) << found.error().to_string();
+  EXPECT_THAT(found->notes, Contains(HasSubstr("it stands 107.7 m from the origin, and is brought here")));
+  for (const glm::vec3& root : roots_of(found->groom)) EXPECT_LT(glm::length(root), 2.0f * kHeadM);
+  options.path = write(folder, "near.ply", hair(is_of_scalp, 0.25f, {1.0f, 1.6f, -4.0f}), 1.0f);
+  EXPECT_EQ(load_placed_groom(options)->placement.origin, glm::vec3(0.0f));
 }
 
 TEST(GroomParts, AFileInAnotherUnitIsFoundByWhereItsRootsLie) {
@@ -248,6 +302,23 @@ TEST(GroomParts, HairThatFallsStraightDownIsLeftAsItIs) {
   EXPECT_THAT(found.notes, Not(Contains(HasSubstr("from tip to root"))));
 }
 
+// Few guides leave 20 degrees between roots, where they happen to be.
+TEST(GroomParts, FewGuidesOfASymmetricHeadFaceAhead) {
+  const TemporaryFolder folder;
+  for (uint32_t seed = 1; seed <= 8; ++seed) {
+    std::mt19937 random(seed);
+    std::vector<Strand> strands;
+    while (strands.size() < 80) {
+      const auto number = [&] { return static_cast<float>(random()) / 2147483648.0f - 1.0f; };
+      const glm::vec3 out(number(), number(), number());
+      if (glm::length(out) > 1.0f || !is_of_scalp(glm::normalize(out))) continue;
+      const glm::vec3 root = kHeadM * glm::normalize(out);
+      strands.push_back({root, 1.3f * root, 1.3f * root - glm::vec3(0.0f, 0.1f, 0.0f)});
+    }
+    EXPECT_EQ(placed({write(folder, "few.ply", strands, 1.0f)}).placement.yaw_deg, 0.0f) << seed;
+  }
+}
+
 /// A skull that is longer than wide, with a face: no turn of it is like it.
 Mesh skull(const std::function<glm::vec3(const glm::vec3&)>& change) {
   Mesh mesh = make_head(kHeadM);
@@ -281,10 +352,27 @@ TEST(HeadMesh, OneThatDoesNotFitItsHairIsTold) {
   EXPECT_THAT(scaled(0.1f), HasSubstr("if it is made 10 times as large"));
   EXPECT_THAT(scaled(10.0f), HasSubstr("if it is made 0.1 times as large"));
   EXPECT_THAT(scaled(100.0f), HasSubstr("if it is made 0.01 times as large"));
-  EXPECT_THAT(told([](const glm::vec3& p) { return p + glm::vec3(0.4f, 0.0f, 0.0f); }),
-              HasSubstr("no usual turn or size brings it there"));
-  EXPECT_THAT(told([](const glm::vec3& p) { return p + glm::vec3(0.0f, 0.06f, 0.0f); }),
-              HasSubstr("no usual turn or size brings it there"));
+  const auto moved = [&](const glm::vec3& by_m) {
+    return told([&](const glm::vec3& p) { return p + by_m; });
+  };
+  for (const glm::vec3& by_m : {glm::vec3(0.4f, 0.0f, 0.0f),
+                                {0.0f, 0.0f, 0.03f},
+                                {-0.03f, 0.0f, 0.0f},
+                                {0.0f, 0.06f, 0.0f},
+                                {0.02f, -1.5f, 0.0f}}) {
+    const std::string text = moved(by_m);
+    glm::vec3 back_mm;
+    const size_t begin = std::min(text.find("moved by about ("), text.size());
+    ASSERT_EQ(std::sscanf(text.c_str() + begin, "moved by about (%f, %f, %f) mm", &back_mm.x, &back_mm.y,
+                          &back_mm.z),
+              3)
+        << by_m.x << " " << by_m.y << " " << by_m.z << text;
+    EXPECT_LT(glm::distance(back_mm, -1000.0f * by_m), 8.0f) << text;
+  }
+  EXPECT_EQ(moved({0.0f, 0.01f, 0.0f}), "") << "as hair may stand off";
+  EXPECT_THAT(told([](const glm::vec3& p) { return p.y > 0.0f ? 2.0f * p : 0.3f * p; }),
+              HasSubstr("no usual turn, size or movement brings it there"))
+      << "another's";
   EXPECT_THAT(told([](const glm::vec3& p) { return glm::vec3(-p.x, p.y, -p.z); }),
               HasSubstr("turned by 180 degrees about Y"));
   EXPECT_THAT(told([](const glm::vec3& p) { return glm::vec3(p.z, p.y, -p.x); }),

@@ -13,7 +13,6 @@ namespace {
 using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
-using ::testing::Not;
 
 std::string refusal(const std::string& text) {
   const auto groom = read_usd(text);
@@ -257,12 +256,11 @@ TEST(Usda, WhatTheFileSaysOfStrandsIsKeptWhereItFits) {
   EXPECT_EQ(hair->labels.width, (std::vector<float>{0.2f, 0.2f, 0.2f, 0.4f, 0.4f})) << "as large as the hair";
   EXPECT_EQ(hair->groom.root_uv, (std::vector<glm::vec2>{{0.1f, 0.2f}, {0.3f, 0.4f}}));
   EXPECT_EQ(hair->labels.object_name, std::vector<std::string>{"Hair"});
-  // What some strands do not say is filled in, and a list that fits nothing says nothing.
+  // Who lacks an id gets a further one, and a list that fits nothing says nothing.
   const std::string other = "def BasisCurves \"Other\" {\n" + kLines + more + "}\n";
   const auto two = read_usd(stage(kLines + ids + more) + other);
   ASSERT_TRUE(two) << two.error().to_string();
   EXPECT_EQ(two->labels.id, (std::vector<int32_t>{7, -3, 8, 9}));
-  EXPECT_THAT(two->notes, Contains(HasSubstr("2 of 4 strands do not state what others do (ids)")));
   EXPECT_EQ(two->labels.group, (std::vector<int32_t>{4, 5, 4, 5}));
   EXPECT_EQ(two->labels.object, (std::vector<uint32_t>{0, 0, 1, 1}));
   const auto unfit = read_usd(stage(kLines + "int[] primvars:groom_id = [7]\nfloat[] widths = [1, 2, 3]\n"));
@@ -272,35 +270,6 @@ TEST(Usda, WhatTheFileSaysOfStrandsIsKeptWhereItFits) {
   std::string many = "float[] primvars:groom_id = [1";
   for (uint32_t i = 0; i <= 2 * kMaxStrandCount; ++i) many += ",1";
   EXPECT_EQ(refusal(stage(kLines + many + "]\n")), "accepted");
-}
-
-/// Guides, and brows that another tool made, often have less than the hair.
-TEST(Usda, CurvesThatSayLessCostTheOthersNothing) {
-  const std::string more =
-      "int[] primvars:groom_id = [7, 9]\nint[] primvars:groom_group_id = [4, 5]\nfloat[] widths = [0.1, "
-      "0.2]\n"
-      "texCoord2f[] primvars:groom_root_uv = [(0.1, 0.2), (0.3, 0.4)]\n";
-  const auto whole = read_usd(stage(kLines + more));
-  for (const bool is_first : {false, true}) {
-    const std::string guides =
-        "def BasisCurves \"Guides\" {\nuniform token purpose = \"guide\"\n" + kLines + "}\n";
-    const auto hair = read_usd(is_first ? stage(kLines + "uniform token purpose = \"guide\"\n") +
-                                              "def BasisCurves \"Hair\" {\n" + kLines + more + "}\n"
-                                        : stage(kLines + more) + guides);
-    ASSERT_TRUE(whole && hair);
-    EXPECT_EQ(hair->labels.id, whole->labels.id);
-    EXPECT_EQ(hair->labels.group, whole->labels.group);
-    EXPECT_EQ(hair->labels.width, whole->labels.width);
-    EXPECT_EQ(hair->groom.root_uv, whole->groom.root_uv);
-    EXPECT_THAT(hair->notes, Not(Contains(HasSubstr("filled in"))));
-  }
-  const auto brows = read_usd(stage(kLines + more) + "def BasisCurves \"Brows\" {\n" + kLines + "}\n");
-  ASSERT_TRUE(brows);
-  EXPECT_EQ(brows->labels.id, (std::vector<int32_t>{7, 9, 10, 11}));
-  EXPECT_EQ(brows->labels.group, (std::vector<int32_t>{4, 5, 0, 0}));
-  EXPECT_EQ(brows->labels.width.size(), 10u);
-  EXPECT_EQ(brows->labels.width[9], 0.1f) << "the usual one";
-  EXPECT_EQ(brows->groom.root_uv[3], glm::vec2(0.0f));
 }
 
 TEST(Usda, CurvesWithoutASegmentAreLeftOutAndCounted) {
@@ -340,6 +309,33 @@ TEST(Usda, GuidesAreNoHairUnlessAllAre) {
     EXPECT_EQ(guides.groom.strand_count(), 2u) << all;
     EXPECT_THAT(guides.notes, Contains("all strands are guides: they are taken as hair")) << all;
   }
+}
+
+TEST(Usda, GuidesThatLackWhatHairSaysTakeNothingFromIt) {
+  const std::string said =
+      "int[] primvars:groom_id = [7, 8]\nint[] primvars:groom_group_id = [1, 2]\ntexCoord2f[] "
+      "primvars:groom_root_uv = [(0.1, 0.2), (0.3, 0.4)]\nfloat[] widths = [0.5]\n";
+  const auto read_with = [&](const char* purpose) {
+    auto hair = read_usd("#usda 1.0\ndef BasisCurves \"Hair\"\n{\n" + kLines + said +
+                         "}\ndef BasisCurves \"Guides\"\n{\nuniform token purpose = \"" + purpose + "\"\n" +
+                         kLines + "}\n");
+    EXPECT_TRUE(hair) << hair.error().to_string();
+    return std::move(hair).value();
+  };
+  const StatedGroom hair = read_with("guide");
+  EXPECT_EQ(hair.groom.strand_count(), 2u);
+  EXPECT_EQ(hair.labels.id, (std::vector<int32_t>{7, 8}));
+  EXPECT_EQ(hair.labels.group, (std::vector<int32_t>{1, 2}));
+  EXPECT_EQ(hair.labels.width, std::vector<float>(5, 0.5f));
+  EXPECT_EQ(hair.groom.root_uv, (std::vector<glm::vec2>{{0.1f, 0.2f}, {0.3f, 0.4f}}));
+  const StatedGroom more = read_with("render");
+  EXPECT_EQ(more.groom.strand_count(), 4u);
+  EXPECT_EQ(more.labels.id, (std::vector<int32_t>{7, 8, 9, 10}));
+  EXPECT_EQ(more.labels.group, (std::vector<int32_t>{1, 2, 3, 3}));
+  EXPECT_EQ(more.labels.width, std::vector<float>(10, 0.5f));
+  EXPECT_EQ(more.groom.root_uv.size(), 4u);
+  EXPECT_THAT(more.notes, Contains(HasSubstr("2 of 4 strands lack an id, a group, widths or root coord")));
+  EXPECT_THAT(hair.notes, testing::Not(Contains(HasSubstr("strands lack"))));
 }
 
 // What a prim is for goes on to what is in it, unless that says another thing.

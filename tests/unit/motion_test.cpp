@@ -408,6 +408,76 @@ TEST(WindCsv, BridgesGapsAndCountsThem) {
 }
 
 // As cameras have it: the same clip, turned over about +Z, is the same motion.
+// As mannequins that look along +Y, avatars along -Z and rigs along +X have it: a nod lowers the face of
+// each.
+TEST(RestPose, FacesWhereItsLeftAndRightJointsLie) {
+  struct Case {
+    const char *up, *left, *right, *to_left, *nod;
+    glm::dvec3 face;  // in the world
+    const char* said;
+  };
+  for (const Case& item :
+       {Case{"0 2 0", "LeftArm", "RightArm", "1 0 0", "30 0 0", {0, 0, 1}, ""},
+        {"0 2 0", "LeftArm", "RightArm", "-1 0 0", "-30 0 0", {0, 0, -1}, "its rest pose faces -Z"},
+        {"0 0 2", "clavicle_l", "clavicle_r", "-1 0 0", "-30 0 0", {0, 0, -1}, "its rest pose faces -Z"},
+        {"0 2 0", "lShldr", "rShldr", "0 0 -1", "0 0 -30", {1, 0, 0}, "its rest pose faces +X"},
+        {"0 2 0", "Bip01 L Hand", "Bip01 R Hand", "0 0 1", "0 0 30", {-1, 0, 0}, "its rest pose faces -X"}}) {
+    SCOPED_TRACE(item.left + std::string(item.to_left));
+    const auto arm = [](const std::string& name, const std::string& offset) {
+      return "JOINT " + name + "\n{\nOFFSET " + offset + "\nCHANNELS 0\nEnd Site\n{\nOFFSET 0 0 0\n}\n}\n";
+    };
+    const std::string text = fmt::format(
+        "HIERARCHY\nROOT Hips\n{{\nOFFSET 0 0 0\nCHANNELS 0\n{}{}JOINT Head\n{{\nOFFSET {}\n"
+        "CHANNELS 3 Xrotation Yrotation Zrotation\nEnd Site\n{{\nOFFSET 0 0 0\n}}\n}}\n}}\n"
+        "MOTION\nFrames: 2\nFrame Time: .01\n0 0 0\n{}\n",
+        arm(item.left, item.to_left), arm(item.right, "0 0 0"), item.up, item.nod);
+    BvhOptions options;
+    options.unit_m = 1.0;
+    options.has_body = true;
+    const auto clip = parse_bvh(text, "x.bvh", options);
+    ASSERT_TRUE(clip) << clip.error().to_string();
+    const glm::dvec3 ahead(0, 0, 1), up(0, 1, 0);
+    EXPECT_LT(glm::distance(clip->world_from_head[0].rotation * ahead, item.face), 1e-9);
+    EXPECT_LT(glm::distance(clip->world_from_head[0].rotation * up, up), 1e-9);
+    EXPECT_NEAR((clip->world_from_head[1].rotation * ahead).y, -0.5, 1e-9);
+    EXPECT_THAT(clip->facing_reason, StartsWith(item.said));
+    EXPECT_EQ(clip->facing_reason.empty(), std::string(item.said).empty());
+    if (clip->joint_name.empty()) continue;
+    EXPECT_NEAR(clip->joint_m[0].x, 1.0, 1e-9) << "to its left";
+  }
+}
+
+/// A hip with a head straight above it; `rows`: place of the hips, and rotation about X.
+Result<MotionClip> clip_of_two_joints(double bone, const std::vector<std::string>& rows) {
+  std::string text = fmt::format(
+      "HIERARCHY\nROOT Hips\n{{\nOFFSET 0 0 0\nCHANNELS 4 Xposition Yposition Zposition Xrotation\nJOINT "
+      "Head\n{{\nOFFSET 0 {} 0\nCHANNELS 0\nEnd Site\n{{\nOFFSET 0 0 0\n}}\n}}\nJOINT Foot\n{{\nOFFSET 0 -{} "
+      "0\nCHANNELS 0\nEnd Site\n{{\nOFFSET 0 0 0\n}}\n}}\n}}\nMOTION\nFrames: {}\nFrame Time: .01\n",
+      0.5 * bone, 0.5 * bone, rows.size());
+  for (const std::string& row : rows) text += row + "\n";
+  return parse_bvh(text, "x.bvh", BvhOptions());
+}
+
+TEST(ClipUnit, ChildrenHaveTheCommonUnits) {
+  for (const double unit_m : {1e-3, 1e-2, 1.0})
+    for (const double body_m : {0.9, 1.11, 1.3})
+      EXPECT_EQ(clip_of_two_joints(body_m / unit_m, {"0 0 0 0"})->file_unit_m, unit_m) << body_m;
+  EXPECT_NE(clip_of_two_joints(0.7, {"0 0 0 0"})->file_unit_m, 1.0) << "too small for one who walks";
+}
+
+// On all fours the head is ahead of the hips, but the floor stays below.
+TEST(UpAxis, IsNotWhereSomebodyCrawlsTo) {
+  const auto crawl_over = [](double way_m) {
+    std::vector<std::string> rows;
+    for (int i = 0; i <= 20; ++i) rows.push_back(fmt::format("0 0.4 {} 90", 0.5 + way_m * i / 20.0));
+    return clip_of_two_joints(1.7, rows).value();
+  };
+  const MotionClip crawl = crawl_over(2.7);
+  EXPECT_EQ(crawl.up_reason, "");
+  for (const Pose& pose : crawl.world_from_head) EXPECT_NEAR(pose.position_m.y, 0.4, 1e-9);
+  EXPECT_THAT(crawl_over(0.1).up_reason, StartsWith("+Z is taken as up")) << "who stays there stands";
+}
+
 TEST(MotionFileAxes, MayHaveYDown) {
   constexpr std::string_view kHead =
       "CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\nJOINT Head\n{\n";
@@ -476,6 +546,10 @@ TEST(MotionFile, DoubtsAStatedUnitAndAxisThatMakeNoBody) {
   const auto z_up = load_motion_file(clip, {.unit_m = 0.0, .up = "z", .joint = ""});
   ASSERT_TRUE(z_up) << z_up.error().to_string();
   EXPECT_THAT(z_up->notes, testing::Contains(HasSubstr("degrees off upright: +Y is likely (--up)")));
+  MotionFileOptions of_bake;
+  of_bake.prefix = "--motion-";
+  EXPECT_THAT(load_motion_file(clip, of_bake)->notes,
+              testing::Contains(HasSubstr("(--motion-unit states another)")));
   const auto right = load_motion_file(clip, {.unit_m = 0.01, .up = "y", .joint = ""});
   ASSERT_TRUE(right) << right.error().to_string();
   EXPECT_THAT(right->notes, Not(testing::Contains(HasSubstr("is likely"))));

@@ -13,7 +13,7 @@ inline void tell(FieldTexts& told, const std::string& where, const ExecutorConfi
 }
 inline void tell(FieldTexts& told, const std::string& where, const MotionFileOptions& all) {
   OPTION_FIELDS(all, unit_m, up, joint, fps, has_body, body_joints, is_filtering_glitches,
-                is_keeping_first_frames);
+                is_keeping_first_frames, prefix);
 }
 inline void tell(FieldTexts& told, const std::string& where, const RenderSize& all) {
   OPTION_FIELDS(all, width, height);
