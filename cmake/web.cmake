@@ -70,8 +70,8 @@ strandcast_small(common/kernels head_path.cpp lane_program.cpp step_input.cpp st
   strand_passes.cpp told_field.cpp)
 strandcast_small(common/strands delta_codec.cpp frame_header.cpp raw_codec.cpp scene_asset.cpp strand_codec.cpp
   strand_payload.cpp strand_prefix.cpp zstd_block.cpp tangent/codec.cpp tangent/fit.cpp tangent/fit_shape.cpp tangent/head.cpp
-  tangent/layout.cpp tangent/order.cpp asset/head.cpp asset/lattice.cpp asset/strands.cpp asset/triangles.cpp
-  step/predictor_state.cpp step/rod_planes.cpp step/steps.cpp step/wire.cpp)
+  tangent/layout.cpp tangent/order.cpp asset/form.cpp asset/head.cpp asset/lattice.cpp asset/strands.cpp asset/triangles.cpp
+  head/head_form.cpp head/head_mesh.cpp step/predictor_state.cpp step/rod_planes.cpp step/steps.cpp step/wire.cpp)
 strandcast_small(. common/groom/mesh.cpp common/scene/hair_color.cpp common/scene/scene_desc.cpp common/render/head_occupancy.cpp common/render/look_lights.cpp
   common/render/rest_facts.cpp common/render/scalp_cover.cpp common/render/strand_detail.cpp common/render/strand_style.cpp
   common/render/view.cpp common/render/gl_tiles/tile_block.cpp client/web/fmt/format.cpp)

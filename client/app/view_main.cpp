@@ -1,6 +1,7 @@
 // strandcast-view: shows the hair of a running server, in a window or (--headless) as pictures and a report.
 #include <exception>
 #include <iostream>
+#include <thread>
 
 #include "client/app/diagnose.h"
 #include "client/app/recording_film.h"
@@ -10,6 +11,7 @@
 #include "client/app/views.h"
 #include "common/base/output_file.h"
 #include "common/log/log.h"
+#include "common/strands/head/head_mesh.h"
 
 namespace {
 
@@ -47,6 +49,8 @@ int run(int argc, char** argv) {
     const Status played = run_playback(options, stop);
     return played ? 0 : fail(played.error().to_string());
   }
+  // While connecting: the asset names it.
+  const std::jthread head_maker([] { make_head(1.0f); });
   auto report = options.is_headless ? run_headless(options, stop) : run_windowed(options, stop);
   if (!report) return fail(report.error().to_string());
   std::cout << to_summary(*report);

@@ -41,7 +41,7 @@ StrandCoreState state_of(const Snapshot& snapshot) {
 }
 
 Status set_asset(StrandCoreDecoder& core, std::span<const std::byte> payload) {
-  ASSIGN_OR_RETURN(const SceneAsset asset, decode_scene_asset(payload));
+  ASSIGN_OR_RETURN(const SceneAsset asset, decode_asset_strands(payload));
   if (asset.strand_count != core.limits.strand_count || asset.vertex_count != core.limits.vertex_count)
     return make_error(ErrorCode::BadInput, "the asset has {} strands of {} vertices, {} of {} were announced",
                       asset.strand_count, asset.vertex_count, core.limits.strand_count,

@@ -19,6 +19,7 @@
 #include "common/render/tiles/tile_bins.h"
 #include "common/render/tiles/tile_raster.h"
 #include "common/render/view.h"
+#include "common/strands/head/head_mesh.h"
 
 using namespace strandcast;
 
@@ -335,6 +336,9 @@ void draw_tiles(StrandPicture& p, uint32_t begin, uint32_t end) {
 
 }  // namespace
 
+STRAND_CORE_EXPORT void strand_picture_expect_asset() {
+  make_head(1.0f);
+}
 STRAND_CORE_EXPORT StrandPicture* strand_picture_make(const std::byte* payload, size_t size_bytes) {
   auto asset = decode_scene_asset({payload, size_bytes});
   if (!asset) {

@@ -104,6 +104,8 @@ static_assert(sizeof(StrandPictureHead) == 24);
 
 extern "C" {
 
+/// Makes the built-in head, which takes a while, before an asset that has it is here.
+void strand_picture_expect_asset(void);
 /// Makes a picture from the payload of an asset message; nullptr on failure, when strand_core_error() says
 /// why.
 StrandPicture* strand_picture_make(const std::byte* payload, size_t size_bytes);

@@ -242,7 +242,7 @@ void ViewerClient::Connection::greet() {
                              one_line(view(chosen)), kWebSocketProtocol));
   set_deadline(config_.welcome_timeout, "sent no Welcome");
   Hello hello = config_.hello;
-  hello.asset_layout = static_cast<uint32_t>(kNewestAssetLayout);
+  hello.asset_layout = static_cast<uint32_t>(newest_asset_layout());
   if (auto sent = send(encode(ClientMessage(hello))); !sent) return finish(sent.error());
   read_next();
 }

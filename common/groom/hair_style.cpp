@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "common/base/hash.h"
-#include "common/groom/head_field.h"
+#include "common/strands/head/head_field.h"
 
 namespace strandcast {
 namespace {

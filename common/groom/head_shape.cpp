@@ -7,8 +7,8 @@
 #include <numbers>
 
 #include "common/base/quantile.h"
-#include "common/groom/head_field.h"
 #include "common/groom/head_fit.h"
+#include "common/strands/head/head_field.h"
 
 namespace strandcast {
 namespace {
@@ -36,96 +36,21 @@ constexpr double kStrayPull = 0.6;
 constexpr double kMostDentM = 0.003, kRootedRad = 0.15;
 /// How far the built-in surface may rise between the centres of two directions (ears, nose), in skull radii.
 constexpr double kCellSpread = 0.3;
-// The neck and the bust below this height, in skull radii, give way to hair sideways. Their axis is that of
-// head_field.cpp: along the neck, then straight down.
-constexpr double kNeckTop = -0.72, kBustEnd = -3.95;
-constexpr double kNeckAxisZ = -0.14, kNeckAxisY = -0.70, kNeckLean = 0.19, kBustAxisZ = -0.40;
-constexpr int kNeckRows = 32, kNeckColumns = 24;
 /// No thinner than this share.
 constexpr double kThinnestNeck = 0.45;
 /// Before that the shoulders sink, and the neck between these heights gets longer: at most by so much, in
 /// such steps, and only if that keeps clear of more of the hair than it costs in looks.
-constexpr double kStretchTop = -1.45, kStretchEnd = -2.05;
 constexpr double kMostDrop = 0.7, kDropStep = 0.05, kDropCost = 0.5;
 /// Fewer vertices than this share of the hair's count as if they were so many.
 constexpr double kDropLeast = 0.02;
-/// Roots pull the head, down to here in full and from there on not at all.
-constexpr double kPullEnd = -1.4, kNoPull = -2.1;
 constexpr double kFurthestHead =
     1.95;                          // no part of the head without the bust is further away, in skull radii
 constexpr double kFurthest = 5.5;  // nor any part of the bust
 
-// Directions are the cells of a cube's six faces, evenly spaced in angle along both edges.
-constexpr int kSide = 16;
-constexpr int kCells = 6 * kSide * kSide;
-
-struct FacePoint {
-  int face = 0;
-  double x = 0.0, y = 0.0;  // -1..1 across the face
-};
-
-FacePoint face_point(const glm::dvec3& d) {
-  const glm::dvec3 size = glm::abs(d);
-  const int axis = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
-  const double along = std::max(size[axis], 1e-300);
-  const auto even = [&](double value) { return std::atan(value / along) * 4.0 / std::numbers::pi; };
-  return {2 * axis + (d[axis] < 0.0 ? 1 : 0), even(d[(axis + 1) % 3]), even(d[(axis + 2) % 3])};
-}
-
-glm::dvec3 direction_of(const FacePoint& at) {
-  glm::dvec3 d;
-  const int axis = at.face / 2;
-  d[axis] = at.face % 2 == 0 ? 1.0 : -1.0;
-  d[(axis + 1) % 3] = std::tan(at.x * std::numbers::pi / 4.0);
-  d[(axis + 2) % 3] = std::tan(at.y * std::numbers::pi / 4.0);
-  return glm::normalize(d);
-}
-
-double center_of_row(int row) {
-  return 2.0 * (row + 0.5) / kSide - 1.0;
-}
-
-int cell_of(const glm::dvec3& direction) {
-  const FacePoint at = face_point(direction);
-  const auto row = [](double value) {
-    return std::clamp(static_cast<int>((value + 1.0) / 2.0 * kSide), 0, kSide - 1);
-  };
-  return (at.face * kSide + row(at.y)) * kSide + row(at.x);
-}
-
-const std::vector<glm::dvec3>& cell_directions() {
-  static const std::vector<glm::dvec3> kDirections = [] {
-    std::vector<glm::dvec3> directions;
-    for (int cell = 0; cell < kCells; ++cell)
-      directions.push_back(direction_of(
-          {cell / (kSide * kSide), center_of_row(cell % kSide), center_of_row(cell / kSide % kSide)}));
-    return directions;
-  }();
-  return kDirections;
-}
-
-/// A field on the directions, between the centres of its cells; neighbours across an edge of the cube
-/// included.
-double blend(const std::vector<double>& field, const glm::dvec3& direction) {
-  const FacePoint at = face_point(direction);
-  const double x = (at.x + 1.0) / 2.0 * kSide - 0.5, y = (at.y + 1.0) / 2.0 * kSide - 0.5;
-  const double low_x = std::floor(x), low_y = std::floor(y);
-  const auto value = [&](double column, double row) {
-    if (column >= 0.0 && row >= 0.0 && column < kSide && row < kSide)
-      return field[static_cast<size_t>((at.face * kSide + static_cast<int>(row)) * kSide +
-                                       static_cast<int>(column))];
-    const FacePoint beyond{at.face, 2.0 * (column + 0.5) / kSide - 1.0, 2.0 * (row + 0.5) / kSide - 1.0};
-    return field[static_cast<size_t>(cell_of(direction_of(beyond)))];
-  };
-  return std::lerp(std::lerp(value(low_x, low_y), value(low_x + 1.0, low_y), x - low_x),
-                   std::lerp(value(low_x, low_y + 1.0), value(low_x + 1.0, low_y + 1.0), x - low_x),
-                   y - low_y);
-}
-
 /// Visits every cell within `reach_rad` of a direction with its angle to it.
 template <class Visit>
 void near_cells(const glm::dvec3& direction, double reach_rad, const Visit& visit) {
-  const std::vector<glm::dvec3>& cells = cell_directions();
+  const std::vector<glm::dvec3>& cells = head::cell_directions();
   const double least = std::cos(std::min(reach_rad, std::numbers::pi));
   for (size_t i = 0; i < cells.size(); ++i) {
     const double cosine = glm::dot(cells[i], direction);
@@ -159,27 +84,10 @@ double built_in_radius(const glm::dvec3& direction) {
 const std::vector<double>& built_in_radii() {
   static const std::vector<double> kRadii = [] {
     std::vector<double> radii;
-    for (const glm::dvec3& direction : cell_directions()) radii.push_back(built_in_radius(direction));
+    for (const glm::dvec3& direction : head::cell_directions()) radii.push_back(built_in_radius(direction));
     return radii;
   }();
   return kRadii;
-}
-
-glm::dvec3 neck_axis(double y) {
-  return {0.0, y, std::max(kNeckAxisZ + kNeckLean * (y - kNeckAxisY), kBustAxisZ)};
-}
-
-/// Row and column of a point of the neck on its grid of heights and azimuths.
-glm::dvec2 neck_grid(const glm::dvec3& u) {
-  const glm::dvec3 offset = u - neck_axis(u.y);
-  const double turns = std::atan2(offset.x, offset.z) / (2.0 * std::numbers::pi) + 1.0;
-  const double row = (kNeckTop - u.y) / (kNeckTop - kBustEnd) * (kNeckRows - 1);
-  return {std::clamp(row, 0.0, kNeckRows - 1.0), turns * kNeckColumns};
-}
-
-size_t neck_cell(int row, int column) {
-  return static_cast<size_t>(std::clamp(row, 0, kNeckRows - 1) * kNeckColumns +
-                             (column + kNeckColumns) % kNeckColumns);
 }
 
 /// Gauss elimination of six normal equations, which the priors keep positive definite.
@@ -200,13 +108,11 @@ std::array<double, 6> solve(std::array<std::array<double, 7>, 6> rows) {
 
 }  // namespace
 
-HeadShape::HeadShape(const Groom& groom, const FittedSphere& about, HeadFit fit)
-    : center_m_(about.center_m),
-      radius_m_(about.radius_m),
-      pull_(kCells, 1.0),
-      neck_width_(kNeckRows * kNeckColumns, 1.0) {
+HeadShape::HeadShape(const Groom& groom, const FittedSphere& about, HeadFit fit) {
+  form_.center_m = glm::dvec3(about.center_m);
+  form_.radius_m = glm::dvec3(static_cast<double>(about.radius_m));
   if (fit == HeadFit::Whole) {
-    radius_m_ /= kSkull;
+    form_.radius_m /= kSkull;
     stretch_to_roots(groom);
     pull_to_roots(groom);
     give_way_to_hair(groom);
@@ -216,70 +122,60 @@ HeadShape::HeadShape(const Groom& groom, const FittedSphere& about, HeadFit fit)
 }
 
 glm::dvec3 HeadShape::in_skull_radii(const glm::vec3& point_m) const {
-  return (glm::dvec3(point_m) - center_m_) / radius_m_;
-}
-
-double HeadShape::pull_at(const glm::dvec3& u) const {
-  const double length = glm::length(u);
-  const double share = std::clamp((u.y - kNoPull) / (kPullEnd - kNoPull), 0.0, 1.0);
-  if (!(length > 0.0) || share == 0.0) return 1.0;
-  return std::lerp(1.0, blend(pull_, u / length), share * share * (3.0 - 2.0 * share));
+  return (glm::dvec3(point_m) - form_.center_m) / form_.radius_m;
 }
 
 /// The built-in head's height that comes to lie at `y` when the neck is longer, and the other way round.
 double HeadShape::before_the_drop(double y) const {
-  const double stretched = kStretchTop - kStretchEnd + drop_;
-  const double below = kStretchTop - y;
-  return y + drop_ * std::clamp(below / stretched, 0.0, 1.0);
+  const double stretched = head::kStretchTop - head::kStretchEnd + form_.drop;
+  const double below = head::kStretchTop - y;
+  return y + form_.drop * std::clamp(below / stretched, 0.0, 1.0);
 }
-double HeadShape::after_the_drop(double y) const {
-  return y - drop_ * std::clamp((kStretchTop - y) / (kStretchTop - kStretchEnd), 0.0, 1.0);
-}
-
 // The least drop that pays: its share of kDropCost against the share of the hair that it keeps clear of.
 void HeadShape::lower_shoulders(const Groom& groom) {
   std::vector<glm::dvec3> near;
   for (const glm::vec3& point : groom.rest_position_m) {
     const glm::dvec3 u = in_skull_radii(point);
-    if (u.y < kStretchTop && glm::length(u) < kFurthest && distance_in_radii(u) < 0.0) near.push_back(u);
+    if (u.y < head::kStretchTop && glm::length(u) < kFurthest && distance_in_radii(u) < 0.0)
+      near.push_back(u);
   }
   const double before = std::max(static_cast<double>(near.size()),
                                  kDropLeast * static_cast<double>(groom.rest_position_m.size()));
   double best = 0.0, least_cost = static_cast<double>(near.size()) / before;
-  for (drop_ = kDropStep; drop_ < kMostDrop + 0.5 * kDropStep; drop_ += kDropStep) {
+  for (form_.drop = kDropStep; form_.drop < kMostDrop + 0.5 * kDropStep; form_.drop += kDropStep) {
     const auto inside = static_cast<double>(std::count_if(
         near.begin(), near.end(), [&](const glm::dvec3& u) { return distance_in_radii(u) < 0.0; }));
-    const double cost = inside / before + kDropCost * drop_ / kMostDrop;
-    if (cost < least_cost) least_cost = cost, best = drop_;
+    const double cost = inside / before + kDropCost * form_.drop / kMostDrop;
+    if (cost < least_cost) least_cost = cost, best = form_.drop;
   }
-  drop_ = best;
+  form_.drop = best;
 }
 
 // Least squares of an ellipsoid through the mean root of each direction, with what is known of heads as
 // prior.
 void HeadShape::stretch_to_roots(const Groom& groom) {
-  std::vector<glm::dvec4> cells(kCells, glm::dvec4(0.0));
+  std::vector<glm::dvec4> cells(head::kCells, glm::dvec4(0.0));
   for (const glm::vec3& root : roots_of(groom)) {
     const glm::dvec3 u = in_skull_radii(root);
     const double length = glm::length(u);
     if (length >= kNearestRoot && length <= kFurthestRoot)
-      cells[static_cast<size_t>(cell_of(u / length))] += glm::dvec4(glm::dvec3(root), 1.0);
+      cells[static_cast<size_t>(head::cell_of(u / length))] += glm::dvec4(glm::dvec3(root), 1.0);
   }
   std::vector<glm::dvec3> points;
   for (const glm::dvec4& cell : cells)
     if (cell.w > 0.0) points.push_back(glm::dvec3(cell) / cell.w);
-  const glm::dvec3 center_m = center_m_, radius_m = radius_m_;
+  const glm::dvec3 center_m = form_.center_m, radius_m = form_.radius_m;
   glm::dvec3 stretch(0.0);  // logarithm of the factor on the radius
   for (int round = 0; round < kStretchRounds; ++round) {
     std::array<std::array<double, 7>, 6> rows{};
     const double root_weight = 1.0 / (kRootNoiseM * kRootNoiseM);
     for (const glm::dvec3& point : points) {
-      const glm::dvec3 q = (point - center_m_) / radius_m_;
+      const glm::dvec3 q = (point - form_.center_m) / form_.radius_m;
       const double length = glm::length(q);
       if (!(length > 0.0)) continue;
       const glm::dvec3 n = q / length;
       const double error_m = (length - kSkull) * radius_m.x;
-      const glm::dvec3 by_center = -n / radius_m_ * radius_m.x, by_stretch = -n * q * radius_m.x;
+      const glm::dvec3 by_center = -n / form_.radius_m * radius_m.x, by_stretch = -n * q * radius_m.x;
       const std::array<double, 6> slope = {by_center.x,  by_center.y,  by_center.z,
                                            by_stretch.x, by_stretch.y, by_stretch.z};
       // Huber: beyond the noise a root pulls no harder.
@@ -295,127 +191,118 @@ void HeadShape::stretch_to_roots(const Groom& groom) {
       const double stretch_weight = 1.0 / (kStretchNoise * kStretchNoise);
       const auto c = static_cast<size_t>(axis), s = static_cast<size_t>(axis + 3);
       rows[c][c] += center_weight;
-      rows[c][6] -= center_weight * (center_m_[axis] - center_m[axis]);
+      rows[c][6] -= center_weight * (form_.center_m[axis] - center_m[axis]);
       rows[s][s] += stretch_weight;
       rows[s][6] -= stretch_weight * stretch[axis];
     }
     const std::array<double, 6> step = solve(rows);
     for (int axis = 0; axis < 3; ++axis) {
-      center_m_[axis] += step[static_cast<size_t>(axis)];
+      form_.center_m[axis] += step[static_cast<size_t>(axis)];
       stretch[axis] = std::clamp(stretch[axis] + step[static_cast<size_t>(axis + 3)], -0.3, 0.3);
-      radius_m_[axis] = radius_m[axis] * std::exp(stretch[axis]);
+      form_.radius_m[axis] = radius_m[axis] * std::exp(stretch[axis]);
     }
   }
 }
 
 void HeadShape::pull_to_roots(const Groom& groom) {
-  std::vector<std::vector<double>> wanted(kCells);
+  std::vector<std::vector<double>> wanted(head::kCells);
   for (const glm::vec3& root : roots_of(groom)) {
     const glm::dvec3 u = in_skull_radii(root);
     const double length = glm::length(u);
     if (!(length > 0.0)) continue;
-    const double pull = length / blend(built_in_radii(), u / length);
+    const double pull = length / head::blend(built_in_radii(), u / length);
     if (length <= kFurthestRoot && pull >= kNearestRoot && pull <= kFurthestRoot)
-      wanted[static_cast<size_t>(cell_of(u / length))].push_back(pull);
+      wanted[static_cast<size_t>(head::cell_of(u / length))].push_back(pull);
   }
   for (std::vector<double>& pulls : wanted)
     if (!pulls.empty()) pulls = {quantile(std::move(pulls), kRootQuantile)};
   for (const double reach_rad : kRootReachRad) {
     // What roots in every direction would weigh.
-    const double full = 0.5 * kCells * reach_rad * reach_rad;
-    std::vector<double> sum(kCells, 0.0), weight(kCells, kBuiltInWeight * full);
+    const double full = 0.5 * head::kCells * reach_rad * reach_rad;
+    std::vector<double> sum(head::kCells, 0.0), weight(head::kCells, kBuiltInWeight * full);
     for (size_t cell = 0; cell < wanted.size(); ++cell) {
       if (wanted[cell].empty()) continue;
-      const double missing = wanted[cell].front() - pull_[cell];
-      near_cells(cell_directions()[cell], 3.0 * reach_rad, [&](size_t near, double angle_rad) {
+      const double missing = wanted[cell].front() - form_.pull[cell];
+      near_cells(head::cell_directions()[cell], 3.0 * reach_rad, [&](size_t near, double angle_rad) {
         const double here = bell(angle_rad, reach_rad);
         sum[near] += here * missing;
         weight[near] += here;
       });
     }
-    for (size_t cell = 0; cell < pull_.size(); ++cell) pull_[cell] += sum[cell] / weight[cell];
+    for (size_t cell = 0; cell < form_.pull.size(); ++cell) form_.pull[cell] += sum[cell] / weight[cell];
   }
 }
 
 /// How far the skin may give way, by direction.
 std::vector<double> HeadShape::deepest_dents(const Groom& groom) const {
-  std::vector<double> floor(kCells, kStrayPull);
-  const double dent = kMostDentM / ((radius_m_.x + radius_m_.y + radius_m_.z) / 3.0);
-  std::vector<bool> has_roots(kCells, false);
+  std::vector<double> floor(head::kCells, kStrayPull);
+  const double dent = kMostDentM / ((form_.radius_m.x + form_.radius_m.y + form_.radius_m.z) / 3.0);
+  std::vector<bool> has_roots(head::kCells, false);
   for (const glm::vec3& root : roots_of(groom)) {
     const glm::dvec3 u = in_skull_radii(root);
     const double length = glm::length(u);
     if (!(length > 0.0) || length > kFurthestRoot) continue;
-    const double pull = length / blend(built_in_radii(), u / length);
+    const double pull = length / head::blend(built_in_radii(), u / length);
     if (pull >= kNearestRoot && pull <= kFurthestRoot)
-      has_roots[static_cast<size_t>(cell_of(u / length))] = true;
+      has_roots[static_cast<size_t>(head::cell_of(u / length))] = true;
   }
   for (size_t cell = 0; cell < has_roots.size(); ++cell)
     if (has_roots[cell])
-      near_cells(cell_directions()[cell], kRootedRad,
-                 [&](size_t near, double) { floor[near] = std::max(kStrayPull, pull_[near] - dent); });
+      near_cells(head::cell_directions()[cell], kRootedRad,
+                 [&](size_t near, double) { floor[near] = std::max(kStrayPull, form_.pull[near] - dent); });
   return floor;
 }
 
 void HeadShape::give_way_to_hair(const Groom& groom) {
   const std::vector<double> floor = deepest_dents(groom);
   for (int round = 0; round < kDentRounds; ++round) {
-    std::vector<double> most(kCells, std::numeric_limits<double>::max());
+    std::vector<double> most(head::kCells, std::numeric_limits<double>::max());
     bool is_clear = true;
     for (const glm::vec3& point : groom.rest_position_m) {
       const glm::dvec3 u = in_skull_radii(point);
       const double length = glm::length(u);
       if (!(length > 0.0) || length > kFurthest) continue;
-      const double pull = pull_at(u);
-      if (u.y < kNeckTop * pull) continue;
-      if (length > pull * (blend(built_in_radii(), u / length) + kCellSpread)) continue;
+      const double pull = form_.pull_at(u);
+      if (u.y < head::kNeckTop * pull) continue;
+      if (length > pull * (head::blend(built_in_radii(), u / length) + kCellSpread)) continue;
       if (!(head_distance(glm::vec3(u / pull)) < 0.0f)) continue;
       const double wanted = length / built_in_radius(u / length);
-      if (wanted < blend(floor, u / length)) continue;
-      double& least = most[static_cast<size_t>(cell_of(u / length))];
+      if (wanted < head::blend(floor, u / length)) continue;
+      double& least = most[static_cast<size_t>(head::cell_of(u / length))];
       least = std::min(least, wanted - (pull - wanted) * 0.25 * round);
       is_clear = false;
     }
     if (is_clear) return;
-    std::vector<double> dented = pull_;
+    std::vector<double> dented = form_.pull;
     for (size_t cell = 0; cell < most.size(); ++cell) {
-      if (most[cell] >= pull_[cell]) continue;
-      const double reach_rad = (pull_[cell] - most[cell]) / kDentSlope + 0.1;
-      near_cells(cell_directions()[cell], reach_rad, [&](size_t near, double angle_rad) {
+      if (most[cell] >= form_.pull[cell]) continue;
+      const double reach_rad = (form_.pull[cell] - most[cell]) / kDentSlope + 0.1;
+      near_cells(head::cell_directions()[cell], reach_rad, [&](size_t near, double angle_rad) {
         dented[near] = std::min(dented[near], most[cell] + kDentSlope * angle_rad);
       });
     }
     // Rounded where something was dented, and nowhere above it.
     for (size_t cell = 0; cell < dented.size(); ++cell) {
       double sum = 0.0, weight = 0.0;
-      near_cells(cell_directions()[cell], 2.5 * kDentReachRad, [&](size_t near, double angle_rad) {
+      near_cells(head::cell_directions()[cell], 2.5 * kDentReachRad, [&](size_t near, double angle_rad) {
         const double here = bell(angle_rad, kDentReachRad);
         sum += here * dented[near];
         weight += here;
       });
-      pull_[cell] = std::min(pull_[cell], sum / weight);
+      form_.pull[cell] = std::min(form_.pull[cell], sum / weight);
     }
   }
-}
-
-double HeadShape::neck_width_at(const glm::dvec3& u) const {
-  if (u.y >= kNeckTop) return 1.0;
-  const glm::dvec2 at = neck_grid(u);
-  const int row = static_cast<int>(at.x), column = static_cast<int>(at.y);
-  const auto value = [&](int r, int c) { return neck_width_[neck_cell(r, c % kNeckColumns)]; };
-  return std::lerp(std::lerp(value(row, column), value(row, column + 1), at.y - column),
-                   std::lerp(value(row + 1, column), value(row + 1, column + 1), at.y - column), at.x - row);
 }
 
 // Each vertex inside of the neck makes it as thin there as it has to be; then the widths are evened out.
 void HeadShape::narrow_neck(const Groom& groom) {
   for (int round = 0; round < kDentRounds; ++round) {
-    std::vector<double> wanted = neck_width_;
+    std::vector<double> wanted = form_.neck_width;
     for (const glm::vec3& point : groom.rest_position_m) {
       const glm::dvec3 u = in_skull_radii(point);
-      if (!(glm::length(u) <= kFurthest) || u.y >= kNeckTop) continue;
-      const glm::dvec3 v = before_the_fit(u), axis = neck_axis(v.y);
-      const glm::dvec3 offset = (v - axis) / neck_width_at(v);
+      if (!(glm::length(u) <= kFurthest) || u.y >= head::kNeckTop) continue;
+      const glm::dvec3 v = before_the_fit(u), axis = head::neck_axis(v.y);
+      const glm::dvec3 offset = (v - axis) / form_.neck_width_at(v);
       const auto is_inside = [&](double width) {
         return head_distance(glm::vec3(axis + width * offset)) < 0.0f;
       };
@@ -426,59 +313,48 @@ void HeadShape::narrow_neck(const Groom& groom) {
         const double middle = 0.5 * (low + high);
         (is_inside(middle) ? low : high) = middle;
       }
-      const glm::dvec2 at = neck_grid(v);
+      const glm::dvec2 at = head::neck_grid(v);
       for (int corner = 0; corner < 4; ++corner) {
-        const size_t cell = neck_cell(static_cast<int>(at.x) + corner % 2,
-                                      (static_cast<int>(at.y) + corner / 2) % kNeckColumns);
-        wanted[cell] = std::min(wanted[cell], neck_width_[cell] / high);
+        const size_t cell = head::neck_cell(static_cast<int>(at.x) + corner % 2,
+                                            (static_cast<int>(at.y) + corner / 2) % head::kNeckColumns);
+        wanted[cell] = std::min(wanted[cell], form_.neck_width[cell] / high);
       }
     }
-    for (int row = 0; row < kNeckRows; ++row)
-      for (int column = 0; column < kNeckColumns; ++column) {
+    for (int row = 0; row < head::kNeckRows; ++row)
+      for (int column = 0; column < head::kNeckColumns; ++column) {
         double sum = 0.0, weight = 0.0;
         for (int dr = -2; dr <= 2; ++dr)
           for (int dc = -2; dc <= 2; ++dc) {
             const double here = std::exp(-0.5 * (dr * dr + dc * dc));
-            sum += here * wanted[neck_cell(row + dr, column + dc)];
+            sum += here * wanted[head::neck_cell(row + dr, column + dc)];
             weight += here;
           }
-        double& width = neck_width_[neck_cell(row, column)];
-        width = std::clamp(std::min(wanted[neck_cell(row, column)], sum / weight), kThinnestNeck, 1.0);
+        double& width = form_.neck_width[head::neck_cell(row, column)];
+        width = std::clamp(std::min(wanted[head::neck_cell(row, column)], sum / weight), kThinnestNeck, 1.0);
       }
-    for (int column = 0; column < kNeckColumns; ++column) neck_width_[neck_cell(0, column)] = 1.0;
+    for (int column = 0; column < head::kNeckColumns; ++column)
+      form_.neck_width[head::neck_cell(0, column)] = 1.0;
   }
 }
 
 /// Where the built-in head has the point, but for the widths.
 glm::dvec3 HeadShape::before_the_fit(const glm::dvec3& u) const {
-  glm::dvec3 v = u / pull_at(u);
+  glm::dvec3 v = u / form_.pull_at(u);
   v.y = before_the_drop(v.y);
   return v;
 }
 
 /// About the distance of a point in (stretched) skull radii.
 double HeadShape::distance_in_radii(const glm::dvec3& u) const {
-  const glm::dvec3 v = before_the_fit(u), axis = neck_axis(v.y);
+  const glm::dvec3 v = before_the_fit(u), axis = head::neck_axis(v.y);
   // The width belongs to the place before it was made thin, which lies in the same direction from the axis.
-  return static_cast<double>(head_distance(glm::vec3(axis + (v - axis) / neck_width_at(v)))) * pull_at(u);
+  return static_cast<double>(head_distance(glm::vec3(axis + (v - axis) / form_.neck_width_at(v)))) *
+         form_.pull_at(u);
 }
 
 double HeadShape::distance_m(const glm::dvec3& point_m) const {
-  const double mean_radius_m = (radius_m_.x + radius_m_.y + radius_m_.z) / 3.0;
-  return distance_in_radii((point_m - center_m_) / radius_m_) * mean_radius_m;
-}
-
-Mesh HeadShape::mesh() const {
-  Mesh mesh = make_head(1.0f);
-  for (glm::vec3& point : mesh.position_m) {
-    glm::dvec3 u(point);
-    const glm::dvec3 axis = neck_axis(u.y);
-    u = axis + (u - axis) * neck_width_at(u);
-    u.y = after_the_drop(u.y);
-    point = glm::vec3(center_m_ + radius_m_ * u * pull_at(u));
-  }
-  mesh.normal = compute_normals(mesh.position_m, mesh.triangle);
-  return mesh;
+  const double mean_radius_m = (form_.radius_m.x + form_.radius_m.y + form_.radius_m.z) / 3.0;
+  return distance_in_radii((point_m - form_.center_m) / form_.radius_m) * mean_radius_m;
 }
 
 }  // namespace strandcast

@@ -8,6 +8,7 @@
 
 #include "common/groom/groom.h"
 #include "common/groom/mesh.h"
+#include "common/strands/head/head_form.h"
 
 namespace strandcast {
 
@@ -23,8 +24,8 @@ class HeadShape {
   /// to make_head().
   HeadShape(const Groom& groom, const FittedSphere& about, HeadFit fit);
 
-  /// Returns the head's mesh, with normals.
-  Mesh mesh() const;
+  /// Returns the head's mesh, with normals and its form.
+  Mesh mesh() const { return make_head(form_); }
   /// Returns the approximate signed distance of a point from the surface in metres; negative inside.
   double distance_m(const glm::dvec3& point_m) const;
 
@@ -36,18 +37,11 @@ class HeadShape {
   void narrow_neck(const Groom& groom);
   double distance_in_radii(const glm::dvec3& u) const;
   glm::dvec3 in_skull_radii(const glm::vec3& point_m) const;
-  double pull_at(const glm::dvec3& u) const;
   void lower_shoulders(const Groom& groom);
   glm::dvec3 before_the_fit(const glm::dvec3& u) const;
   double before_the_drop(double y) const;
-  double after_the_drop(double y) const;
-  double neck_width_at(const glm::dvec3& u) const;
 
-  glm::dvec3 center_m_;
-  glm::dvec3 radius_m_;             // of the skull, by axis
-  std::vector<double> pull_;        // (direction) factor on the built-in head's radius
-  double drop_ = 0.0;               // of the shoulders, in skull radii
-  std::vector<double> neck_width_;  // (height x azimuth) factor on the width of neck and bust
+  HeadForm form_;
 };
 
 }  // namespace strandcast

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/strands/head/head_mesh.h"
 #include "common/strands/scene_asset.h"
 
 namespace strandcast {
@@ -29,17 +30,9 @@ Result<ObjMesh> load_obj(const std::filesystem::path& path, float unit_m);
 /// Parses OBJ text like load_obj(); `place` names it in errors.
 Result<ObjMesh> parse_obj(std::string_view text, const std::string& place, float unit_m);
 
-/// Returns area-weighted unit normals of the vertices; +Y for a vertex without triangles.
-std::vector<glm::vec3> compute_normals(const std::vector<glm::vec3>& position_m,
-                                       const std::vector<glm::uvec3>& triangle);
-
 /// Makes a hemispherical scalp of the given radius about `center_m`, open at face and neck. It has about
 /// `vertex_target` evenly spread vertices with outward normals.
 Mesh make_scalp_cap(const glm::vec3& center_m, float radius_m, uint32_t vertex_target);
-
-/// Makes the built-in head (cranium, face, ears, neck) with this cranium radius; the origin is that of head
-/// space.
-Mesh make_head(float radius_m);
 
 struct FittedSphere {
   glm::vec3 center_m{0.0f};

@@ -159,21 +159,6 @@ Result<bool> read_statement(TextScan& scan, float unit_m, ObjData& data) {
 
 }  // namespace
 
-std::vector<glm::vec3> compute_normals(const std::vector<glm::vec3>& position_m,
-                                       const std::vector<glm::uvec3>& triangle) {
-  std::vector<glm::dvec3> sum(position_m.size(), glm::dvec3(0.0));
-  for (const glm::uvec3& corner : triangle) {
-    const glm::dvec3 a = position_m[corner.x], b = position_m[corner.y], c = position_m[corner.z];
-    const glm::dvec3 area = glm::cross(b - a, c - a);
-    for (int i = 0; i < 3; ++i) sum[corner[i]] += area;
-  }
-  std::vector<glm::vec3> normal(position_m.size(), glm::vec3(0.0f, 1.0f, 0.0f));
-  for (size_t i = 0; i < normal.size(); ++i) {
-    if (glm::dot(sum[i], sum[i]) > 0.0) normal[i] = glm::vec3(glm::normalize(sum[i]));
-  }
-  return normal;
-}
-
 Result<ObjMesh> load_obj(const std::filesystem::path& path, float unit_m) {
   ASSIGN_OR_RETURN(const std::string text, load_text(path, kMaxMeshFileBytes));
   Result<ObjMesh> mesh = parse_obj(text, path.string(), unit_m);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "common/base/check.h"
+#include "common/strands/asset/form.h"
 #include "common/strands/asset/head.h"
 #include "common/strands/asset/lattice.h"
 #include "common/strands/asset/layout.h"
@@ -15,8 +16,9 @@ namespace strandcast {
 namespace {
 
 constexpr int kAssetLevel = 3;
-/// Parts of the layout Numbers, in their order.
-enum class Part : uint8_t { Strands = 1, Triangles = 2, Head = 3 };
+/// Parts of the layouts Numbers and Form, in their order; the head is one of the last two.
+enum class Part : uint8_t { Strands = 1, Triangles = 2, Head = 3, Form = 4 };
+enum class HeadRead { Whole, LeftOut };
 
 static_assert(sizeof(glm::vec3) == 12 && sizeof(glm::uvec3) == 12, "copied as they lie in memory");
 constexpr size_t kItemBytes = 12;
@@ -130,7 +132,8 @@ void put_part(Part part, const std::vector<std::byte>& body, std::vector<std::by
 }
 
 /// Returns nothing where the asset cannot be told by numbers.
-std::vector<std::byte> encode_numbers(const SceneAsset& asset, const AssetCounts& counts) {
+std::vector<std::byte> encode_numbers(const SceneAsset& asset, const AssetCounts& counts,
+                                      AssetLayout newest) {
   if (!check(counts) || !check_indices("", asset.triangle, counts.strands) ||
       !check_indices("", asset.head.triangle, counts.mesh_vertices) ||
       (asset.head.triangle.empty() && !asset.head.position_m.empty()))
@@ -138,14 +141,19 @@ std::vector<std::byte> encode_numbers(const SceneAsset& asset, const AssetCounts
   auto points = asset::to_lattice(asset.rest_position_m);
   if (!points) return {};
   points->point = turned(points->point, counts.vertices, counts.strands);
-  std::vector<std::byte> payload, body;
-  put_counts(AssetLayout::Numbers, counts, payload);
+  std::vector<std::byte> payload, body, form;
+  const bool has_form = newest >= AssetLayout::Form && asset::append_form(asset.head, form);
+  put_counts(has_form ? AssetLayout::Form : AssetLayout::Numbers, counts, payload);
   asset::append_strands({counts.strands, counts.vertices, std::move(*points)}, body);
   put_part(Part::Strands, body, payload);
   body.clear();
   asset::append_triangles(asset.triangle, std::span(asset.rest_position_m).first(counts.strands), body);
   put_part(Part::Triangles, body, payload);
   if (asset.head.triangle.empty()) return payload;
+  if (has_form) {
+    put_part(Part::Form, form, payload);
+    return payload;
+  }
   body.clear();
   if (!asset::append_head(asset.head, body)) return {};
   put_part(Part::Head, body, payload);
@@ -178,7 +186,8 @@ Result<std::span<const std::byte>> take_part(Part part, ByteReader& reader) {
                     static_cast<int>(part));
 }
 
-Result<SceneAsset> decode_numbers(std::span<const std::byte> source, const AssetCounts& counts) {
+Result<SceneAsset> decode_numbers(std::span<const std::byte> source, const AssetCounts& counts,
+                                  AssetLayout layout, HeadRead head_read) {
   ByteReader reader(source);
   SceneAsset asset;
   asset::StrandShape shape{counts.strands, counts.vertices, {}};
@@ -189,9 +198,13 @@ Result<SceneAsset> decode_numbers(std::span<const std::byte> source, const Asset
   asset.triangle.resize(counts.triangles);
   const auto roots_m = std::span(asset.rest_position_m).first(counts.strands);
   RETURN_IF_ERROR(asset::read_triangles(triangles, roots_m, asset.triangle));
+  if (head_read == HeadRead::LeftOut) return asset;
   if (counts.mesh_triangles > 0) {
-    ASSIGN_OR_RETURN(const auto head, take_part(Part::Head, reader));
-    RETURN_IF_ERROR(asset::read_head(head, {counts.mesh_vertices, counts.mesh_triangles}, asset.head));
+    const asset::HeadCounts head_counts{counts.mesh_vertices, counts.mesh_triangles};
+    const bool is_form = layout == AssetLayout::Form;
+    ASSIGN_OR_RETURN(const auto head, take_part(is_form ? Part::Form : Part::Head, reader));
+    RETURN_IF_ERROR(is_form ? asset::read_form(head, head_counts, asset.head)
+                            : asset::read_head(head, head_counts, asset.head));
   }
   if (!reader.rest().empty() || asset.head.position_m.size() != counts.mesh_vertices)
     return make_error(ErrorCode::BadInput, "asset goes on for {} bytes, or lacks a mesh of {} vertices",
@@ -199,22 +212,9 @@ Result<SceneAsset> decode_numbers(std::span<const std::byte> source, const Asset
   return asset;
 }
 
-}  // namespace
-
-std::vector<std::byte> encode_scene_asset(const SceneAsset& asset, AssetLayout newest) {
-  const AssetCounts counts = counts_of(asset);
-  std::vector<std::byte> payload;
-  if (newest == AssetLayout::Numbers) payload = encode_numbers(asset, counts);
-  return payload.empty() ? encode_floats(asset, counts) : payload;
-}
-
-std::vector<std::byte> encode_scene_asset(const SceneAsset& asset) {
-  return encode_scene_asset(asset, kNewestAssetLayout);
-}
-
-Result<SceneAsset> decode_scene_asset(std::span<const std::byte> payload) {
+Result<SceneAsset> decode_asset(std::span<const std::byte> payload, HeadRead head_read) {
   ByteReader reader(payload);
-  const auto layout = reader.take<uint32_t>();
+  const auto layout = static_cast<AssetLayout>(reader.take<uint32_t>());
   AssetCounts counts;
   counts.strands = reader.take<uint32_t>();
   counts.vertices = reader.take<uint32_t>();
@@ -223,13 +223,14 @@ Result<SceneAsset> decode_scene_asset(std::span<const std::byte> payload) {
   counts.mesh_triangles = reader.take<uint32_t>();
   if (!reader.ok())
     return make_error(ErrorCode::BadInput, "asset of {} bytes is too short for its counts", payload.size());
-  if (layout != static_cast<uint32_t>(AssetLayout::Floats) &&
-      layout != static_cast<uint32_t>(AssetLayout::Numbers))
-    return make_error(ErrorCode::BadInput, "asset has layout {}, known are 1 and 2", layout);
+  if (layout < AssetLayout::Floats || layout > kNewestAssetLayout)
+    return make_error(ErrorCode::BadInput, "asset has layout {}, known are 1 to {}",
+                      static_cast<uint32_t>(layout), static_cast<uint32_t>(kNewestAssetLayout));
   RETURN_IF_ERROR(check(counts));
-  ASSIGN_OR_RETURN(SceneAsset asset, layout == static_cast<uint32_t>(AssetLayout::Floats)
+  ASSIGN_OR_RETURN(SceneAsset asset, layout == AssetLayout::Floats
                                          ? decode_floats(reader.rest(), counts)
-                                         : decode_numbers(reader.rest(), counts));
+                                         : decode_numbers(reader.rest(), counts, layout, head_read));
+  if (head_read == HeadRead::LeftOut) asset.head = {};
   asset.strand_count = counts.strands;
   asset.vertex_count = counts.vertices;
 
@@ -240,6 +241,31 @@ Result<SceneAsset> decode_scene_asset(std::span<const std::byte> payload) {
   RETURN_IF_ERROR(check_points("mesh normal", asset.head.normal, kMaxNormal));
   RETURN_IF_ERROR(check_indices("mesh triangle", asset.head.triangle, counts.mesh_vertices));
   return asset;
+}
+
+}  // namespace
+
+AssetLayout newest_asset_layout() {
+  return asset::makes_other_heads() ? AssetLayout::Numbers : kNewestAssetLayout;
+}
+
+std::vector<std::byte> encode_scene_asset(const SceneAsset& asset, AssetLayout newest) {
+  const AssetCounts counts = counts_of(asset);
+  std::vector<std::byte> payload;
+  if (newest >= AssetLayout::Numbers) payload = encode_numbers(asset, counts, newest);
+  return payload.empty() ? encode_floats(asset, counts) : payload;
+}
+
+std::vector<std::byte> encode_scene_asset(const SceneAsset& asset) {
+  return encode_scene_asset(asset, kNewestAssetLayout);
+}
+
+Result<SceneAsset> decode_scene_asset(std::span<const std::byte> payload) {
+  return decode_asset(payload, HeadRead::Whole);
+}
+
+Result<SceneAsset> decode_asset_strands(std::span<const std::byte> payload) {
+  return decode_asset(payload, HeadRead::LeftOut);
 }
 
 }  // namespace strandcast

@@ -2,6 +2,7 @@
 // thread.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "common/strands/frame_header.h"
@@ -10,14 +11,14 @@ namespace strandcast {
 
 class AssetForms {
  public:
-  /// Returns the frame of an asset in a layout up to `newest`, as in the Hello. Translates a newer one once,
-  /// and remembers the last. A frame that cannot be translated comes back unchanged: its receiver says why
-  /// it fails.
+  /// Returns the frame of an asset in a layout up to `newest`, as in the Hello. Translates a newer one once
+  /// for each layout, and remembers those of the last. A frame that cannot be translated comes back
+  /// unchanged: its receiver says why it fails.
   EncodedFramePtr fit(const EncodedFramePtr& asset, uint32_t newest);
 
  private:
   EncodedFramePtr from_;
-  EncodedFramePtr translated_;
+  std::array<EncodedFramePtr, 2> translated_;  // Floats, Numbers; null until somebody takes that
 };
 
 }  // namespace strandcast

@@ -26,6 +26,13 @@ void FlowControl::on_ack(uint16_t stream_id, uint32_t sequence, int64_t time_ns,
   if (decodes_ns_.size() > kDecodes) decodes_ns_.pop_front();
 }
 
+void FlowControl::on_asset_left(size_t bytes, int64_t time_ns) {
+  const AckedFrame* const asset = awaits_asset() ? gate_.asset_alone() : nullptr;
+  if (asset == nullptr || link_.capacity_bytes_per_s(time_ns) > 0.0) return;
+  link_.on_part(*asset, asset->bytes - std::min(bytes, asset->bytes), time_ns);
+  if (link_.capacity_bytes_per_s(time_ns) > 0.0) gate_.pass_asset();
+}
+
 /// Blames the link only while the client is heard: a silent one may be away, and a slow link shows when it is
 /// back.
 void FlowControl::on_chain_loss(int64_t time_ns) {

@@ -38,6 +38,11 @@ class FlowControl {
   }
   /// Notes that the link has taken a part of this frame.
   void on_written(const FrameHeader& header, int64_t time_ns) { gate_.on_written(header, time_ns); }
+  /// Returns whether all else waits for the asset.
+  bool awaits_asset() const { return has_acks_ && gate_.asset_alone() != nullptr; }
+  /// Notes how many bytes of the asset are still on their way, by TCP's own acknowledgements. When half of it
+  /// has come slowly, the link is known, and others may follow without a gap.
+  void on_asset_left(size_t bytes, int64_t time_ns);
   /// Acknowledges this frame and all before it; numbers that are not in flight are ignored.
   void on_ack(uint16_t stream_id, uint32_t sequence, int64_t time_ns, const ClientTimes& client = {});
   /// Adds the round trip time of a small message.

@@ -16,6 +16,8 @@ constexpr int64_t kLeastTransferNs = kMsInNs;
 constexpr size_t kMaxBusySamples = 16;
 /// A rate is taken over at least this: frames and acknowledgements come in bunches.
 constexpr int64_t kBusySpanNs = 50 * kMsInNs;
+/// A part of a frame that came sooner shows how TCP starts, not the link.
+constexpr int64_t kLeastPartNs = 150 * kMsInNs;
 /// Difference of round trips that has other reasons than the rate: jitter, or a client that looks only now
 /// and then.
 constexpr int64_t kJitterNs = 50 * kMsInNs;
@@ -93,6 +95,12 @@ int64_t LinkEstimate::shortest_way_ns() const {
 
 void LinkEstimate::on_round_trip(int64_t round_trip_ns, int64_t time_ns) {
   if (round_trip_ns >= 0) note_round_trip(std::max(round_trip_ns, kLeastTransferNs), time_ns);
+}
+
+void LinkEstimate::on_part(const AckedFrame& frame, size_t bytes, int64_t time_ns) {
+  const int64_t duration_ns = time_ns - frame.sent_ns - base_ns();
+  if (seen_rate_ || round_trips_.empty() || 2 * bytes < frame.bytes || duration_ns < kLeastPartNs) return;
+  seen_rate_ = {time_ns, static_cast<double>(bytes) * kNsPerS / static_cast<double>(duration_ns)};
 }
 
 void LinkEstimate::note_round_trip(int64_t round_trip_ns, int64_t time_ns) {

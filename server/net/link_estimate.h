@@ -52,6 +52,8 @@ class LinkEstimate {
   int64_t link_delay_ns() const { return link_delay_ns_; }
   /// Adds the round trip time of a small message.
   void on_round_trip(int64_t round_trip_ns, int64_t time_ns);
+  /// Takes a first rate from the bytes that have arrived of a frame that is still on its way.
+  void on_part(const AckedFrame& frame, size_t bytes, int64_t time_ns);
 
   /// Returns the round trip time of the unloaded link; 0 while unknown.
   int64_t base_ns() const;

@@ -45,6 +45,10 @@ std::optional<AckedFrame> SendGate::take_acked(uint16_t stream_id, uint32_t sequ
   return frame;
 }
 
+const AckedFrame* SendGate::asset_alone() const {
+  return in_flight_.size() == 1 && in_flight_.front().is_asset ? &in_flight_.front().sent : nullptr;
+}
+
 void SendGate::forget() {
   in_flight_.clear();
   in_flight_bytes_ = 0;
@@ -85,8 +89,9 @@ bool SendGate::may_send(Delay delay, int64_t time_ns) const {
   if (in_flight_.empty()) return true;
   if (in_flight_bytes_ >= kMaxInFlightBytes || in_flight_.size() >= kMaxInFlightFrames) return false;
   const Frame& oldest = in_flight_.front();
-  // What the link can do shows when the asset or the first picture has arrived; all else waits for that.
-  if (oldest.is_asset || (link_.last_ack_ns() == 0 && in_flight_bytes_ >= kFirstBytes)) return false;
+  // What the link can do shows when the asset or the first picture arrives; all else waits for that.
+  const bool is_unknown = link_.last_ack_ns() == 0 && link_.capacity_bytes_per_s(time_ns) <= 0.0;
+  if (oldest.is_asset || (is_unknown && in_flight_bytes_ >= kFirstBytes)) return false;
   // Acknowledgements may get lost with a client's queue: it is asked again, slowly, and never given up here.
   if (time_ns - in_flight_.back().sent.sent_ns >= kAskAgainNs) return true;
   const int64_t allowance_ns = keyframe_allowance_ns(time_ns);

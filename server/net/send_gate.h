@@ -44,6 +44,10 @@ class SendGate {
   void on_written(const FrameHeader& header, int64_t time_ns);
   /// Removes this frame and all before it from those in flight; empty for numbers that are not in flight.
   std::optional<AckedFrame> take_acked(uint16_t stream_id, uint32_t sequence);
+  /// Returns the asset where all else waits for it, and the link has nothing else to do.
+  const AckedFrame* asset_alone() const;
+  /// Lets other frames follow the asset before it is acknowledged.
+  void pass_asset() { in_flight_.front().is_asset = false; }
   /// Forgets the frames in flight, which will not be acknowledged.
   void forget();
 

@@ -297,6 +297,8 @@ void Session::check_deadlines(int64_t time_ns) {
   if (token_expires_unix_s_ != 0 && unix_time_s() >= token_expires_unix_s_) return check_stay();
   guarded([&] {
     probe(time_ns);
+    if (flow_.awaits_asset())
+      flow_.on_asset_left(socket_.next_layer().untaken_bytes() + unwritten_.size(), time_ns);
     adapt(time_ns);
     report_link(time_ns);
     ask_for_keyframe(time_ns);

@@ -12,7 +12,7 @@ namespace strandcast::net {
 namespace {
 
 /// A link that carried the asset for so long carries the keyframe of all strands about as long.
-constexpr int64_t kThinAssetNs = 500 * kMsInNs;
+constexpr int64_t kThinAssetNs = 330 * kMsInNs;
 constexpr int64_t kPreviewPatienceNs = 1'000 * kMsInNs;
 
 }  // namespace

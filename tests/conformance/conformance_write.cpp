@@ -52,6 +52,7 @@ int run(const std::filesystem::path& folder) {
   is_kept &= keep_messages(folder);
   is_kept &= keep(folder / "asset_1.txt", make_asset_lines(AssetLayout::Floats));
   is_kept &= keep(folder / "asset_2.txt", make_asset_lines(AssetLayout::Numbers));
+  is_kept &= keep(folder / "asset_3.txt", make_asset_lines(AssetLayout::Form));
   is_kept &= keep(folder / "tiles.txt", make_tile_lines());
   return is_kept ? 0 : 1;
 }

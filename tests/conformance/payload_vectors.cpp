@@ -6,6 +6,7 @@
 #include "common/pictures/jpeg_tiles.h"
 #include "common/strands/asset/head.h"
 #include "common/strands/asset/lattice.h"
+#include "common/strands/head/head_form.h"
 #include "tests/conformance/reference_hash.h"
 #include "tests/support/sample_asset.h"
 
@@ -41,6 +42,19 @@ std::string make_tiles(uint32_t width, uint32_t height, const std::array<uint8_t
                      to_hex(pack_tiles(width, height, placed)));
 }
 
+/// A form whose factors all differ; its numbers are whole steps.
+HeadForm sample_form() {
+  HeadForm form;
+  form.center_m = {0.01, -0.02, 0.03};
+  form.radius_m = {0.094, 0.1, 0.09};
+  form.drop = 0.15;
+  for (size_t i = 0; i < form.neck_width.size(); ++i)
+    form.neck_width[i] = 0.75 + static_cast<double>(i * i % 97) / 512.0;
+  for (size_t i = 0; i < form.pull.size(); ++i)
+    form.pull[i] = 0.9375 + static_cast<double>(i * i % 89) / 1024.0;
+  return form;
+}
+
 }  // namespace
 
 uint64_t content_hash(const SceneAsset& asset) {
@@ -67,6 +81,12 @@ std::string make_asset_lines(AssetLayout layout) {
     head.normal.emplace_back(0.6f, -0.8f, 0.0f);
     head.triangle.emplace_back(1, 0, 4);
     head = as_sent(head);
+  }
+  if (layout == AssetLayout::Form) {  // as it is, and all of it fitted
+    assets = {sample_asset(7, 4), sample_asset(6, 3)};
+    for (SceneAsset& asset : assets) round_to_lattice(asset.rest_position_m, kRestStepBits);
+    assets[0].head = as_sent(make_head(HeadForm()));
+    assets[1].head = as_sent(make_head(sample_form()));
   }
   for (const SceneAsset& asset : assets)
     lines +=

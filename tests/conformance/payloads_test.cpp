@@ -22,7 +22,7 @@ std::vector<std::vector<std::string>> lines_of(const std::string& name) {
 }
 
 TEST(Conformance, KeptAssetsHaveTheirContentAndAreMadeAlike) {
-  for (const AssetLayout layout : {AssetLayout::Floats, AssetLayout::Numbers})
+  for (const AssetLayout layout : {AssetLayout::Floats, AssetLayout::Numbers, AssetLayout::Form})
     for (const auto& words : lines_of(fmt::format("asset_{}.txt", static_cast<uint32_t>(layout)))) {
       ASSERT_EQ(words.size(), 3u);
       const Bytes payload = from_hex(words[2]).value();

@@ -3,7 +3,10 @@
 #include "common/pictures/jpeg_tiles.h"
 #include "common/pictures/picture.h"
 #include "common/pictures/video_codec.h"
+#include "common/strands/asset/head.h"
+#include "common/strands/asset/lattice.h"
 #include "common/strands/asset/layout.h"
+#include "common/strands/head/head_form.h"
 #include "common/strands/residual_coder.h"
 #include "common/strands/strand_payload.h"
 #include "common/strands/value_coder.h"
@@ -43,6 +46,9 @@ void add_blocks(const SeedFolder& seeds) {
   SceneAsset bare = sample_asset(1, 2);
   bare.head = {};
   seeds.add("scene_asset", "bare", encode_scene_asset(bare));
+  round_to_lattice(bare.rest_position_m, kRestStepBits);
+  bare.head = as_sent(make_head(HeadForm()));
+  seeds.add("scene_asset", "form", encode_scene_asset(bare));
 
   Image image{16, 9, std::vector<uint8_t>(16 * 9 * 4, 200)};
   for (size_t i = 0; i < image.rgba.size(); ++i) image.rgba[i] = static_cast<uint8_t>(i * i >> 4);

@@ -159,7 +159,7 @@ TEST_F(LiveServer, LateJoinerHasTheSameStatesBitForBit) {
 TEST_F(LiveServer, AssetMatchesTheWelcomeInEveryLayoutThatAViewerTakes) {
   if (!start()) return;
   std::vector<SceneAsset> assets;
-  for (const uint32_t newest : {0u, 1u, 2u}) {  // 0: a viewer of before there was a second layout
+  for (const uint32_t newest : {0u, 1u, 2u, 3u}) {  // 0: a viewer of before there was a second layout
     StrandClient viewer(server_->port(), Role::Viewer, 0, newest);
     const auto message = viewer.raw.read_media(Opcode::Asset);
     ASSERT_TRUE(message.has_value());

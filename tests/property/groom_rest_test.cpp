@@ -3,7 +3,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "common/groom/head_field.h"
+#include "common/strands/head/head_field.h"
 #include "common/scene/scene_file.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/step_builder.h"

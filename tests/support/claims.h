@@ -42,7 +42,7 @@ inline constexpr double kPbdViolentStretch = 6.6;
 inline constexpr double kXpbdViolentStretch = 3.5;
 
 /// Asset of the built-in hair, 2,000 x 16 with its head, in kB.
-inline constexpr uint32_t kAssetKb = 150;
+inline constexpr uint32_t kAssetKb = 100;
 
 // ---- the strand codec `tangent` at 0.1 mm on the built-in scene's hair, dftl with 0.3 of its weight
 // carried, half a second each ----

@@ -1,6 +1,9 @@
 #include "server/net/asset_forms.h"
 
+#include "common/strands/asset/head.h"
+#include "common/strands/asset/lattice.h"
 #include "common/strands/asset/layout.h"
+#include "common/strands/head/head_form.h"
 #include "tests/support/sample_asset.h"
 
 namespace strandcast::asset_forms_test {
@@ -25,6 +28,22 @@ TEST(AssetForms, AClientGetsNoLayoutThatItDoesNotTake) {
   const auto other = frame_of(sample_asset(5, 3), AssetLayout::Numbers);
   EXPECT_EQ(forms.fit(other, 0)->message, frame_of(sample_asset(5, 3), AssetLayout::Floats)->message);
   EXPECT_EQ(forms.fit(nullptr, 0), nullptr);
+}
+
+TEST(AssetForms, AHeadByItsFormIsTranslatedForEachClient) {
+  SceneAsset asset = sample_asset(12, 4);
+  round_to_lattice(asset.rest_position_m, kRestStepBits);
+  asset.head = as_sent(make_head(HeadForm()));
+  const auto form = frame_of(asset, AssetLayout::Form);
+  AssetForms forms;
+  for (const uint32_t newest : {3u, ~0u}) EXPECT_EQ(forms.fit(form, newest), form) << newest;
+  for (const auto layout : {AssetLayout::Numbers, AssetLayout::Floats}) {
+    const EncodedFramePtr fit = forms.fit(form, static_cast<uint32_t>(layout));
+    EXPECT_EQ(fit->message, frame_of(asset, layout)->message);
+    EXPECT_GT(fit->message.size(), 50 * form->message.size());
+    EXPECT_EQ(forms.fit(form, static_cast<uint32_t>(layout)), fit) << "translated once";
+  }
+  EXPECT_EQ(forms.fit(form, 0), forms.fit(form, 1));
 }
 
 TEST(AssetForms, WhatCannotBeReadStaysAsItIs) {

@@ -292,6 +292,61 @@ TEST(FlowControl, AnAcknowledgementIsDueWhenTheLinkCanHaveCarriedItsFrame) {
       << "but not for ever";
 }
 
+/// A viewer whose asset of 100 kB is on its way over a link, since 1 s.
+struct AssetOnItsWay {
+  static constexpr size_t kBytes = 100'000;
+  AssetOnItsWay() {
+    flow.expect_acks();
+    flow.on_round_trip(80 * kMsInNs, 1 * kSInNs);
+    asset.opcode = Opcode::Asset;
+    asset.sequence = 1;
+    flow.on_sent(asset, kBytes, 1 * kSInNs);
+  }
+  /// TCP's acknowledgements until a time, each a round trip after its bytes went out.
+  void watch(double bytes_per_ms, int64_t until_ms) {
+    for (int64_t ms = 0; ms <= until_ms; ms += 50) {
+      const auto taken = bytes_per_ms * static_cast<double>(std::max<int64_t>(ms - 80, 0));
+      flow.on_asset_left(kBytes - std::min(kBytes, static_cast<size_t>(taken)), 1 * kSInNs + ms * kMsInNs);
+    }
+  }
+  FlowControl flow;
+  FrameHeader asset;
+};
+
+TEST(FlowControl, ASlowAssetShowsTheLinkBeforeAllOfItIsThere) {
+  AssetOnItsWay slow;
+  slow.watch(250.0, 250);  // 2 Mbit/s: 42 kB are there
+  EXPECT_TRUE(slow.flow.awaits_asset());
+  EXPECT_FALSE(slow.flow.may_start(1 * kSInNs + 250 * kMsInNs));
+  slow.watch(250.0, 300);
+  EXPECT_FALSE(slow.flow.awaits_asset());
+  EXPECT_NEAR(slow.flow.capacity_bytes_per_s(1 * kSInNs + 300 * kMsInNs), 250e3, 10e3);
+  EXPECT_FALSE(slow.flow.may_start(1 * kSInNs + 300 * kMsInNs)) << "the link has enough to do";
+  EXPECT_TRUE(slow.flow.may_start(1 * kSInNs + 360 * kMsInNs))
+      << "the link would stand idle for a round trip";
+  FrameHeader first = slow.asset;
+  first.opcode = Opcode::StrandKeyframe;
+  first.sequence = 2;
+  slow.flow.on_sent(first, 5'000, 1 * kSInNs + 360 * kMsInNs);
+  EXPECT_FALSE(slow.flow.may_start(1 * kSInNs + 365 * kMsInNs));
+  EXPECT_TRUE(slow.flow.may_start(1 * kSInNs + 400 * kMsInNs));
+  slow.flow.on_ack(slow.asset.stream_id, slow.asset.sequence, 1 * kSInNs + 480 * kMsInNs);
+  EXPECT_EQ(slow.flow.in_flight_bytes(), 5'000u);
+  EXPECT_NEAR(slow.flow.capacity_bytes_per_s(1 * kSInNs + 480 * kMsInNs), 250e3, 10e3);
+}
+
+TEST(FlowControl, WhatIsNotKnownIsNotGuessedFromPartsOfAnAsset) {
+  AssetOnItsWay fast;
+  fast.watch(2'000.0, 100);  // all but 60 kB within 20 ms: TCP has only begun
+  EXPECT_TRUE(fast.flow.awaits_asset());
+  AssetOnItsWay still;
+  still.watch(0.0, 10'000);
+  EXPECT_TRUE(still.flow.awaits_asset()) << "nothing came, however long it takes";
+  FlowControl others;
+  others.on_asset_left(0, 1 * kSInNs);
+  EXPECT_FALSE(others.awaits_asset()) << "a client without acknowledgements";
+}
+
 TEST(FlowControl, UnknownAndRepeatedAcknowledgementsChangeNothing) {
   FlowControl flow;
   flow.expect_acks();

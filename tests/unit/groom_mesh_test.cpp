@@ -4,8 +4,8 @@
 #include <map>
 
 #include "common/base/hash.h"
-#include "common/groom/head_field.h"
 #include "common/groom/mesh.h"
+#include "common/strands/head/head_field.h"
 #include "tests/support/temporary_folder.h"
 
 namespace strandcast::groom_mesh_test {
@@ -293,6 +293,28 @@ TEST(Head, IsAsFarFromManyPointsAsFromOneAndTheSameOnBothSides) {
     }
   }
   EXPECT_NE(head_distance({0.5f, 0.0f, 0.9f}), head_distance({0.5f, 0.0f, -0.9f})) << "a face has a back";
+}
+
+TEST(Head, NearAPointIsMadeOfThePartsThere) {
+  constexpr float kReach = 0.15f;
+  const Mesh head = make_head(1.0f);
+  const NearHead chest({0.0f, -3.5f, 0.3f}, kReach);
+  size_t other_count = 0;
+  for (size_t i = 0; i < head.position_m.size(); i += 41) {
+    const auto at = static_cast<float>(i);
+    const glm::vec3 about = head.position_m[i];
+    std::vector<glm::vec3> points;
+    for (const float turn : {0.0f, 2.0f, 4.0f, 6.0f, 8.0f})
+      points.push_back(
+          about + kReach *
+                      glm::vec3(std::sin(at + turn), std::sin(2.1f * at + turn), std::sin(3.7f * at - turn)) /
+                      1.8f);
+    const NearHead near(about, kReach);
+    ASSERT_EQ(near.distances(points), head_distances(points)) << i;
+    ASSERT_EQ(near.normals(points), head_normals(points)) << i;
+    other_count += chest.distances(points) == head_distances(points) ? 0 : 1;
+  }
+  EXPECT_GT(other_count, 100u) << "the parts of the chest alone make no face";
 }
 
 TEST(Head, ScalesWithItsRadius) {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/groom/hair_style.h"
-#include "common/groom/head_field.h"
+#include "common/strands/head/head_field.h"
 #include "common/groom/procedural.h"
 #include "common/groom/scalp_roots.h"
 #include "common/math/point_tree.h"

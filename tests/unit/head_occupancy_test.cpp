@@ -9,7 +9,7 @@
 #include <limits>
 #include <utility>
 
-#include "common/groom/head_field.h"
+#include "common/strands/head/head_field.h"
 
 namespace strandcast::head_occupancy_test {
 namespace {

@@ -3,10 +3,13 @@
 
 #include <limits>
 
+#include "common/groom/head_shape.h"
+#include "common/groom/procedural.h"
 #include "common/scene/scene_file.h"
 #include "common/strands/asset/head.h"
 #include "common/strands/asset/lattice.h"
 #include "common/strands/asset/layout.h"
+#include "common/strands/head/head_form.h"
 #include "server/scene/scene_content.h"
 #include "tests/support/claims.h"
 #include "tests/support/sample_asset.h"
@@ -100,7 +103,10 @@ TEST(SceneAsset, TheBuiltInHairTakesFewBytes) {
   ASSERT_FALSE(asset.head.triangle.empty());
   EXPECT_EQ(as_sent(content.head).position_m, content.head.position_m) << "what is rounded stays";
   expect_back(asset, AssetLayout::Numbers);
+  expect_back(asset, AssetLayout::Form);
   EXPECT_LE(encode_scene_asset(asset).size(), claims::kAssetKb * 1000);
+  EXPECT_GT(encode_scene_asset(asset, AssetLayout::Numbers).size(), claims::kAssetKb * 1000 + 40'000)
+      << "the head by its form";
   EXPECT_GT(encode_scene_asset(asset, AssetLayout::Floats).size(), 3 * claims::kAssetKb * 1000)
       << "without it";
 }
@@ -162,6 +168,85 @@ TEST(SceneAsset, NormalsAreThoseOfTheHead) {
   }
 }
 
+/// An asset whose head is fitted under hair: all of it, or the bust alone.
+SceneAsset asset_with_head(HeadFit fit) {
+  ProceduralGroomOptions options;
+  options.strand_count = 300;
+  options.vertex_count = 12;
+  options.length_m = 0.4f;
+  const Groom groom = grow_groom(make_scalp_cap({0.01f, 0.02f, 0.0f}, 0.1f, 500), options).value();
+  SceneAsset asset = sample_asset(40, 12);
+  round_to_lattice(asset.rest_position_m, kRestStepBits);
+  asset.head = as_sent(HeadShape(groom, {{0.01f, 0.02f, 0.0f}, 0.093f}, fit).mesh());
+  return asset;
+}
+
+TEST(SceneAsset, AFittedHeadIsToldByItsForm) {
+  for (const HeadFit fit : {HeadFit::Whole, HeadFit::BustOnly}) {
+    const SceneAsset asset = asset_with_head(fit);
+    ASSERT_NE(asset.head.form, nullptr);
+    EXPECT_NE(asset.head.form->neck_width, HeadForm().neck_width);
+    expect_back(asset, AssetLayout::Form);
+    SceneAsset bare = asset;
+    bare.head = {};
+    const size_t bytes = encode_scene_asset(asset).size() - encode_scene_asset(bare).size();
+    EXPECT_LT(bytes, 8'000u);
+    EXPECT_GT(encode_scene_asset(asset, AssetLayout::Numbers).size() - encode_scene_asset(bare).size(),
+              5 * bytes);
+    const SceneAsset strands = decode_asset_strands(encode_scene_asset(asset)).value();
+    EXPECT_EQ(strands.rest_position_m, asset.rest_position_m);
+    EXPECT_TRUE(strands.head.position_m.empty());
+  }
+}
+
+TEST(SceneAsset, AHeadThatIsNotWhatItsFormMakesIsToldByNumbers) {
+  SceneAsset asset = asset_with_head(HeadFit::BustOnly);
+  Mesh moved = asset.head;
+  moved.position_m[7].x += 1.0f / 1024.0f;
+  asset.head = as_sent(moved);
+  expect_back(asset, AssetLayout::Numbers);
+  EXPECT_EQ(encode_scene_asset(asset), encode_scene_asset(asset, AssetLayout::Numbers));
+}
+
+/// The payload with bytes of the head's form changed.
+std::vector<std::byte> with_form_bytes(size_t at, std::span<const std::byte> bytes) {
+  const SceneAsset asset = asset_with_head(HeadFit::BustOnly);
+  SceneAsset bare = asset;
+  bare.head = {};
+  auto payload = encode_scene_asset(asset);
+  constexpr size_t kPartHead = 5;  // number and size
+  std::copy(bytes.begin(), bytes.end(),
+            payload.begin() + static_cast<ptrdiff_t>(encode_scene_asset(bare).size() + kPartHead + at));
+  return payload;
+}
+
+TEST(SceneAsset, AFormThatIsNoneIsRefused) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const auto& [at, value] : {std::pair<size_t, double>{8, nan},
+                                  {16, 1e9},
+                                  {32, 0.0},
+                                  {40, -1.0},
+                                  {48, nan},
+                                  {48, 1e300},
+                                  {56, -0.1},
+                                  {56, 1e9},
+                                  {56, nan}}) {
+    const auto refused = decode_scene_asset(with_form_bytes(at, std::as_bytes(std::span(&value, 1))));
+    ASSERT_FALSE(refused) << at << " " << value;
+    EXPECT_EQ(refused.error().code, ErrorCode::BadInput) << refused.error().to_string();
+  }
+  for (const auto& [at, value] : {std::pair<size_t, uint8_t>{64, 31}, {64, 255}, {65, 2}})
+    EXPECT_FALSE(decode_scene_asset(with_form_bytes(at, std::as_bytes(std::span(&value, 1))))) << at;
+}
+
+TEST(SceneAsset, AProgramThatMakesAnotherHeadAsksForNumbers) {
+  const uint8_t other = 0x5a;  // of the hash
+  const auto decoded = decode_scene_asset(with_form_bytes(3, std::as_bytes(std::span(&other, 1))));
+  ASSERT_FALSE(decoded);
+  EXPECT_EQ(decoded.error().code, ErrorCode::Unavailable) << "a viewer tries again";
+  EXPECT_EQ(newest_asset_layout(), AssetLayout::Numbers);
+}
+
 TEST(SceneAsset, TakesTheGroomVertexMajor) {
   const Groom groom = random_groom(40, 5, 3);
   const SceneAsset asset = make_scene_asset(groom, sample_mesh());
@@ -204,7 +289,7 @@ TEST(SceneAsset, CountsAreCheckedBeforeAnythingElse) {
       std::memcpy(bytes.data() + 4 * index, &value, 4);
       return decode_scene_asset(bytes);
     };
-    EXPECT_EQ(with_number(0, 3).error().code, ErrorCode::BadInput);  // layout
+    EXPECT_EQ(with_number(0, 4).error().code, ErrorCode::BadInput);  // layout
     for (const uint32_t strands : {0u, kMaxStrandCount + 1, ~0u})
       EXPECT_EQ(with_number(1, strands).error().code, ErrorCode::LimitExceeded) << strands;
     for (const uint32_t vertices : {0u, 1u, kMaxVertexCount + 1, ~0u})

@@ -29,7 +29,7 @@ function install() {
 }
 
 const Socket = globalThis.WebSocket ?? NodeSocket;
-let connect;
+let connect, headOf;
 const open = (server, options = {}) => connect(server.url, { WebSocket: Socket, ...options });
 const until = async (condition, what, ms = 20_000) => {
   for (const end = Date.now() + ms; Date.now() < end; await new Promise((done) => setTimeout(done, 20)))
@@ -116,6 +116,20 @@ const tests = {
     assert.ok(connection.asset.byteLength > 0 && connection.look.methods);
     connection.close();
     assert.deepEqual(await take(connection, 1), []);
+  },
+  async 'the built-in head is made as the server made it'() {
+    const connection = open(server);
+    await take(connection, 1);
+    const asset = connection.asset.slice(0);
+    connection.close();
+    assert.equal(new Uint8Array(asset)[0], 3, 'the layout that has the form alone');
+    const head = await headOf(asset); // refuses a mesh of another hash
+    assert.deepEqual([head.positions.length, head.triangles.length], [3 * 15_548, 3 * 31_092]);
+    new Uint8Array(asset)[asset.byteLength - 93] ^= 1; // of its size
+    await assert.rejects(headOf(asset), /head/);
+    const kept = fs.readFileSync(path.join(here, '../conformance/vectors/asset_3.txt'), 'utf8').trim().split('\n');
+    for (const line of kept) await headOf(Uint8Array.from(Buffer.from(line.split(' ')[2], 'hex')).buffer); // fitted
+    assert.equal(kept.length, 2);
   },
   async 'exact frames are states like others'() {
     // A head that stands still: soon every vertex is where the steps lead.
@@ -217,7 +231,7 @@ const tests = {
 let failed = 0;
 try {
   console.log(`installed by ${install()}`);
-  ({ connect } = await import(pathToFileURL(path.join(installed, 'node.js'))));
+  ({ connect, headOf } = await import(pathToFileURL(path.join(installed, 'node.js'))));
   server = await Server.start(program, SMALL);
   for (const [name, test] of Object.entries(tests)) {
     const begin = Date.now();

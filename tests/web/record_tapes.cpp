@@ -147,7 +147,7 @@ Status record_hostile(Tape& tape) {
       payloads.emplace_back(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(i));
     }
     for (const auto& payload : payloads) {
-      const auto asset = decode_scene_asset(payload);
+      const auto asset = decode_asset_strands(payload);
       const StrandStreamLimits any{4, 4};
       tape.add_decoder("raw", asset ? StrandStreamLimits{asset->strand_count, asset->vertex_count} : any, {});
       tape.add_asset(payload, asset ? Status() : Status(asset.error()));

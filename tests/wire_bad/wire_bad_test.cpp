@@ -8,8 +8,11 @@
 #include <random>
 
 #include "common/pictures/image_codec.h"
+#include "common/strands/asset/head.h"
+#include "common/strands/asset/lattice.h"
 #include "common/strands/asset/layout.h"
 #include "common/strands/byte_io.h"
+#include "common/strands/head/head_form.h"
 #include "common/strands/strand_payload.h"
 #include "common/strands/tangent/symbols.h"
 #include "common/strands/zstd_block.h"
@@ -489,6 +492,15 @@ TEST(AssetBytes, TruncatedDamagedAndRandomAssetsNeverCrash) {
     EXPECT_FALSE(decode_scene_asset(longer));
     for_each_damage(good, 5000, 11, [](const Bytes& bad) { feed(fuzz_scene_asset, bad); });
   }
+  SceneAsset built_in = sample_asset(4, 2);
+  round_to_lattice(built_in.rest_position_m, kRestStepBits);
+  built_in.head = as_sent(make_head(HeadForm()));
+  const Bytes form = encode_scene_asset(built_in);
+  EXPECT_LT(form.size(), 500u);
+  for (size_t size = 0; size < form.size(); ++size)
+    EXPECT_FALSE(decode_scene_asset(std::span(form).first(size))) << size;
+  for_each_damage(form, 100, 12,
+                  [](const Bytes& bad) { feed(fuzz_scene_asset, bad); });  // making heads takes long
   std::mt19937 random(4);
   for (int i = 0; i < 1000; ++i) feed(fuzz_scene_asset, random_bytes(random() % 300, random));
 }

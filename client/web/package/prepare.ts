@@ -46,8 +46,10 @@ class Preparing {
   private pointRoom = 0;
 
   async take(message: ToPrepare): Promise<FromPrepare | undefined> {
-    if (message.kind === 'core') this.core = await Core.load(message.core);
-    else if (message.kind === 'asset') {
+    if (message.kind === 'core') {
+      this.core = await Core.load(message.core);
+      this.core.call.strand_picture_expect_asset();
+    } else if (message.kind === 'asset') {
       this.picture?.delete();
       this.picture = new StrandPicture(this.core, new Uint8Array(message.asset));
       this.seen = { light: -1, layout: -1, head: -1 };

@@ -16,6 +16,7 @@ export interface CoreFunctions {
   strand_core_position_floats(decoder: number): number;
   strand_core_step_ns?(): number; // of modules that take steps
   strand_core_error(): number;
+  strand_picture_expect_asset(): void;
   strand_picture_make(at: number, bytes: number): number;
   strand_picture_delete(picture: number): void;
   strand_picture_head(picture: number): number;

@@ -200,6 +200,7 @@ class Drawer {
     this.states = message.states;
     this.states.onmessage = (event: MessageEvent<State>) => this.take(event.data);
     this.askNext();
+    this.core.call.strand_picture_expect_asset();
     setInterval(() => this.report(), 500);
     const turn = (): void => {
       void this.turn();

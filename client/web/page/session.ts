@@ -31,7 +31,7 @@ const PICTURE_NAMES: { [codec: number]: string } = {
 
 /** Clocks of browsers are coarse: what is quicker than they can tell is still something. */
 const LEAST_STEP_NS = 5;
-const NEWEST_ASSET_LAYOUT = 2; // that the cores decode
+const NEWEST_ASSET_LAYOUT = 3; // that the cores decode
 const EXACT_BIT = 128; // of a strand frame's first byte: it carries no corrections
 
 /** Where a session runs: whom it tells, what its socket is, and where modules of the core come from. */

@@ -479,7 +479,9 @@ Mesh as_sent(const Mesh& mesh) {
     points.point.emplace_back(glm::dvec3(asset::rounded(position, kHeadStepBits)) *
                               std::ldexp(1.0, kHeadStepBits));
   asset::NumberWriter numbers;
-  return asset::write_head(mesh, points, numbers);
+  Mesh sent = asset::write_head(mesh, points, numbers);
+  sent.form = mesh.form;
+  return sent;
 }
 
 }  // namespace strandcast

@@ -10,13 +10,16 @@
 
 namespace strandcast {
 
-/// Floats under zstd, or whole numbers that are predicted; their numbers are those on the wire.
-enum class AssetLayout : uint32_t { Floats = 1, Numbers = 2 };
-/// What programs of this version say that they take.
-inline constexpr AssetLayout kNewestAssetLayout = AssetLayout::Numbers;
+/// Floats under zstd, whole numbers that are predicted, or these with the built-in head by its form; their
+/// numbers are those on the wire.
+enum class AssetLayout : uint32_t { Floats = 1, Numbers = 2, Form = 3 };
+inline constexpr AssetLayout kNewestAssetLayout = AssetLayout::Form;
+/// Returns what this program says that it takes: no forms where it has made another head of one.
+AssetLayout newest_asset_layout();
 
 /// Serialises the payload of an Asset message for a viewer that knows layouts up to `newest`. Every layout
-/// gives back the same bits. What is not rounded as by load_scene_content() has Floats in any case.
+/// gives back the same bits. What is not rounded as by load_scene_content() has Floats in any case, and other
+/// heads than the built-in one have Numbers at most.
 std::vector<std::byte> encode_scene_asset(const SceneAsset& asset, AssetLayout newest);
 
 }  // namespace strandcast

@@ -2,6 +2,7 @@
 // radii about the skull's centre; +Y up, +Z out of the face. Any thread.
 #pragma once
 
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
 #include <vector>
@@ -17,6 +18,19 @@ std::vector<float> head_distances(std::span<const glm::vec3> points);
 
 /// Returns the outward unit normals of the surfaces through `points`.
 std::vector<glm::vec3> head_normals(std::span<const glm::vec3> points);
+
+/// The head near a point: as head_distances() and head_normals(), of the parts alone that matter there.
+class NearHead {
+ public:
+  /// For points within `reach` of `about`, on the surface or a few reaches away.
+  NearHead(const glm::vec3& about, float reach);
+
+  std::vector<float> distances(std::span<const glm::vec3> points) const;
+  std::vector<glm::vec3> normals(std::span<const glm::vec3> points) const;
+
+ private:
+  uint32_t parts_;
+};
 
 /// Distance and normal of neck and bust alone.
 float bust_distance(const glm::vec3& point);

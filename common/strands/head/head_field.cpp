@@ -1,4 +1,4 @@
-#include "common/groom/head_field.h"
+#include "common/strands/head/head_field.h"
 
 #include <algorithm>
 #include <array>
@@ -73,6 +73,9 @@ const std::array kHead = {
     ellipsoid(Blend::Add, 0.04f, {0.985f, -0.30f, 0.115f}, {0.045f, 0.06f, 0.045f}),  // its flap
 };
 
+/// How much distances from two parts change at most, beside the way of a point.
+constexpr float kSpread = 2.0f;
+
 /// Mirrored parts meet round, not in a crease, over this width.
 constexpr float kSeam = 0.04f;
 
@@ -119,15 +122,28 @@ simd::Float smooth_min(simd::Float a, simd::Float b, float softness) {
   return simd::min(a, b) - near * near * softness * 0.25f;
 }
 
-/// `distance` is that of what there is already.
-simd::Float with_parts(simd::Float distance, std::span<const Part> parts, const LanePoints& points) {
+/// Which parts are looked at; all others must change nothing.
+using Wanted = uint32_t;
+constexpr Wanted kAllParts = ~Wanted{0};
+static_assert(kBust.size() + kHead.size() <= 32);
+constexpr Wanted kHeadParts = kAllParts << kBust.size();
+
+/// Takes parts to the distance of what there is already; beside(i, own, distance) sees each before that.
+template <class Beside>
+simd::Float with_parts(simd::Float distance, std::span<const Part> parts, Wanted wanted,
+                       const LanePoints& points, const Beside& beside) {
   LanePoints mirrored = points;
-  for (uint32_t lane = 0; lane < simd::kLanes; ++lane)
-    mirrored.x.v[lane] = std::hypot(points.x.v[lane], kSeam);
-  for (const Part& part : parts) {
+  for (uint32_t lane = 0; lane < simd::kLanes; ++lane) {
+    const double x = double{points.x.v[lane]};
+    mirrored.x.v[lane] = static_cast<float>(std::sqrt(x * x + double{kSeam} * double{kSeam}));
+  }
+  for (uint32_t i = 0; wanted >> i != 0 && i < parts.size(); ++i) {
+    if ((wanted >> i & 1u) == 0) continue;
+    const Part& part = parts[i];
     const LanePoints offset = from_point(is_in_the_middle(part) ? points : mirrored, part.from);
     const simd::Float own =
         part.shape == Shape::Ellipsoid ? ellipsoid_distance(offset, part.to) : capsule_distance(offset, part);
+    beside(i, own, distance);
     switch (part.blend) {
       case Blend::Add:
         distance = smooth_min(distance, own, part.softness);
@@ -143,17 +159,33 @@ simd::Float with_parts(simd::Float distance, std::span<const Part> parts, const 
   return distance;
 }
 
-simd::Float bust_distance_of(const LanePoints& points) {
-  return with_parts(std::numeric_limits<float>::max(), kBust, points);
+simd::Float distance_of(const LanePoints& points, Wanted wanted) {
+  const auto nothing = [](uint32_t, const simd::Float&, const simd::Float&) {};
+  const simd::Float bust =
+      with_parts(std::numeric_limits<float>::max(), kBust, wanted & ~kHeadParts, points, nothing);
+  return with_parts(bust, kHead, wanted >> kBust.size(), points, nothing);
 }
 
-simd::Float head_distance_of(const LanePoints& points) {
-  return with_parts(bust_distance_of(points), kHead, points);
+/// Parts that come close enough to change a distance near a point, if distances change by `margin`.
+Wanted parts_near(const glm::vec3& about, float margin) {
+  Wanted wanted = 0;
+  const auto look_at = [&](std::span<const Part> parts, uint32_t first) {
+    return [&wanted, parts, first, margin](uint32_t i, const simd::Float& own, const simd::Float& distance) {
+      const float is = own.v[0], was = distance.v[0];
+      const Blend blend = parts[i].blend;
+      const float apart = blend == Blend::Add ? is - was : blend == Blend::Cut ? is + was : was - is;
+      if (apart < parts[i].softness + margin) wanted |= Wanted{1} << (first + i);
+    };
+  };
+  const LanePoints points{about.x, about.y, about.z};
+  const simd::Float bust =
+      with_parts(std::numeric_limits<float>::max(), kBust, kAllParts, points, look_at(kBust, 0));
+  with_parts(bust, kHead, kAllParts, points, look_at(kHead, kBust.size()));
+  return wanted;
 }
 
 /// As many as there are points.
-template <class Distance>
-std::vector<float> distances_of(const Distance& distance, std::span<const glm::vec3> points) {
+std::vector<float> distances_of(Wanted wanted, std::span<const glm::vec3> points) {
   std::vector<float> distances(points.size());
   for (size_t begin = 0; begin < points.size(); begin += simd::kLanes) {
     const size_t count = std::min<size_t>(simd::kLanes, points.size() - begin);
@@ -162,21 +194,20 @@ std::vector<float> distances_of(const Distance& distance, std::span<const glm::v
       const glm::vec3& point = points[begin + i];
       lanes.x.v[i] = point.x, lanes.y.v[i] = point.y, lanes.z.v[i] = point.z;
     }
-    const simd::Float found = distance(lanes);
+    const simd::Float found = distance_of(lanes, wanted);
     for (size_t i = 0; i < count; ++i) distances[begin + i] = found.v[i];
   }
   return distances;
 }
 
-template <class Distance>
-std::vector<glm::vec3> normals_of(const Distance& distance, std::span<const glm::vec3> points) {
+std::vector<glm::vec3> normals_of(Wanted wanted, std::span<const glm::vec3> points) {
   constexpr float kStep = 2e-3f;
   std::vector<glm::vec3> slopes(points.size()), moved(points.begin(), points.end());
   for (int axis = 0; axis < 3; ++axis) {
     for (size_t i = 0; i < points.size(); ++i) moved[i][axis] = points[i][axis] + kStep;
-    const std::vector<float> above = distances_of(distance, moved);
+    const std::vector<float> above = distances_of(wanted, moved);
     for (size_t i = 0; i < points.size(); ++i) moved[i][axis] = points[i][axis] - kStep;
-    const std::vector<float> below = distances_of(distance, moved);
+    const std::vector<float> below = distances_of(wanted, moved);
     for (size_t i = 0; i < points.size(); ++i) {
       slopes[i][axis] = above[i] - below[i];
       moved[i][axis] = points[i][axis];
@@ -191,24 +222,34 @@ std::vector<glm::vec3> normals_of(const Distance& distance, std::span<const glm:
 
 }  // namespace
 
+NearHead::NearHead(const glm::vec3& about, float reach) : parts_(parts_near(about, kSpread * reach)) {}
+
+std::vector<float> NearHead::distances(std::span<const glm::vec3> points) const {
+  return distances_of(parts_, points);
+}
+
+std::vector<glm::vec3> NearHead::normals(std::span<const glm::vec3> points) const {
+  return normals_of(parts_, points);
+}
+
 float bust_distance(const glm::vec3& point) {
-  return bust_distance_of({point.x, point.y, point.z}).v[0];
+  return distances_of(~kHeadParts, {&point, 1}).front();
 }
 
 glm::vec3 bust_normal(const glm::vec3& point) {
-  return normals_of(bust_distance_of, {&point, 1}).front();
+  return normals_of(~kHeadParts, {&point, 1}).front();
 }
 
 float head_distance(const glm::vec3& point) {
-  return head_distance_of({point.x, point.y, point.z}).v[0];
+  return distance_of({point.x, point.y, point.z}, kAllParts).v[0];
 }
 
 std::vector<float> head_distances(std::span<const glm::vec3> points) {
-  return distances_of(head_distance_of, points);
+  return distances_of(kAllParts, points);
 }
 
 std::vector<glm::vec3> head_normals(std::span<const glm::vec3> points) {
-  return normals_of(head_distance_of, points);
+  return normals_of(kAllParts, points);
 }
 
 }  // namespace strandcast

@@ -1,13 +1,16 @@
-// Meshes the built-in head by dual vertices: one vertex in every grid cell that the surface crosses, one quad
+#include "common/strands/head/head_mesh.h"
+
+// By dual vertices: one vertex in every grid cell that the surface crosses, one quad
 // round every grid edge that it crosses. The grid is finer where the face has detail.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <span>
+#include <utility>
 
-#include "common/groom/head_field.h"
-#include "common/groom/mesh.h"
+#include "common/strands/head/head_field.h"
 
 namespace strandcast {
 namespace {
@@ -15,6 +18,11 @@ namespace {
 constexpr float kCoarse = 0.125f;  // cell width in skull radii
 constexpr float kFine = 0.032f;
 constexpr int kProjections = 4;  // of each vertex onto the surface
+constexpr int kBlock = 3;        // grid cells, along each axis, that are looked at together
+/// Points of a block that leave it by no more than this are still near it.
+constexpr float kLeastReach = 0.004f;
+/// Where a block is further from the surface than this share of its size all of it is on one side.
+constexpr float kFarReaches = 3.0f;
 constexpr uint32_t kNoTriangle = std::numeric_limits<uint32_t>::max();
 
 struct Range {
@@ -62,9 +70,8 @@ class HeadMesher {
   Mesh build() {
     for_each(size_ - 1, [&](const glm::ivec3& cell) { add_vertex(cell); });
     project();
-    for_each(size_ - 1, [&](const glm::ivec3& at) {
+    for (const glm::ivec3& at : cell_of_vertex_)
       for (int axis = 0; axis < 3; ++axis) add_quad(at, axis);
-    });
     return std::move(mesh_);
   }
 
@@ -85,26 +92,48 @@ class HeadMesher {
   bool is_inside(const glm::ivec3& at) const { return distance_[index_of(at)] < 0.0f; }
   static glm::ivec3 step(int axis) { return {axis == 0, axis == 1, axis == 2}; }
 
-  /// Layer by layer; of each one half, and its mirror image.
+  bool is_crossed(const glm::ivec3& cell) const {
+    const float* const corner = &distance_[index_of(cell)];
+    const auto row = static_cast<size_t>(size_.x), layer = row * static_cast<size_t>(size_.y);
+    const bool is_first_inside = corner[0] < 0.0f;
+    for (const size_t beside : {size_t{1}, row, row + 1, layer, layer + 1, layer + row, layer + row + 1})
+      if ((corner[beside] < 0.0f) != is_first_inside) return true;
+    return false;
+  }
+
+  /// Visits a half of the grid in blocks of up to kBlock corners along each axis: first, past the last.
+  template <class Visit>
+  void for_each_block(const Visit& visit) const {
+    const glm::ivec3 first(size_.x / 2, 0, 0);
+    for_each((size_ - first + kBlock - 1) / kBlock, [&](const glm::ivec3& block) {
+      const glm::ivec3 begin = first + block * kBlock;
+      visit(begin, glm::min(begin + kBlock, size_));
+    });
+  }
+
+  /// Of one half, and its mirror image. Only signs matter far from the surface.
   void measure_corners() {
     const int middle = size_.x / 2;
-    std::vector<glm::vec3> corners;
-    for (int z = 0; z < size_.z; ++z) {
-      corners.clear();
-      for (int y = 0; y < size_.y; ++y)
-        for (int x = middle; x < size_.x; ++x) corners.push_back(corner({x, y, z}));
-      const std::vector<float> distances = head_distances(corners);
+    for_each_block([&](const glm::ivec3& begin, const glm::ivec3& end) {
+      const glm::vec3 low = corner(begin), high = corner(end - 1), about = 0.5f * (low + high);
+      const float reach = 0.5f * glm::distance(low, high) + kLeastReach, there = head_distance(about);
+      std::vector<glm::vec3> corners;
+      for_each(end - begin, [&](const glm::ivec3& at) { corners.push_back(corner(begin + at)); });
+      const std::vector<float> distances = std::abs(there) > kFarReaches * reach
+                                               ? std::vector<float>(corners.size(), there)
+                                               : NearHead(about, reach).distances(corners);
       auto distance = distances.begin();
-      for (int y = 0; y < size_.y; ++y)
-        for (int x = middle; x < size_.x; ++x) {
-          distance_[index_of({2 * middle - x, y, z})] = *distance;
-          distance_[index_of({x, y, z})] = *distance++;
-        }
-    }
+      for_each(end - begin, [&](const glm::ivec3& at) {
+        const glm::ivec3 place = begin + at;
+        distance_[index_of({2 * middle - place.x, place.y, place.z})] = *distance;
+        distance_[index_of(place)] = *distance++;
+      });
+    });
   }
 
   /// A vertex at the mean of the crossings on the cell's edges.
   void add_vertex(const glm::ivec3& cell) {
+    if (!is_crossed(cell)) return;
     glm::vec3 sum(0.0f);
     int crossings = 0;
     for (int axis = 0; axis < 3; ++axis) {
@@ -117,25 +146,43 @@ class HeadMesher {
         ++crossings;
       }
     }
-    if (crossings == 0) return;
     vertex_[index_of(cell)] = static_cast<uint32_t>(mesh_.position_m.size());
     mesh_.position_m.push_back(sum / static_cast<float>(crossings));
     cell_of_vertex_.push_back(cell);
   }
 
-  /// Moves the vertices onto the surface.
+  /// Moves the vertices onto the surface, those of a block of cells together.
   void project() {
+    mesh_.normal.resize(mesh_.position_m.size());
+    std::map<std::array<int, 3>, std::vector<uint32_t>> blocks;
+    for (uint32_t i = 0; i < cell_of_vertex_.size(); ++i) {
+      const glm::ivec3 block = cell_of_vertex_[i] / kBlock;
+      blocks[{block.x, block.y, block.z}].push_back(i);
+    }
+    for (const auto& [block, vertices] : blocks) {
+      const glm::ivec3 first = kBlock * glm::ivec3(block[0], block[1], block[2]);
+      project({first, glm::min(first + kBlock, size_ - 1)}, vertices);
+    }
+  }
+  void project(const std::pair<glm::ivec3, glm::ivec3>& cells, const std::vector<uint32_t>& vertices) {
+    const glm::vec3 low = corner(cells.first), high = corner(cells.second);
+    const NearHead head(0.5f * (low + high), 0.5f * glm::distance(low, high) + kLeastReach);
+    std::vector<glm::vec3> points;
+    for (const uint32_t vertex : vertices) points.push_back(mesh_.position_m[vertex]);
     for (int round = 0; round < kProjections; ++round) {
-      const std::vector<float> distance = head_distances(mesh_.position_m);
-      const std::vector<glm::vec3> normal = head_normals(mesh_.position_m);
-      for (size_t i = 0; i < distance.size(); ++i) {
+      const std::vector<float> distance = head.distances(points);
+      const std::vector<glm::vec3> normal = head.normals(points);
+      for (size_t i = 0; i < points.size(); ++i) {
         // Kept inside of its cell, so that neighbouring quads never fold over each other.
-        glm::vec3& point = mesh_.position_m[i];
-        const glm::ivec3& cell = cell_of_vertex_[i];
-        point = glm::clamp(point - distance[i] * normal[i], corner(cell), corner(cell + 1));
+        const glm::ivec3& cell = cell_of_vertex_[vertices[i]];
+        points[i] = glm::clamp(points[i] - distance[i] * normal[i], corner(cell), corner(cell + 1));
       }
     }
-    mesh_.normal = head_normals(mesh_.position_m);
+    const std::vector<glm::vec3> normal = head.normals(points);
+    for (size_t i = 0; i < points.size(); ++i) {
+      mesh_.position_m[vertices[i]] = points[i];
+      mesh_.normal[vertices[i]] = normal[i];
+    }
   }
 
   /// The quad of the four cells round a grid edge that crosses the surface.
@@ -171,6 +218,21 @@ Mesh make_head(float radius_m) {
   Mesh mesh = kUnitHead;
   for (glm::vec3& point : mesh.position_m) point *= radius_m;
   return mesh;
+}
+
+std::vector<glm::vec3> compute_normals(const std::vector<glm::vec3>& position_m,
+                                       const std::vector<glm::uvec3>& triangle) {
+  std::vector<glm::dvec3> sum(position_m.size(), glm::dvec3(0.0));
+  for (const glm::uvec3& corner : triangle) {
+    const glm::dvec3 a = position_m[corner.x], b = position_m[corner.y], c = position_m[corner.z];
+    const glm::dvec3 area = glm::cross(b - a, c - a);
+    for (int i = 0; i < 3; ++i) sum[corner[i]] += area;
+  }
+  std::vector<glm::vec3> normal(position_m.size(), glm::vec3(0.0f, 1.0f, 0.0f));
+  for (size_t i = 0; i < normal.size(); ++i) {
+    if (glm::dot(sum[i], sum[i]) > 0.0) normal[i] = glm::vec3(glm::normalize(sum[i]));
+  }
+  return normal;
 }
 
 }  // namespace strandcast
