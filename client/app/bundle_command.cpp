@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstring>
 #include <iostream>
@@ -33,8 +34,22 @@ addEventListener('DOMContentLoaded', async () => {
     for (let i = 0; i < text.length; ++i) all[i] = text.charCodeAt(i);
     return all;
   };
+  // 4 bytes as 5 digits (text_of_85).
+  const value = new Uint8Array(128);
+  for (let code = 35, i = 0; code < 126; ++code)
+    if (!"&'<>\\`".includes(String.fromCharCode(code))) value[code] = i++;
+  const bytesOf85 = (id) => {
+    const text = document.getElementById(id).textContent;
+    const all = new Uint8Array(Math.floor((text.length * 4) / 5));
+    for (let at = 0, out = 0; at < text.length; at += 5, out += 4) {
+      let group = 0;
+      for (let i = 0; i < 5; ++i) group = group * 85 + (at + i < text.length ? value[text.charCodeAt(at + i)] : 84);
+      for (let i = 0; i < 4 && out + i < all.length; ++i) all[out + i] = Math.floor(group / 2 ** (24 - 8 * i));
+    }
+    return all;
+  };
   const unzipped = async (id, type) => {
-    const stream = new Blob([bytes(id)]).stream().pipeThrough(new DecompressionStream('gzip'));
+    const stream = new Blob([bytesOf85(id)]).stream().pipeThrough(new DecompressionStream('gzip'));
     return new Blob([await new Response(stream).arrayBuffer()], { type });
   };
   if (!document.getElementById('end')) {
@@ -104,9 +119,30 @@ Welcome welcome_of(const RecordingStart& start, const SceneDesc& scene, const Sc
   return welcome;
 }
 
-std::string script_of(std::string_view id, std::string_view content, std::string_view attributes = {}) {
+/// Every 4 bytes as 5 digits of what stands in HTML as it is: a sixteenth less than base64. n bytes at the
+/// end take n + 1.
+std::string text_of_85(std::string_view bytes) {
+  static const std::string kDigits = [] {
+    std::string digits;
+    for (char code = '#'; code < '~'; ++code)
+      if (std::string_view("&'<>\\`").find(code) == std::string_view::npos) digits += code;
+    return digits;
+  }();
+  std::string text;
+  for (size_t at = 0; at < bytes.size(); at += 4) {
+    uint32_t group = 0;
+    for (size_t i = at; i < at + 4; ++i)
+      group = group << 8 | (i < bytes.size() ? static_cast<uint8_t>(bytes[i]) : 0u);
+    std::array<char, 5> five;
+    for (size_t i = five.size(); i-- > 0; group /= 85) five[i] = kDigits[group % 85];
+    text.append(five.data(), std::min<size_t>(bytes.size() - at, 4) + 1);
+  }
+  return text;
+}
+
+std::string script_of(std::string_view id, const std::string& text, std::string_view attributes = {}) {
   return fmt::format("<script type=\"application/octet-stream\" id=\"{}\"{}>{}</script>\n", id, attributes,
-                     base64_of(std::as_bytes(std::span(content))));
+                     text);
 }
 
 /// Returns the file whose path begins with "/" and this name.
@@ -146,13 +182,14 @@ Result<std::string> page_with(PageFiles files, const std::string& tape, const st
   RETURN_IF_ERROR(replace_line(html, "rel=\"stylesheet\"", fmt::format("<style>{}</style>", style->plain)));
   RETURN_IF_ERROR(replace_line(html, "rel=\"preload\"", ""));
   std::string parts(kLoader);
-  parts += script_of("script", script->gzip);
-  parts += script_of("core", core->gzip);
+  parts += script_of("script", text_of_85(script->gzip));
+  parts += script_of("core", text_of_85(core->gzip));
   if (codec != "tangent") {
     ASSIGN_OR_RETURN(const PageFile* step, part(files, has_all_solvers ? "strand_core." : "strand_step."));
-    parts += script_of("stepCore", step->gzip);
+    parts += script_of("stepCore", text_of_85(step->gzip));
   }
-  parts += script_of("tape", tape, fmt::format(" data-codec=\"{}\"", codec));
+  parts +=
+      script_of("tape", base64_of(std::as_bytes(std::span(tape))), fmt::format(" data-codec=\"{}\"", codec));
   parts += script_of("end", "");  // missing where the file was cut off
   RETURN_IF_ERROR(replace_line(html, "<script type=\"module\"", parts));
   return html;

@@ -4,6 +4,7 @@
 #include <string_view>
 #include <utility>
 
+#include "common/base/base64.h"
 #include "common/base/profile.h"
 #include "common/base/text.h"
 #include "common/client/connection_error_private.h"
@@ -11,6 +12,7 @@
 #include "common/client/viewer_connection_private.h"
 #include "common/log/log.h"
 #include "common/strands/asset/layout.h"
+#include "common/wire/early_hello.h"
 
 namespace strandcast {
 namespace {
@@ -207,9 +209,11 @@ void ViewerClient::Connection::upgrade() {
   timeout.idle_timeout = config_.idle_timeout;
   timeout.keep_alive_pings = true;
   ws_.set_option(timeout);
-  ws_.set_option(websocket::stream_base::decorator([](websocket::request_type& request) {
+  const std::string greeting = base64_of(encode(ClientMessage(hello())));
+  ws_.set_option(websocket::stream_base::decorator([greeting](websocket::request_type& request) {
     request.set(http::field::sec_websocket_protocol, kWebSocketProtocol);
     request.set(http::field::user_agent, "strandcast");
+    if (greeting.size() <= kMaxHelloFieldBytes) request.set(kHelloField, greeting);
   }));
   ws_.read_message_max(kMaxMessageBytes);
   ws_.binary(true);
@@ -241,10 +245,15 @@ void ViewerClient::Connection::greet() {
                              "the server speaks protocol '{}', this program needs '{}'",
                              one_line(view(chosen)), kWebSocketProtocol));
   set_deadline(config_.welcome_timeout, "sent no Welcome");
+  if (view(response_[kHelloField]) != kHelloTaken)
+    if (auto sent = send(encode(ClientMessage(hello()))); !sent) return finish(sent.error());
+  read_next();
+}
+
+Hello ViewerClient::Connection::hello() const {
   Hello hello = config_.hello;
   hello.asset_layout = static_cast<uint32_t>(newest_asset_layout());
-  if (auto sent = send(encode(ClientMessage(hello))); !sent) return finish(sent.error());
-  read_next();
+  return hello;
 }
 
 void ViewerClient::Connection::set_deadline(std::chrono::milliseconds timeout, const char* complaint) {

@@ -54,6 +54,7 @@ class ViewerClient::Connection {
   void connect_tls();
   void upgrade();
   void greet();
+  Hello hello() const;
 
   void read_next();
   Error error_from_stream(const error_code& failure);

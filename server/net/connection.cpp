@@ -8,6 +8,7 @@
 #include "common/base/profile.h"
 #include "common/base/units.h"
 #include "common/log/log.h"
+#include "common/wire/early_hello.h"
 #include "common/wire/session_path.h"
 #include "server/net/access.h"
 #include "server/net/metrics.h"
@@ -34,8 +35,9 @@ bool has_body(const http::request_parser<http::empty_body>& parser) {
 bool is_ambiguous(const http::request<http::empty_body>& request) {
   const auto fields = {http::field::host, http::field::origin, http::field::authorization,
                        http::field::sec_websocket_key, http::field::sec_websocket_version};
-  return std::any_of(fields.begin(), fields.end(),
-                     [&](http::field field) { return request.count(field) > 1; });
+  return request.count(kHelloField) > 1 || std::any_of(fields.begin(), fields.end(), [&](http::field field) {
+           return request.count(field) > 1;
+         });
 }
 
 /// The other side went away in the middle.

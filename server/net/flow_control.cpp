@@ -87,7 +87,8 @@ size_t FlowControl::begin_codec(const Classes& classes, int64_t time_ns) {
 
 size_t FlowControl::choose_class(const Classes& classes, int64_t time_ns) {
   const size_t present = classes.present;
-  if (classes.costs.size() < 2 || (has_acks_ && link_.last_ack_ns() == 0)) return present;
+  const bool is_unknown = link_.last_ack_ns() == 0 && link_.capacity_bytes_per_s(time_ns) <= 0.0;
+  if (classes.costs.size() < 2 || (has_acks_ && is_unknown)) return present;
   const double allowed = allowed_bytes_per_s(classes, time_ns);
   const std::vector<double> shares = decode_shares(classes);
   const size_t chosen =

@@ -4,10 +4,12 @@
 #include <exception>
 #include <utility>
 
+#include "common/base/base64.h"
 #include "common/base/profile.h"
 #include "common/base/text.h"
 #include "common/base/units.h"
 #include "common/log/log.h"
+#include "common/wire/early_hello.h"
 
 namespace strandcast::net {
 namespace {
@@ -46,9 +48,13 @@ void Session::start(http::request<http::empty_body> request, bool has_room) {
   timeout.idle_timeout = std::chrono::milliseconds(limits.idle_ms);
   timeout.keep_alive_pings = true;
   socket_.set_option(timeout);
-  socket_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
+  const auto greeting = request_[kHelloField];
+  if (auto hello = from_base64({greeting.data(), greeting.size()})) early_hello_ = std::move(*hello);
+  const bool is_greeted = !early_hello_.empty();
+  socket_.set_option(websocket::stream_base::decorator([is_greeted](websocket::response_type& response) {
     response.set(http::field::sec_websocket_protocol, kWebSocketProtocol);
     response.set(http::field::server, "strandcast");
+    if (is_greeted) response.set(kHelloField, kHelloTaken);
   }));
   socket_.read_message_max(kMaxControlBytes);
   socket_.auto_fragment(false);
@@ -66,7 +72,10 @@ void Session::on_open(bool has_room) {
   state_ = State::AwaitHello;
   read();
   if (context_.is_stopping) return close(CloseCode::GoingAway, "The server is stopping.");
-  if (!has_room) close_as_full();
+  if (!has_room) return close_as_full();
+  if (early_hello_.empty()) return;
+  context_.count(&NetCounters::messages_received);
+  on_message(std::exchange(early_hello_, {}), received_ns_ = now_ns());
 }
 
 void Session::close_as_full() {
@@ -114,7 +123,10 @@ void Session::on_read(const beast::error_code& error) {
   if (!rate_.take(arrival_ns)) return reject(CloseCode::Policy, rate_sentence());
   context_.count(&NetCounters::messages_received);
   received_ns_ = arrival_ns;
-  on_message({static_cast<const std::byte*>(data.data()), data.size()}, arrival_ns);
+  if (socket_.got_text())
+    reject(CloseCode::BadData, "Text messages are not part of the protocol.");
+  else
+    on_message({static_cast<const std::byte*>(data.data()), data.size()}, arrival_ns);
   read_buffer_.consume(read_buffer_.size());
   read_on();
 }

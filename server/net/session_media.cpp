@@ -11,8 +11,8 @@
 namespace strandcast::net {
 namespace {
 
-/// A link that carried the asset for so long carries the keyframe of all strands about as long.
-constexpr int64_t kThinAssetNs = 330 * kMsInNs;
+/// A link that carries the asset for so long carries the keyframe of all strands a little longer.
+constexpr int64_t kThinAssetNs = 400 * kMsInNs;
 constexpr int64_t kPreviewPatienceNs = 1'000 * kMsInNs;
 
 }  // namespace

@@ -32,7 +32,6 @@ CloseCode close_code_for(const Error& error) {
 }  // namespace
 
 void Session::on_message(std::span<const std::byte> bytes, int64_t arrival_ns) {
-  if (socket_.got_text()) return reject(CloseCode::BadData, "Text messages are not part of the protocol.");
   const Result<ClientMessage> message = decode_client_message(bytes);
   if (!message && message.error().code == ErrorCode::Unsupported)
     return context_.count(&NetCounters::unknown_messages);

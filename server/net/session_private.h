@@ -116,6 +116,7 @@ class Session : public std::enable_shared_from_this<Session> {
   websocket::stream<NetStream> socket_;
   const Peer peer_;
   http::request<http::empty_body> request_;
+  std::vector<std::byte> early_hello_;  // from the request; empty: it comes as a message
   State state_ = State::Handshake;
   Hello hello_;                       // its token stays: it may be taken back
   int64_t token_expires_unix_s_ = 0;  // 0 = never

@@ -9,6 +9,7 @@
 #include <atomic>
 #include <thread>
 
+#include "common/base/base64.h"
 #include "common/base/profile.h"
 #include "tests/support/metrics_text.h"
 #include "tests/support/server_net_fixture.h"
@@ -124,7 +125,7 @@ TEST_F(ServerNet, FieldsThatDecideStandOnce) {
        {"Host: 127.0.0.1", "host: evil.example", "Origin: http://127.0.0.1\r\nOrigin: http://127.0.0.1",
         "Origin: http://127.0.0.1\r\nOrigin: http://evil.example",
         "Authorization: Bearer a\r\nAuthorization: Bearer b",
-        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ=="}) {
+        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", "Strandcast-Hello: QQ==\r\nStrandcast-Hello: QQ=="}) {
     RawClient client(server_->port());
     client.send_raw(upgrade + field + "\r\n\r\n");
     EXPECT_TRUE(client.read_raw_to_end().starts_with("HTTP/1.1 400 ")) << field;
@@ -185,6 +186,47 @@ TEST_F(ServerNet, AHelloRightBehindTheUpgradeIsRead) {
     EXPECT_TRUE(eventually([&] { return server_->counters().messages_received == 4 * sessions; })) << first;
     EXPECT_EQ(app_.motion, 512 * sessions);
   }
+}
+
+// It saves a round trip.
+TEST_F(ServerNet, AHelloInTheRequestIsTaken) {
+  start();
+  RawClient early(server_->port());
+  ASSERT_TRUE(
+      early.handshake({.host = {}, .origin = {}, .hello = base64_of(encode(ClientMessage(hello())))}));
+  EXPECT_TRUE(early.read_control<Welcome>().has_value()) << "no message was needed";
+  EXPECT_EQ(server_->counters().messages_received, 1u);
+  early.send(hello());
+  EXPECT_EQ(early.read_end().close_code, code(CloseCode::Policy)) << "a second one is one too many";
+
+  RawClient other(server_->port());
+  ASSERT_TRUE(
+      other.handshake({.host = {}, .origin = {}, .hello = base64_of(encode(ClientMessage(Ping{1})))}));
+  EXPECT_EQ(other.read_end().close_code, code(CloseCode::Policy)) << "the first message must be Hello";
+  std::vector<std::byte> cut = encode(ClientMessage(hello()));
+  cut.pop_back();
+  RawClient broken(server_->port());
+  ASSERT_TRUE(broken.handshake({.host = {}, .origin = {}, .hello = base64_of(cut)}));
+  EXPECT_EQ(broken.read_end().close_code, code(CloseCode::BadData));
+
+  // What is no base64 is nothing; the answer says so.
+  const auto answer_to = [&](const std::string& greeting) {
+    RawClient client(server_->port());
+    client.send_raw(
+        "GET /v1 HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
+        "Sec-WebSocket-Protocol: strandcast.v1\r\nStrandcast-Hello: " +
+        greeting + "\r\n\r\n");
+    return client.read_answer();
+  };
+  EXPECT_THAT(answer_to(base64_of(encode(ClientMessage(hello())))),
+              testing::HasSubstr("Strandcast-Hello: taken"));
+  for (const char* greeting : {"", "x", "QQ=", "Q!=="})
+    EXPECT_THAT(answer_to(greeting), testing::Not(testing::HasSubstr("Strandcast-Hello"))) << greeting;
+  RawClient late(server_->port());
+  ASSERT_TRUE(late.handshake({.host = {}, .origin = {}, .hello = "Q!=="}));
+  late.send(hello());
+  EXPECT_TRUE(late.read_control<Welcome>().has_value());
 }
 
 TEST_F(ServerNet, HandshakeNeedsPathProtocolHostAndOrigin) {

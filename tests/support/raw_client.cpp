@@ -68,6 +68,7 @@ bool RawClient::handshake(const HandshakeOptions& options) {
     if (!options.protocol.empty()) request.set(beast::http::field::sec_websocket_protocol, options.protocol);
     if (!options.origin.empty()) request.set(beast::http::field::origin, options.origin);
     if (!options.forwarded_for.empty()) request.set("X-Forwarded-For", options.forwarded_for);
+    if (!options.hello.empty()) request.set("Strandcast-Hello", options.hello);
   }));
   const std::string host = options.host.empty() ? "127.0.0.1:" + std::to_string(state_->port) : options.host;
   const error_code error = state_->wait(

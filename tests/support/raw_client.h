@@ -31,6 +31,7 @@ struct HandshakeOptions {
   std::string origin;  // empty: none
   std::string protocol = kWebSocketProtocol;
   std::string forwarded_for = {};  // X-Forwarded-For; empty: none
+  std::string hello = {};          // Strandcast-Hello; empty: none
 };
 
 class RawClient {

@@ -51,12 +51,29 @@ std::string decoded(std::string_view base64) {
   return bytes;
 }
 
-/// The content of a script element of the page.
-std::string part_of(const std::string& html, const std::string& id) {
+/// The text of a script element of the page.
+std::string text_of(const std::string& html, const std::string& id) {
   const size_t at = html.find("id=\"" + id + "\"");
   if (at == std::string::npos) return {};
   const size_t begin = html.find('>', at) + 1;
-  return decoded(std::string_view(html).substr(begin, html.find('<', begin) - begin));
+  return html.substr(begin, html.find('<', begin) - begin);
+}
+/// The bytes of a module or script, 4 in 5 digits of base 85.
+std::string file_of(const std::string& html, const std::string& id) {
+  const std::string text = text_of(html, id);
+  std::string bytes;
+  for (size_t at = 0; at < text.size(); at += 5) {
+    uint64_t group = 0;
+    for (size_t i = at; i < at + 5; ++i) {
+      const char digit = i < text.size() ? text[i] : '}';
+      group = 85 * group + static_cast<uint64_t>(digit - '#');
+      for (const char left_out : std::string_view("&'<>\\`"))
+        if (digit > left_out) --group;
+    }
+    for (size_t i = 0; i + 1 < std::min<size_t>(text.size() - at, 5); ++i)
+      bytes += static_cast<char>(group >> (24 - 8 * i) & 0xff);
+  }
+  return bytes;
 }
 
 struct TapeMessage {
@@ -64,7 +81,7 @@ struct TapeMessage {
   std::string bytes;
 };
 std::vector<TapeMessage> tape_of(const std::string& html) {
-  const std::string tape = part_of(html, "tape");
+  const std::string tape = decoded(text_of(html, "tape"));
   std::vector<TapeMessage> messages;
   for (size_t at = 4; at + 8 <= tape.size();) {
     uint32_t numbers[2];
@@ -84,9 +101,13 @@ TEST(Bundle, HoldsThePageAndAllThatAServerWouldHaveSent) {
   EXPECT_THAT(bundle->html, HasSubstr("<style>main { color: red }</style>"));
   EXPECT_THAT(bundle->html, Not(HasSubstr("rel=\"preload\"")));
   EXPECT_THAT(bundle->html, Not(HasSubstr("type=\"module\"")));
-  EXPECT_EQ(part_of(bundle->html, "script"), "Man");
-  EXPECT_EQ(part_of(bundle->html, "core"), "Ma");
-  EXPECT_EQ(part_of(bundle->html, "stepCore"), "M");
+  // In base 85 0x4d616e00 is 24 73 80 78 29, and n bytes take n + 1 digits from '#' on.
+  EXPECT_EQ(text_of(bundle->html, "script"), "?ryw");
+  EXPECT_EQ(text_of(bundle->html, "core"), "?rv");
+  EXPECT_EQ(text_of(bundle->html, "stepCore"), "?h");
+  EXPECT_EQ(file_of(bundle->html, "script"), "Man");
+  EXPECT_EQ(file_of(bundle->html, "core"), "Ma");
+  EXPECT_EQ(file_of(bundle->html, "stepCore"), "M");
   EXPECT_GT(bundle->html.find("id=\"end\""), bundle->html.find("id=\"tape\""))
       << "a file that is cut off has none";
 
@@ -166,7 +187,7 @@ TEST(Bundle, IsAsLongAsAskedFor) {
 
 TEST(Bundle, TakesTheLargerModuleForWhatTheSmallerOneDoesNotStep) {
   const auto module_of = [](const char* solver) {
-    return part_of(make_bundle(*reader_of(restyled_recording(solver)), kFiles, {})->html, "stepCore");
+    return file_of(make_bundle(*reader_of(restyled_recording(solver)), kFiles, {})->html, "stepCore");
   };
   EXPECT_EQ(module_of("dftl"), "M");
   EXPECT_EQ(module_of("direct_rod"), "M");
@@ -177,7 +198,7 @@ TEST(Bundle, TakesTheLargerModuleIfAskedFor) {
   const auto reader = reader_of(test::moving_recording(2));
   BundleCommand command;
   command.has_all_solvers = true;
-  EXPECT_EQ(part_of(make_bundle(*reader, kFiles, command)->html, "stepCore"), "whole");
+  EXPECT_EQ(file_of(make_bundle(*reader, kFiles, command)->html, "stepCore"), "whole");
 }
 
 TEST(Bundle, WritesOverNoRecordingWhosePageWasForgotten) {

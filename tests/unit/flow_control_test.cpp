@@ -321,6 +321,9 @@ TEST(FlowControl, ASlowAssetShowsTheLinkBeforeAllOfItIsThere) {
   slow.watch(250.0, 300);
   EXPECT_FALSE(slow.flow.awaits_asset());
   EXPECT_NEAR(slow.flow.capacity_bytes_per_s(1 * kSInNs + 300 * kMsInNs), 250e3, 10e3);
+  const std::vector<double> costs = {600e3, 300e3, 150e3, 20e3};
+  EXPECT_EQ(slow.flow.choose_class({0, costs}, 1 * kSInNs + 300 * kMsInNs), 2u) << "the first frame fits";
+  EXPECT_EQ(AssetOnItsWay().flow.choose_class({0, costs}, 1 * kSInNs + 300 * kMsInNs), 0u);
   EXPECT_FALSE(slow.flow.may_start(1 * kSInNs + 300 * kMsInNs)) << "the link has enough to do";
   EXPECT_TRUE(slow.flow.may_start(1 * kSInNs + 360 * kMsInNs))
       << "the link would stand idle for a round trip";

@@ -1,4 +1,5 @@
 #include "common/base/text.h"
+#include "common/base/base64.h"
 
 namespace strandcast::text_test {
 namespace {
@@ -24,6 +25,17 @@ TEST(Text, EveryCharacterOfUnicodeHasItsLengthAndSurrogatesHaveNone) {
   }
   for (const char* overlong : {"\xc0\x80", "\xc1\xbf", "\xe0\x9f\xbf", "\xf0\x8f\xbf\xbf"})
     EXPECT_EQ(utf8_length(overlong, 0), 0u);
+}
+
+TEST(Text, Base64ComesBackAndNothingElseIsRead) {
+  std::vector<std::byte> bytes;
+  for (size_t size = 0; size < 70; ++size) {
+    EXPECT_EQ(from_base64(base64_of(bytes)), bytes) << size;
+    bytes.push_back(static_cast<std::byte>(7 * size * size + 251));
+  }
+  for (const char* bad :
+       {"Q", "QQ", "QQ=", "QQ===", "QQ=x", "QR==", "Q Q=", "QUI", "QUJD=", "QUJ\n", "=", "QUJD\xff"})
+    EXPECT_FALSE(from_base64(bad)) << bad;
 }
 
 TEST(Text, IsPrintableWithoutControlsAndBrokenBytes) {
