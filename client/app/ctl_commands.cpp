@@ -92,14 +92,16 @@ std::string taken_for(const MotionClip& clip) {
   const auto [lowest, highest] =
       std::minmax_element(clip.world_from_head.begin(), clip.world_from_head.end(),
                           [](const Pose& a, const Pose& b) { return a.position_m.y < b.position_m.y; });
-  const std::optional<double> facing_rad = mean_facing_rad(clip);
+  std::string facing = "all around";
+  if (const std::optional<double> facing_rad = mean_facing_rad(clip)) {
+    const double deg = std::round(glm::degrees(*facing_rad));
+    facing = deg == 0.0 ? "ahead on the mean" : fmt::format("{} degrees from +Z towards +X on the mean", deg);
+  }
   return fmt::format(
       "{} frames, {} per second; one unit is {:.4g} m and {} is up: the head is {:.2f} to {:.2f} m up, and "
       "looks {}",
       clip.world_from_head.size(), frame_rate_text(1.0 / clip.frame_s), clip.file_unit_m, clip.up,
-      lowest->position_m.y, highest->position_m.y,
-      facing_rad ? fmt::format("{:.0f} degrees from +Z towards +X on the mean", glm::degrees(*facing_rad))
-                 : "all around");
+      lowest->position_m.y, highest->position_m.y, facing);
 }
 
 void print_notes(const FeedOptions& options, const MotionFile& file) {

@@ -65,14 +65,23 @@ std::optional<double> channel_value(std::string_view word) {
   return value && std::abs(*value) <= kMaxChannelValue ? value : std::nullopt;
 }
 
+/// What a file is by its first bytes, and what to do with it; "" for one that is not known.
+const char* other_kind(std::string_view text) {
+  return text.starts_with("\x1f\x8b") ? "; it is packed by gzip: unpack it"
+         : text.starts_with("Kaydara FBX") || text.starts_with("; FBX")
+             ? "; it is FBX: convert it, as Blender does"
+         : text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff") ? "; it is UTF-16: save it as UTF-8"
+                                                                        : "";
+}
+
 class HierarchyParser {
  public:
-  explicit HierarchyParser(TextCursor& cursor) : cursor_(cursor) {}
+  HierarchyParser(TextCursor& cursor, std::string_view text) : cursor_(cursor), text_(text) {}
 
   /// Reads from HIERARCHY up to and including the word MOTION.
   Result<Skeleton> parse() {
     if (!equals_ignoring_case(cursor_.next_token(), "HIERARCHY"))
-      return cursor_.fail(ErrorCode::BadInput, "a BVH file begins with HIERARCHY");
+      return cursor_.fail(ErrorCode::BadInput, "a BVH file begins with HIERARCHY{}", other_kind(text_));
     for (;;) {
       const auto word = cursor_.next_token();
       if (equals_ignoring_case(word, "MOTION")) break;
@@ -180,6 +189,7 @@ class HierarchyParser {
   }
 
   TextCursor& cursor_;
+  std::string_view text_;
   Skeleton skeleton_;
 };
 
@@ -598,11 +608,14 @@ bool begins_with_t_pose(const std::vector<Pose>& poses, double rest_share_first,
 Upward guess_up_in_motion(const Rows& rows, const Upward& at_rest) {
   constexpr double kMostClimb = 1.5;  // times the way from hips to head
   const auto frames = static_cast<double>(rows.is_good.size() - rows.bad.count());
-  for (const Upward& up : kUpwards)
+  const glm::dvec3 way = rows.root_high - rows.root_low;
+  for (const Upward& up : kUpwards) {
+    const bool goes_there =
+        way[up.axis] * frames > kMostClimb * up.of(rows.lift) && way[up.axis] > way[at_rest.axis];
     if (up != at_rest && up.of(rows.lift) > kUpClearly * up.beside(rows.lift) &&
-        up.of(rows.root) > 0.5 * up.of(rows.lift) &&
-        std::abs(up.of(rows.root_high - rows.root_low)) * frames < kMostClimb * up.of(rows.lift))
+        up.of(rows.root) > 0.5 * up.of(rows.lift) && !goes_there)
       return up;
+  }
   return at_rest;
 }
 
@@ -708,6 +721,19 @@ Result<std::vector<JointPath>> find_body(const Skeleton& skeleton, uint32_t head
   return paths;
 }
 
+std::vector<std::string> repairs_of(const Rows& rows, const MotionHeader& header) {
+  std::vector<std::string> repairs;
+  if (rows.bad.count() > 0)
+    repairs.push_back(rows.bad.sentence(rows.is_good.size(), "frames", "and are bridged or left out"));
+  if (rows.idle.count() > 0)
+    repairs.push_back(fmt::format("{} values are no numbers, in joints that nobody needs; the first: {}",
+                                  rows.idle.count(), rows.idle.first().to_string()));
+  if (rows.is_good.size() != header.frame_count)
+    repairs.push_back(
+        fmt::format("{} frames are announced, {} are there", header.frame_count, rows.is_good.size()));
+  return repairs;
+}
+
 }  // namespace
 
 Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, const BvhOptions& options) {
@@ -715,7 +741,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
     return make_error(ErrorCode::BadInput, "the length unit is {} m, it must be above 0, or 0 to be guessed",
                       options.unit_m);
   TextCursor cursor(text, place);
-  ASSIGN_OR_RETURN(const Skeleton skeleton, HierarchyParser(cursor).parse());
+  ASSIGN_OR_RETURN(const Skeleton skeleton, HierarchyParser(cursor, text).parse());
   const auto head = find_head(skeleton, options.head_joint);
   if (!head) return at(place, head.error());
   const auto path = path_to(skeleton, *head);
@@ -733,15 +759,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   clip.frame_s = header.frame_s;
   ASSIGN_OR_RETURN(const Rows rows, read_rows(cursor, skeleton, path, body, clip));
   bridge(clip, rows.is_good);
-  if (rows.bad.count() > 0)
-    clip.repairs.push_back(rows.bad.sentence(rows.is_good.size(), "frames", "and are bridged or left out"));
-  if (rows.idle.count() > 0)
-    clip.repairs.push_back(fmt::format("{} values are no numbers, in joints that nobody needs; the first: {}",
-                                       rows.idle.count(), rows.idle.first().to_string()));
-  if (rows.is_good.size() != header.frame_count)
-    clip.repairs.push_back(
-        fmt::format("{} frames are announced, {} are there", header.frame_count, rows.is_good.size()));
-
+  clip.repairs = repairs_of(rows, header);
   if (options.skip_first_frame_if_t_pose &&
       begins_with_t_pose(clip.world_from_head, rows.rest_share[0], rows.rest_share[1]))
     leave_out_first_frames(clip, 1);

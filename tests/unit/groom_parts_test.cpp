@@ -149,11 +149,11 @@ TEST(GroomParts, AStrandWhoseRootStandsAloneIsLeftOut) {
       for (glm::vec3& point : other[40 + i]) point.x += off_m;
     const PlacedGroom found = placed({write(folder, "off.ply", other, 1.0f, "comment unit_m 1\n")});
     EXPECT_THAT(found.notes, Contains(HasSubstr(note)));
-    EXPECT_TRUE(off_m < 0.9f || found.unlikely.empty()) << "the others say how large the head is";
+    EXPECT_TRUE(off_m < 0.7f || found.unlikely.empty()) << "the others say how large the head is";
     return found.groom.strand_count();
   };
   const auto all = static_cast<uint32_t>(strands.size());
-  EXPECT_EQ(count_with(1, 1.0f, "1 of 4"), all - 1);
+  EXPECT_EQ(count_with(1, 0.8f, "1 of 4"), all - 1);
   EXPECT_EQ(count_with(1, 0.2f, "strands x 6"), all) << "beside the head";
   EXPECT_EQ(count_with(12, 0.6f, "strands x 6"), all) << "a patch, which is meant";
 }
@@ -305,10 +305,10 @@ TEST(GroomParts, HairThatFallsStraightDownIsLeftAsItIs) {
 // Few guides leave 20 degrees between roots, where they happen to be.
 TEST(GroomParts, FewGuidesOfASymmetricHeadFaceAhead) {
   const TemporaryFolder folder;
-  for (uint32_t seed = 1; seed <= 8; ++seed) {
+  for (uint32_t seed = 1; seed <= 30; ++seed) {
     std::mt19937 random(seed);
     std::vector<Strand> strands;
-    while (strands.size() < 80) {
+    while (strands.size() < 70) {
       const auto number = [&] { return static_cast<float>(random()) / 2147483648.0f - 1.0f; };
       const glm::vec3 out(number(), number(), number());
       if (glm::length(out) > 1.0f || !is_of_scalp(glm::normalize(out))) continue;

@@ -536,6 +536,13 @@ TEST(CaseFiles, MotionComesInAsItShould) {
   }
 }
 
+TEST(MotionFile, AnotherKindOfFileIsNamed) {
+  for (const auto& [begin, said] : {std::pair("\x1f\x8b\x08", "packed by gzip"),
+                                    {"Kaydara FBX Binary", "it is FBX"},
+                                    {"\xff\xfeH", "it is UTF-16"}})
+    EXPECT_THAT(parse_bvh(begin, "x.bvh", BvhOptions()).error().to_string(), HasSubstr(said));
+}
+
 // A person who states a wrong unit or axis reads about a head that is too fast, and filters what is right.
 TEST(MotionFile, DoubtsAStatedUnitAndAxisThatMakeNoBody) {
   const std::filesystem::path clip = std::filesystem::path(STRANDCAST_SHARED_DATA) / "mocap/pirouette.bvh";
