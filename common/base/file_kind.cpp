@@ -27,8 +27,8 @@ std::string likely_kind(const std::filesystem::path& path) {
       {"\x1f\x8b", "", "it is packed by gzip: unpack it (gunzip)"},
       {"Kaydara FBX", "", "it is FBX, which is not read: export motion as .bvh, hair as .abc or .usd"},
       {"glTF", "", "it is binary glTF, which is not read: export motion as .bvh, a head as .obj"},
-      {"\xff\xfe", "", "it is text in UTF-16: save it as UTF-8"},
-      {"\xfe\xff", "", "it is text in UTF-16: save it as UTF-8"},
+      {"\xff\xfe", "", "it is UTF-16: save it as UTF-8"},
+      {"\xfe\xff", "", "it is UTF-16: save it as UTF-8"},
   }};
   std::error_code failure;
   if (!std::filesystem::is_regular_file(path, failure)) return {};

@@ -65,23 +65,14 @@ std::optional<double> channel_value(std::string_view word) {
   return value && std::abs(*value) <= kMaxChannelValue ? value : std::nullopt;
 }
 
-/// What a file is by its first bytes, and what to do with it; "" for one that is not known.
-const char* other_kind(std::string_view text) {
-  return text.starts_with("\x1f\x8b") ? "; it is packed by gzip: unpack it"
-         : text.starts_with("Kaydara FBX") || text.starts_with("; FBX")
-             ? "; it is FBX: convert it, as Blender does"
-         : text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff") ? "; it is UTF-16: save it as UTF-8"
-                                                                        : "";
-}
-
 class HierarchyParser {
  public:
-  HierarchyParser(TextCursor& cursor, std::string_view text) : cursor_(cursor), text_(text) {}
+  explicit HierarchyParser(TextCursor& cursor) : cursor_(cursor) {}
 
   /// Reads from HIERARCHY up to and including the word MOTION.
   Result<Skeleton> parse() {
     if (!equals_ignoring_case(cursor_.next_token(), "HIERARCHY"))
-      return cursor_.fail(ErrorCode::BadInput, "a BVH file begins with HIERARCHY{}", other_kind(text_));
+      return cursor_.fail(ErrorCode::BadInput, "a BVH file begins with HIERARCHY");
     for (;;) {
       const auto word = cursor_.next_token();
       if (equals_ignoring_case(word, "MOTION")) break;
@@ -189,7 +180,6 @@ class HierarchyParser {
   }
 
   TextCursor& cursor_;
-  std::string_view text_;
   Skeleton skeleton_;
 };
 
@@ -741,7 +731,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
     return make_error(ErrorCode::BadInput, "the length unit is {} m, it must be above 0, or 0 to be guessed",
                       options.unit_m);
   TextCursor cursor(text, place);
-  ASSIGN_OR_RETURN(const Skeleton skeleton, HierarchyParser(cursor, text).parse());
+  ASSIGN_OR_RETURN(const Skeleton skeleton, HierarchyParser(cursor).parse());
   const auto head = find_head(skeleton, options.head_joint);
   if (!head) return at(place, head.error());
   const auto path = path_to(skeleton, *head);

@@ -405,18 +405,6 @@ TEST(Bvh, ARoundedFrameTimeIsThatOfItsRate) {
     EXPECT_EQ(frame_s(other), std::stod(other)) << "it may be meant";
 }
 
-TEST(Bvh, AFileOfAnotherKindIsCalledThat) {
-  const TemporaryFolder folder;
-  for (const auto& [begin, said] : {std::pair("\x1f\x8b", "packed by gzip"),
-                                    {"Kaydara FBX Binary", "it is FBX"},
-                                    {"\xff\xfeH", "UTF-16"},
-                                    {"", "it is empty"}}) {
-    const auto clip = load_bvh(folder.write("walk.bvh", begin), kPlain);
-    ASSERT_FALSE(clip);
-    EXPECT_THAT(clip.error().to_string(), HasSubstr(said));
-  }
-}
-
 TEST(Bvh, DecimalCommasAreRead) {
   const std::string row = "1.5 0 0 -2.25 0 0 0 0 0 0 0 0\n";
   std::string commas = small_with(row + row);

@@ -10,6 +10,7 @@
 #include "common/motion/motion_glitches.h"
 #include "common/motion/wind_csv.h"
 #include "tests/support/shared_data.h"
+#include "tests/support/temporary_folder.h"
 
 namespace strandcast::motion_test {
 namespace {
@@ -537,10 +538,12 @@ TEST(CaseFiles, MotionComesInAsItShould) {
 }
 
 TEST(MotionFile, AnotherKindOfFileIsNamed) {
+  const TemporaryFolder folder;
   for (const auto& [begin, said] : {std::pair("\x1f\x8b\x08", "packed by gzip"),
                                     {"Kaydara FBX Binary", "it is FBX"},
-                                    {"\xff\xfeH", "it is UTF-16"}})
-    EXPECT_THAT(parse_bvh(begin, "x.bvh", BvhOptions()).error().to_string(), HasSubstr(said));
+                                    {"\xff\xfeH", "it is UTF-16"},
+                                    {"", "it is empty"}})
+    EXPECT_THAT(load_motion_file(folder.write("x.bvh", begin), {}).error().to_string(), HasSubstr(said));
 }
 
 // A person who states a wrong unit or axis reads about a head that is too fast, and filters what is right.
