@@ -3,8 +3,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "common/strands/head/head_field.h"
 #include "common/scene/scene_file.h"
+#include "common/strands/head/head_field.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/step_builder.h"
 #include "tests/support/shared_data.h"

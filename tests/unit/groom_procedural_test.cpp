@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "common/groom/hair_style.h"
-#include "common/strands/head/head_field.h"
 #include "common/groom/procedural.h"
 #include "common/groom/scalp_roots.h"
 #include "common/math/point_tree.h"
+#include "common/strands/head/head_field.h"
 
 namespace strandcast::groom_procedural_test {
 namespace {
