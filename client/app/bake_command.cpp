@@ -92,7 +92,7 @@ Status check_paths(const BakeCommand& command) {
   for (const std::string& path : read)
     if (std::filesystem::equivalent(path, out, failure) || (!command.exported.at_s && is_frame_of(path, out)))
       return make_error(ErrorCode::BadInput,
-                        "{} is read, and would be written over: name another file to write", out);
+                        "{} is read, and would be written over: name another file to write", path);
   if (names_none && std::filesystem::exists(out, failure))
     return make_error(
         ErrorCode::BadInput,

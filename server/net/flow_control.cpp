@@ -27,6 +27,8 @@ void FlowControl::on_ack(uint16_t stream_id, uint32_t sequence, int64_t time_ns,
 }
 
 void FlowControl::on_asset_left(size_t bytes, int64_t time_ns) {
+  // A proxy may have taken all of it at once: only the client knows then.
+  if (bytes == 0) return;
   const AckedFrame* const asset = awaits_asset() ? gate_.asset_alone() : nullptr;
   if (asset == nullptr || link_.capacity_bytes_per_s(time_ns) > 0.0) return;
   link_.on_part(*asset, asset->bytes - std::min(bytes, asset->bytes), time_ns);

@@ -16,8 +16,10 @@ constexpr int64_t kLeastTransferNs = kMsInNs;
 constexpr size_t kMaxBusySamples = 16;
 /// A rate is taken over at least this: frames and acknowledgements come in bunches.
 constexpr int64_t kBusySpanNs = 50 * kMsInNs;
-/// A part of a frame that came sooner shows how TCP starts, not the link.
-constexpr int64_t kLeastPartNs = 150 * kMsInNs;
+/// A part of a frame that came sooner shows how TCP starts, or a proxy's buffer, not the link. What follows
+/// shows it over kPartSpanNs.
+constexpr int64_t kFirstPartNs = 50 * kMsInNs;
+constexpr int64_t kPartSpanNs = 150 * kMsInNs;
 /// Difference of round trips that has other reasons than the rate: jitter, or a client that looks only now
 /// and then.
 constexpr int64_t kJitterNs = 50 * kMsInNs;
@@ -98,9 +100,12 @@ void LinkEstimate::on_round_trip(int64_t round_trip_ns, int64_t time_ns) {
 }
 
 void LinkEstimate::on_part(const AckedFrame& frame, size_t bytes, int64_t time_ns) {
-  const int64_t duration_ns = time_ns - frame.sent_ns - base_ns();
-  if (seen_rate_ || round_trips_.empty() || 2 * bytes < frame.bytes || duration_ns < kLeastPartNs) return;
-  seen_rate_ = {time_ns, static_cast<double>(bytes) * kNsPerS / static_cast<double>(duration_ns)};
+  if (seen_rate_ || round_trips_.empty() || time_ns - frame.sent_ns - base_ns() < kFirstPartNs) return;
+  if (!first_part_) first_part_ = {time_ns, static_cast<double>(bytes)};
+  const int64_t duration_ns = time_ns - first_part_->time_ns;
+  const double more = static_cast<double>(bytes) - first_part_->value;
+  if (2 * bytes < frame.bytes || duration_ns < kPartSpanNs || !(more > 0.0)) return;
+  seen_rate_ = {time_ns, more * kNsPerS / static_cast<double>(duration_ns)};
 }
 
 void LinkEstimate::note_round_trip(int64_t round_trip_ns, int64_t time_ns) {

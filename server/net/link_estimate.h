@@ -88,7 +88,8 @@ class LinkEstimate {
   std::deque<TimedValue> busy_rates_;   // bytes/s while the link was the limit, of spans of kBusySpanNs
   double busy_bytes_ = 0.0;             // of the span under way
   int64_t busy_ns_ = 0;
-  std::optional<TimedValue> seen_rate_;  // bytes/s of the newest large frame
+  std::optional<TimedValue> first_part_;  // bytes of a first frame that is still on its way
+  std::optional<TimedValue> seen_rate_;   // bytes/s of the newest large frame
 };
 
 }  // namespace strandcast

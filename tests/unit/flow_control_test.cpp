@@ -342,6 +342,13 @@ TEST(FlowControl, WhatIsNotKnownIsNotGuessedFromPartsOfAnAsset) {
   AssetOnItsWay fast;
   fast.watch(2'000.0, 100);  // all but 60 kB within 20 ms: TCP has only begun
   EXPECT_TRUE(fast.flow.awaits_asset());
+  AssetOnItsWay buffered;
+  for (int64_t ms = 0; ms <= 400; ms += 50)  // a proxy has taken 60 kB at once, and passes 50 kB a second on
+    buffered.flow.on_asset_left(40'000 - static_cast<size_t>(50 * ms), 1 * kSInNs + ms * kMsInNs);
+  EXPECT_NEAR(buffered.flow.capacity_bytes_per_s(1 * kSInNs + 400 * kMsInNs), 50e3, 1e3);
+  AssetOnItsWay taken;
+  taken.watch(5'000.0, 400);
+  EXPECT_TRUE(taken.flow.awaits_asset()) << "a proxy has all of it, and passes it on as the link beyond can";
   AssetOnItsWay still;
   still.watch(0.0, 10'000);
   EXPECT_TRUE(still.flow.awaits_asset()) << "nothing came, however long it takes";
