@@ -388,23 +388,6 @@ TEST(Bvh, ARateThatThePersonStatesGoesWhereTheFileHasNone) {
   EXPECT_THAT(error_of(text), HasSubstr("--fps states the rate"));
 }
 
-/// Rounded times would add up: the last of 240 frames came after the end of its clip.
-TEST(Bvh, ARoundedFrameTimeIsThatOfItsRate) {
-  const auto frame_s = [](const std::string& written) {
-    std::string text = small_with(rising_rows(2, {}));
-    text.replace(text.find(".0083333"), 8, written);
-    return parsed(text).frame_s;
-  };
-  EXPECT_EQ(frame_s("0.0333333"), 1.0 / 30.0);
-  EXPECT_EQ(frame_s("0.033333"), 1.0 / 30.0);
-  EXPECT_EQ(frame_s("0.04166667"), 1.0 / 24.0);
-  EXPECT_EQ(frame_s("0.008333"), 1.0 / 120.0);
-  EXPECT_EQ(frame_s("0.0333667"), 1001.0 / 30'000.0);
-  EXPECT_EQ(frame_s("0.041708"), 1001.0 / 24'000.0);
-  for (const char* const other : {"0.0333", "0.0416", "0.0217", "1.5"})
-    EXPECT_EQ(frame_s(other), std::stod(other)) << "it may be meant";
-}
-
 TEST(Bvh, DecimalCommasAreRead) {
   const std::string row = "1.5 0 0 -2.25 0 0 0 0 0 0 0 0\n";
   std::string commas = small_with(row + row);

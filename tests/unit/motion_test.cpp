@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <numbers>
 
+#include "common/base/frame_rate.h"
 #include "common/motion/bvh.h"
 #include "common/motion/motion_file.h"
 #include "common/motion/motion_glitches.h"
@@ -535,6 +536,17 @@ TEST(CaseFiles, MotionComesInAsItShould) {
     EXPECT_TRUE(item.unit_m == 0.0 || motion->clip.file_unit_m == item.unit_m) << item.name;
     EXPECT_THAT(motion->notes, testing::Contains(HasSubstr(item.said))) << item.name;
   }
+}
+
+/// Rounded times would add up: the last of 240 frames came after the end of its clip.
+TEST(MotionFile, ARoundedFrameTimeIsThatOfItsRate) {
+  for (const double rounded : {0.0333333, 0.033333}) EXPECT_EQ(exact_frame_s(rounded), 1.0 / 30.0) << rounded;
+  EXPECT_EQ(exact_frame_s(0.04166667), 1.0 / 24.0);
+  EXPECT_EQ(exact_frame_s(0.008333), 1.0 / 120.0);
+  EXPECT_EQ(exact_frame_s(0.0333667), 1001.0 / 30'000.0);
+  EXPECT_EQ(exact_frame_s(0.041708), 1001.0 / 24'000.0);
+  for (const double other : {0.0333, 0.0416, 0.0217, 1.5})
+    EXPECT_EQ(exact_frame_s(other), other) << "it may be meant";
 }
 
 TEST(MotionFile, AnotherKindOfFileIsNamed) {
