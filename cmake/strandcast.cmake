@@ -59,6 +59,9 @@ endif()
 # (common/simd/variants.h), which would take in what else stands in the unit, and files that define macros of others.
 if(CMAKE_UNITY_BUILD)
   target_compile_options(strandcast_flags INTERFACE -Wno-subobject-linkage)  # the "header" is a file of the unit
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")  # such a unit fills the usual 128 MB again and again: collecting took 7 %
+    target_compile_options(strandcast_flags INTERFACE "SHELL:--param ggc-min-expand=200" "SHELL:--param ggc-min-heapsize=524288")
+  endif()
 endif()
 function(strandcast_leave_single)
   set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
@@ -117,21 +120,26 @@ function(strandcast_program name)
   target_precompile_headers(${name} REUSE_FROM ${ARG_PCH})
 endfunction()
 
-# strandcast_test(NAME LABEL unit SOURCES ... LIBS ... [ALONE] [OFFLINE] [BUSY suite ...] [PATIENT suite ...] [TIMEOUT s]
+# strandcast_test(NAME LABEL unit SOURCES ... LIBS ... [COMPUTES] [ALONE] [OFFLINE] [BUSY suite ...] [PATIENT suite ...] [TIMEOUT s]
 # [ENVIRONMENT VARIABLE=value ...]): a GoogleTest program. Every
 # suite in it is one CTest test, NAME.Suite; with ALONE every TEST is, NAME.Suite.Test, in a process of its own. Tests of
 # the label `integration` run alone and get the label `network` too, which allows a second try (tests/run.sh), unless
-# they are OFFLINE; two of them run at once, beside tests that compute (list_tests.cmake). BUSY: suites that load both
+# they are OFFLINE; two of them run at once, beside tests that compute (list_tests.cmake). COMPUTES: what its own files compute costs more than to optimise them. BUSY: suites that load both
 # cores: one other test runs beside them. PATIENT: suites that wait longest; one of them runs at a time, as a third.
 # TIMEOUT: of one CTest test.
 function(strandcast_test name)
-  cmake_parse_arguments(ARG "ALONE;OFFLINE" "LABEL;TIMEOUT" "SOURCES;LIBS;BUSY;PATIENT;ENVIRONMENT" ${ARGN})
+  cmake_parse_arguments(ARG "COMPUTES;ALONE;OFFLINE" "LABEL;TIMEOUT" "SOURCES;LIBS;BUSY;PATIENT;ENVIRONMENT" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE strandcast_flags ${ARG_LIBS} strandcast_test_main GTest::gmock)
   target_compile_definitions(${name} PRIVATE
     STRANDCAST_SHARED_DATA="${CMAKE_SOURCE_DIR}/../shared/data" STRANDCAST_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
-  target_compile_options(${name} PRIVATE ${strandcast_test_options})
-  target_precompile_headers(${name} REUSE_FROM strandcast_gtest)
+  if(ARG_COMPUTES)
+    target_compile_options(${name} PRIVATE ${strandcast_light_options})
+    target_precompile_headers(${name} REUSE_FROM strandcast_computing_gtest)
+  else()
+    target_compile_options(${name} PRIVATE ${strandcast_test_options})
+    target_precompile_headers(${name} REUSE_FROM strandcast_gtest)
+  endif()
   set(mode suites)
   set(timeout_s 600)
   set(labels ${ARG_LABEL})
