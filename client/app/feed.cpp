@@ -120,7 +120,7 @@ class SessionWay {
     progress.pace = 1.0;
     progress.is_heard = true;
     progress.reconnects = 0;
-    double gone_s = 0.0;
+    progress.gone_s = 0.0;
     for (size_t i = 0; i < heads_.size(); ++i) {
       const Told& told = told_[i];
       progress.rejected_samples += told.rejected_samples;
@@ -131,10 +131,8 @@ class SessionWay {
       progress.is_heard = progress.is_heard && told.is_heard;
       progress.reconnects += heads_[i]->policy().reconnects();
       progress.outage_s = std::max(progress.outage_s, heads_[i]->policy().outage_s(now_ns()));
-      gone_s =
-          std::max(gone_s, told.gone_ns == 0 ? 0.0 : static_cast<double>(now_ns() - told.gone_ns) / kNsPerS);
+      progress.gone_s = std::max(progress.gone_s, heads_[i]->policy().running_outage_s(now_ns()));
     }
-    progress.gone_s = gone_s;
     return {};
   }
 
@@ -163,8 +161,6 @@ class SessionWay {
     uint64_t tick = 0;                        // of the first status after that
     bool is_heard = true;
     bool is_away = false;
-    int64_t heard_ns = 0;  // the server's last byte
-    int64_t gone_ns = 0;   // begin of the silence that lasts; 0: it answers
   };
 
   static bool send_to(SteadyClient& head, const ClientMessage& message) {
@@ -188,8 +184,6 @@ class SessionWay {
         listen(told, *status, progress.last_notice);
       }
     }));
-    if (head.client() != nullptr) told.heard_ns = head.client()->heard_ns();
-    told.gone_ns = head.is_connected() ? 0 : told.heard_ns;
     const bool is_away = head.client() == nullptr;
     if (is_away) told.sent_ns = 0;
     if (std::exchange(told.is_away, is_away) != is_away && !plan.is_live) told.pace = is_away ? 0.0 : 1.0;
@@ -267,7 +261,7 @@ Result<FeedProgress> feed(std::span<const std::unique_ptr<SteadyClient>> heads, 
 }
 
 std::string slow_motion_sentence(const FeedProgress& done, double speed) {
-  const double there_s = std::max(done.elapsed_s - std::max(done.outage_s, done.gone_s), 0.0) * speed;
+  const double there_s = std::max(done.elapsed_s - done.outage_s, 0.0) * speed;
   const double missing_s = there_s - done.motion_s;
   if (missing_s <= (1.0 - kSlowMotion) * there_s || missing_s <= kLeastMissingS) return {};
   return fmt::format(
@@ -289,7 +283,7 @@ std::string gone_sentence(const FeedProgress& done) {
     return fmt::format(
         "the server was gone from {:.1f} s on, for {:.1f} s to the end: {} samples were not sent",
         std::max(done.elapsed_s - done.gone_s, 0.0), done.gone_s, done.unsent_samples);
-  if (done.reconnects == 0) return {};
+  if (done.outage_s == 0.0) return {};
   return fmt::format("the server was away for {:.1f} s, and came back: {} samples were not sent",
                      done.outage_s, done.unsent_samples);
 }

@@ -369,12 +369,18 @@ Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bo
     live->set_trace(trace);
   }
   ASSIGN_OR_RETURN(Connections others, open_others(config, live->session().welcome(), limit, stop));
-  ASSIGN_OR_RETURN(const Collected collected, Collector(options, *live, others, *trace, limit, stop).run());
+  const Result<Collected> ended = Collector(options, *live, others, *trace, limit, stop).run();
   ViewerSession* session = &live->session();
 
   StageTimer render_timer;
   ViewReport report = make_report(*session, scope_of(*live));
   if (!own_reason.empty()) set_mode_reason(report, own_reason);
+  if (!ended) {
+    // What came before is what somebody looks for in the report then.
+    if (!options.report.empty()) RETURN_IF_ERROR(save_report(options.report, report));
+    return ended.error();
+  }
+  const Collected& collected = *ended;
   const StreamMode mode = session->mode();  // a clip holds what came in the mode that the run ended in
   Drawn scene{device.get(),
               {{session->shared_asset(), session->look().look}},

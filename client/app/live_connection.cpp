@@ -35,7 +35,6 @@ void LiveConnection::take(std::unique_ptr<ViewerSession> session) {
   if (session_ != nullptr) earlier_ += totals_of(*session_);
   session_ = std::move(session);
   is_open_ = true;
-  has_told_silence_ = false;
   session_->follow(modes_);
   session_->set_trace(trace_);
 }
@@ -48,8 +47,7 @@ bool LiveConnection::pump(std::chrono::milliseconds timeout) {
       attempts_.lose(pumped.error(), session_->client().heard_ns());
       return false;
     }
-    tell_silence();
-    auto next = attempts_.pump_beside(session_->client().heard_ns());
+    auto next = attempts_.pump_beside(session_->heard());
     if (next == nullptr) return false;
     take(std::move(next));
     return true;
@@ -60,21 +58,10 @@ bool LiveConnection::pump(std::chrono::milliseconds timeout) {
   return true;
 }
 
-/// For who sees no window, once a silence.
-void LiveConnection::tell_silence() {
-  if (!std::exchange(has_told_silence_, is_silent()) && has_told_silence_) log_warn("net", "{}", trouble());
-}
-
-double LiveConnection::outage_s() const {
-  const int64_t time_ns = now_ns();
-  const int64_t silent_ns = is_silent() ? time_ns - session_->client().heard_ns() : 0;
-  return attempts_.policy().outage_s(time_ns) + static_cast<double>(silent_ns) / kNsPerS;
-}
-
 std::string LiveConnection::trouble() const {
   if (is_connected()) return {};
   if (is_silent())
-    return silence_text(attempts_.config().address.to_string(), session_->client().heard_ns(), now_ns());
+    return silence_text(attempts_.config().address.to_string(), session_->heard(), now_ns());
   return attempts_.last_error() ? attempts_.last_error()->to_string() : std::string();
 }
 

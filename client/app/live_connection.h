@@ -36,12 +36,13 @@ class LiveConnection {
   ViewerSession& session() { return *session_; }
   /// What the sessions before that one counted.
   const SessionTotals& earlier() const { return earlier_; }
-  /// Returns whether there is a session on which the server said something within kSilentServer.
+  /// Returns whether there is a session on which the server said something within kSilentServer, behind a relay
+  /// too.
   bool is_connected() const { return is_open_ && !is_silent(); }
   /// How often the server was found again.
   uint64_t reconnects() const { return attempts_.policy().reconnects(); }
   /// Time without a connection since the first Welcome, and since that Welcome, s.
-  double outage_s() const;
+  double outage_s() const { return attempts_.policy().outage_s(now_ns()); }
   double since_first_s() const { return attempts_.policy().since_first_s(now_ns()); }
   /// Why there is no connection; empty while connected and before the first attempt failed.
   std::string trouble() const;
@@ -55,17 +56,13 @@ class LiveConnection {
  private:
   explicit LiveConnection(const ClientConfig& config);
   void take(std::unique_ptr<ViewerSession> session);
-  bool is_silent() const {
-    return is_open_ && strandcast::is_silent(session_->client().heard_ns(), now_ns());
-  }
-  void tell_silence();
+  bool is_silent() const { return is_open_ && silent_since_ns(session_->heard(), now_ns()) != 0; }
 
   const std::shared_ptr<ModeControl> modes_;
   std::shared_ptr<FrameTrace> trace_;  // null: none
   std::unique_ptr<ViewerSession> session_;
   SessionTotals earlier_;
   bool is_open_ = false;
-  bool has_told_silence_ = false;
   Attempts<ViewerSession> attempts_;
 };
 

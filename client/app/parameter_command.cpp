@@ -57,7 +57,7 @@ int watch(std::unique_ptr<ViewerClient> client, const ClientConfig& config, cons
   while (!stop && std::cout) {
     if (lost) {
       std::cerr << fmt::format("strandcast-ctl: {}; trying again\n", lost->to_string());
-      auto again = connect_patiently(config, kWatchPatience);
+      auto again = connect_patiently(config, kWatchPatience, Standing::Member);
       if (!again) return ctl_failure(again.error(), kRefusedExit);
       client = std::move(*again);
       lost.reset();

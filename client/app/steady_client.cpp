@@ -19,25 +19,23 @@ Status SteadyClient::pump(std::chrono::milliseconds timeout, const OnEvent& on_e
     if (const auto* closed = std::get_if<ClosedEvent>(&event)) {
       attempts_.lose(closed->error, client_->heard_ns());
       client_.reset();
+      away_since_ns_ = 0;
       if (attempts_.final_error()) return *attempts_.final_error();
       return {};
     }
+    if (const auto* status = std::get_if<ServerStatus>(&event)) {
+      Heard heard;
+      hear(heard, status->away_s, now_ns());
+      away_since_ns_ = heard.away_since_ns;
+    }
     on_event(event);
   }
-  tell_silence();
-  if (auto next = attempts_.pump_beside(client_->heard_ns())) {
+  if (auto next = attempts_.pump_beside(heard())) {
+    away_since_ns_ = 0;
     client_ = std::move(next);
     welcome_ = client_->welcome();
   }
   return {};
-}
-
-/// Once a silence.
-void SteadyClient::tell_silence() {
-  const bool is_quiet = !is_connected();
-  if (!std::exchange(has_told_silence_, is_quiet) && is_quiet)
-    log_warn("net", "{}",
-             silence_text(attempts_.config().address.to_string(), client_->heard_ns(), now_ns()));
 }
 
 Status SteadyClient::await_welcome(const std::atomic<bool>& stop, std::chrono::milliseconds limit) {

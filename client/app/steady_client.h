@@ -28,19 +28,20 @@ class SteadyClient {
 
   /// Null while there is no connection.
   ViewerClient* client() { return client_.get(); }
-  /// Returns whether there is a connection on which the server said something within kSilentServer.
-  bool is_connected() const { return client_ != nullptr && !is_silent(client_->heard_ns(), now_ns()); }
+  /// Returns whether there is a connection on which the server said something within kSilentServer, behind a
+  /// relay too.
+  bool is_connected() const { return client_ != nullptr && silent_since_ns(heard(), now_ns()) == 0; }
   /// Returns the Welcome of the newest connection; there must have been one.
   const Welcome& welcome() const { return welcome_; }
   const ReconnectPolicy& policy() const { return attempts_.policy(); }
 
  private:
-  void tell_silence();
+  Heard heard() const { return {client_->heard_ns(), away_since_ns_}; }
 
   Attempts<ViewerClient> attempts_;
   std::unique_ptr<ViewerClient> client_;
   Welcome welcome_;
-  bool has_told_silence_ = false;
+  int64_t away_since_ns_ = 0;  // as in Heard
 };
 
 }  // namespace strandcast

@@ -111,11 +111,14 @@ ViewReport make_report(ViewerSession& session, const ReportScope& scope) {
   out.count("picture_quality", quality.quality);
   out.number("picture_rate_hz", quality.rate_hz, 2);
   out.count("whole_pictures", all.whole_pictures);
-  out.number("queue_delay_ms", server.queue_delay_ms, 1);
-  out.number("server_sim_ms", server.sim_ms, 3);
-  out.number("server_encode_ms", server.encode_ms, 3);
-  out.number("server_render_ms", server.render_ms, 3);
-  out.number("server_realtime_factor", server.realtime_factor, 3);
+  const auto told = [&](const char* key, double value, int digits) {
+    session.has_status() ? out.number(key, value, digits) : out.word(key, "unknown");
+  };
+  told("queue_delay_ms", server.queue_delay_ms, 1);
+  told("server_sim_ms", server.sim_ms, 3);
+  told("server_encode_ms", server.encode_ms, 3);
+  told("server_render_ms", server.render_ms, 3);
+  told("server_realtime_factor", server.realtime_factor, 3);
   out.word("server_slow_motion", session.last_slow_motion().empty() ? "none" : session.last_slow_motion());
   out.count("server_tick", server.tick);
   return out.take();
@@ -189,6 +192,10 @@ std::string to_summary(const ViewReport& report) {
                                  ? fmt::format("  connection      found again {} times, {} s without one\n",
                                                v("reconnects"), v("outage_s"))
                                  : std::string();
+  const std::string server = v("server_sim_ms") == "unknown"
+                                 ? std::string("has not said how fast it is")
+                                 : fmt::format("{} ms per step, realtime factor {}", v("server_sim_ms"),
+                                               v("server_realtime_factor"));
   return fmt::format(
       "scene {} ({} strands x {}), {} by {}\n"
       "  mode            {}\n"
@@ -197,11 +204,11 @@ std::string to_summary(const ViewReport& report) {
       "  render          {} ms ({} frames)\n"
       "  motion->decoded {}\n"
       "  dropped         {}\n"
-      "  server          {} ms per step, realtime factor {}\n{}{}",
+      "  server          {}\n{}{}",
       v("scene"), v("strands"), v("vertices_per_strand"), v("mode"), v("codec"), v("mode_reason"),
       v("decoded_frames"), v("seconds"), v("frames_per_s"), v("bytes_per_frame"), v("mbit_per_s"),
       v("decode_ms_median"), v("decode_ms_p99"), v("render_ms_median"), v("rendered_pictures"), motion,
-      dropped, v("server_sim_ms"), v("server_realtime_factor"), outage,
+      dropped, server, outage,
       slow == "none" || slow == "?" ? std::string() : fmt::format("  {}\n", slow));
 }
 

@@ -105,6 +105,7 @@ Status ViewerSession::handle(ClientEvent& event) {
   if (const auto* status = std::get_if<ServerStatus>(&event)) {
     status_ = *status;
     has_status_ = true;
+    hear(heard_, status->away_s, now_ns());
     picture_latency_.add_motions(status_.picture_motions, client_->clock());
     if (!status_.slow_motion.empty()) last_slow_motion_ = status_.slow_motion;
   } else if (auto* notice = std::get_if<Notice>(&event)) {

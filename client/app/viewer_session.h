@@ -134,6 +134,7 @@ class ViewerSession {
 
   const ServerStatus& status() const { return status_; }
   bool has_status() const { return has_status_; }
+  Heard heard() const { return {client_->heard_ns(), heard_.away_since_ns}; }
   /// Returns the server's last message about slow motion; empty if there was none.
   const std::string& last_slow_motion() const { return last_slow_motion_; }
   /// Returns the notices since the last call, at most the newest kMaxWaitingNotices.
@@ -192,6 +193,7 @@ class ViewerSession {
   std::optional<SceneText> scene_;
   ServerStatus status_;
   bool has_status_ = false;
+  Heard heard_;  // of the relay's server
   std::string last_slow_motion_;
   NoticeList notices_;
   LineBudget log_lines_;  // that the server's messages cause

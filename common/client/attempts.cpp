@@ -3,8 +3,10 @@
 namespace strandcast {
 
 Result<std::unique_ptr<ViewerClient>> connect_patiently(const ClientConfig& config,
-                                                        std::chrono::milliseconds patience) {
+                                                        std::chrono::milliseconds patience,
+                                                        Standing standing) {
   ReconnectPolicy policy(static_cast<uint32_t>(now_ns()), kLongestUrgentDelay);
+  if (standing == Standing::Member) policy.on_welcome(now_ns());
   const int64_t end_ns = now_ns() + std::chrono::nanoseconds(patience).count();
   while (true) {
     auto client = ViewerClient::connect(config);

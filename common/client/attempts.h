@@ -22,9 +22,10 @@
 namespace strandcast {
 
 /// Blocks until a connection is there, `patience` is over or an error is final: the last error then, or what
-/// config.cancel says.
+/// config.cancel says. Member: somebody who has been in it before.
 Result<std::unique_ptr<ViewerClient>> connect_patiently(
-    const ClientConfig& config, std::chrono::milliseconds patience = kCommandPatience);
+    const ClientConfig& config, std::chrono::milliseconds patience = kCommandPatience,
+    Standing standing = Standing::Newcomer);
 
 template <class Session>
 class Attempts {
@@ -66,12 +67,16 @@ class Attempts {
     log_info("net", "connected to {}", config_.address.to_string());
     return std::move(opened).value();
   }
-  /// Where there is one on which something came last at `heard_ns`: as pump(), without waiting, while that is
-  /// doubted. Call it often: who stood still itself has heard nothing meanwhile.
-  std::unique_ptr<Session> pump_beside(int64_t heard_ns) {
+  /// Where there is one: as pump(), without waiting, while the connection is doubted. Call it often: who stood
+  /// still itself has heard nothing meanwhile.
+  std::unique_ptr<Session> pump_beside(const Heard& heard) {
     const int64_t time_ns = now_ns();
     const bool was_awake = !is_doubted(std::exchange(looked_ns_, time_ns), time_ns);
-    is_unneeded_ = !is_doubted(heard_ns, time_ns);
+    is_unneeded_ = !is_doubted(heard.last_ns, time_ns);
+    policy_.on_heard(heard, time_ns);
+    const bool was_told = std::exchange(is_silence_told_, silent_since_ns(heard, time_ns) != 0);
+    if (!was_told && is_silence_told_)
+      log_warn("net", "{}", silence_text(config_.address.to_string(), heard, time_ns));
     if (!attempt_.valid()) {
       if (!is_unneeded_ && was_awake && time_ns >= next_ns_) begin();
       return nullptr;
@@ -86,7 +91,7 @@ class Attempts {
       log_debug("net", "beside a silent connection: {}", opened.error().to_string());
       return nullptr;
     }
-    policy_.on_lost(make_error(ErrorCode::Timeout, "silent"), time_ns, heard_ns);
+    policy_.on_lost(make_error(ErrorCode::Timeout, "silent"), time_ns, heard.last_ns);
     note_welcome();
     log_info("net", "connected to {} anew, since nothing came any more", config_.address.to_string());
     return std::move(opened).value();
@@ -94,6 +99,7 @@ class Attempts {
   /// A session was opened without this one.
   void note_welcome() {
     policy_.on_welcome(now_ns());
+    is_silence_told_ = false;
     step_ = ConnectStep::AwaitWelcome;  // it had all of them
   }
 
@@ -142,6 +148,7 @@ class Attempts {
   ReconnectPolicy policy_;
   int64_t next_ns_ = 0;
   int64_t looked_ns_ = 0;  // by pump_beside()
+  bool is_silence_told_ = false;
   std::optional<Error> last_error_;
   std::optional<Error> final_error_;
   // Last: its end waits for what is under way, which reads the others.

@@ -69,9 +69,22 @@ bool is_doubted(int64_t heard_ns, int64_t time_ns) {
   return time_ns - heard_ns >= std::chrono::nanoseconds(kDoubtedServer).count();
 }
 
-std::string silence_text(const std::string& server, int64_t heard_ns, int64_t time_ns) {
-  return fmt::format("{}: not connected: nothing has come for {:.0f} s", server,
-                     static_cast<double>(time_ns - heard_ns) / kNsPerS);
+void hear(Heard& heard, double away_s, int64_t time_ns) {
+  constexpr double kMostS = 1e9;  // as nanoseconds still a number
+  heard.away_since_ns = away_s > 0.0 ? time_ns - static_cast<int64_t>(std::min(away_s, kMostS) * kNsPerS) : 0;
+}
+
+int64_t silent_since_ns(const Heard& heard, int64_t time_ns) {
+  if (heard.away_since_ns != 0) return heard.away_since_ns;
+  return is_silent(heard.last_ns, time_ns) ? heard.last_ns : 0;
+}
+
+std::string silence_text(const std::string& server, const Heard& heard, int64_t time_ns) {
+  const int64_t since_ns = silent_since_ns(heard, time_ns);
+  const bool is_away = !is_silent(heard.last_ns, time_ns) && since_ns != 0;
+  return fmt::format("{}: not connected: nothing has come{} for {:.0f} s", server,
+                     is_away ? " to this relay from its server" : "",
+                     static_cast<double>(since_ns == 0 ? 0 : time_ns - since_ns) / kNsPerS);
 }
 
 void ReconnectPolicy::on_welcome(int64_t time_ns) {
@@ -85,10 +98,22 @@ std::optional<std::chrono::milliseconds> ReconnectPolicy::on_lost(const Error& e
                                                                   int64_t heard_ns) {
   if (welcome_ns_ != 0) {
     lost_ns_ = heard_ns == 0 ? time_ns : std::clamp(heard_ns, welcome_ns_, time_ns);
+    if (silent_ns_ != 0) lost_ns_ = std::min(lost_ns_, std::exchange(silent_ns_, 0));
     const int64_t lived_ns = time_ns - std::exchange(welcome_ns_, 0);
     if (lived_ns >= std::chrono::nanoseconds(kStableConnection).count()) doublings_ = 0;
   }
   return on_failed(error);
+}
+
+void ReconnectPolicy::on_heard(const Heard& heard, int64_t time_ns) {
+  if (welcome_ns_ == 0) return;
+  const int64_t since_ns = silent_since_ns(heard, time_ns);
+  if (since_ns != 0) {
+    // A server that was away before this connection is nothing that it has lost.
+    if (silent_ns_ == 0) silent_ns_ = std::clamp(since_ns, welcome_ns_, time_ns);
+  } else if (silent_ns_ != 0) {
+    outage_ns_ += time_ns - std::exchange(silent_ns_, 0);
+  }
 }
 
 std::optional<std::chrono::milliseconds> ReconnectPolicy::on_failed(const Error& error) {
@@ -106,8 +131,12 @@ std::optional<std::chrono::milliseconds> ReconnectPolicy::on_failed(const Error&
 }
 
 double ReconnectPolicy::outage_s(int64_t time_ns) const {
-  const int64_t running_ns = lost_ns_ != 0 ? std::max<int64_t>(time_ns - lost_ns_, 0) : 0;
-  return static_cast<double>(outage_ns_ + running_ns) / kNsPerS;
+  return static_cast<double>(outage_ns_) / kNsPerS + running_outage_s(time_ns);
+}
+
+double ReconnectPolicy::running_outage_s(int64_t time_ns) const {
+  const int64_t begin_ns = lost_ns_ != 0 ? lost_ns_ : silent_ns_;
+  return begin_ns != 0 ? static_cast<double>(std::max<int64_t>(time_ns - begin_ns, 0)) / kNsPerS : 0.0;
 }
 
 double ReconnectPolicy::since_first_s(int64_t time_ns) const {

@@ -50,8 +50,19 @@ inline constexpr std::string_view kClosedByServer = "the server closed the conne
 bool is_silent(int64_t heard_ns, int64_t time_ns);
 /// Whether it may be dead.
 bool is_doubted(int64_t heard_ns, int64_t time_ns);
+
+/// What has come lately on a connection that is open; times by now_ns().
+struct Heard {
+  int64_t last_ns = 0;  // anything
+  /// Since when the relay there has heard nothing of its own server; 0: it hears it, or the server itself is there.
+  int64_t away_since_ns = 0;
+};
+/// Takes in how long a status says that its server has been away.
+void hear(Heard& heard, double away_s, int64_t time_ns);
+/// Since when it is to be shown as no connection; 0: it is one.
+int64_t silent_since_ns(const Heard& heard, int64_t time_ns);
 /// Returns a sentence for a person: for how long nothing has come from the server.
-std::string silence_text(const std::string& server, int64_t heard_ns, int64_t time_ns);
+std::string silence_text(const std::string& server, const Heard& heard, int64_t time_ns);
 
 class ReconnectPolicy {
  public:
@@ -64,6 +75,8 @@ class ReconnectPolicy {
   /// An attempt failed, or the connection ended whose last byte came at `heard_ns` (0: now). Delay before the
   /// next attempt, or nothing when the error is final.
   std::optional<std::chrono::milliseconds> on_lost(const Error& error, int64_t time_ns, int64_t heard_ns = 0);
+  /// The connection is open; called as often as it is looked at. Silences of an open connection are outages.
+  void on_heard(const Heard& heard, int64_t time_ns);
   /// An attempt beside a connection that there still is failed; as on_lost().
   std::optional<std::chrono::milliseconds> on_failed(const Error& error);
 
@@ -72,8 +85,10 @@ class ReconnectPolicy {
   uint32_t attempts() const { return attempts_; }
   /// Welcomes after the first.
   uint64_t reconnects() const { return welcomes_ > 0 ? welcomes_ - 1 : 0; }
-  /// Time without a connection since the first Welcome, s, a last silence included.
+  /// Time without a connection since the first Welcome, s, silences included.
   double outage_s(int64_t time_ns) const;
+  /// That of the outage that lasts, s; 0: none does.
+  double running_outage_s(int64_t time_ns) const;
   /// Time since the first Welcome, s; 0 before it.
   double since_first_s(int64_t time_ns) const;
 
@@ -86,6 +101,7 @@ class ReconnectPolicy {
   int64_t first_ns_ = 0;    // the first Welcome
   int64_t welcome_ns_ = 0;  // of the running connection; 0: there is none
   int64_t lost_ns_ = 0;     // begin of the running outage
+  int64_t silent_ns_ = 0;   // begin of the running silence; 0: something comes
   int64_t outage_ns_ = 0;   // those that are over
 };
 

@@ -316,7 +316,12 @@ Status ViewerClient::Connection::handle(std::span<const std::byte> bytes) {
     return std::visit([this](auto& part) { return handle_control(part); }, *message);
   }
   const Result<FrameHeader> header = unpack_frame_header(bytes);
-  if (!header && header.error().code == ErrorCode::Unsupported && is_welcome_) return leave_out();
+  if (!header && header.error().code == ErrorCode::Unsupported) {
+    if (is_welcome_) return leave_out();
+    // No version of ours began so: what speaks there may be another thing the next time.
+    return make_error(ErrorCode::BadInput, "the server began with something else than its Welcome: {}",
+                      header.error().message);
+  }
   if (!header) return header.error();
   if (!is_welcome_) return make_error(ErrorCode::BadInput, "the server sent media before its Welcome");
   MediaEvent event{*header, {bytes.begin(), bytes.end()}, now_ns()};

@@ -18,7 +18,7 @@ namespace {
 
 namespace pb = google::protobuf;
 
-constexpr size_t kMaxOverrideChars = 200;  // of an assignment, in error messages
+constexpr size_t kMaxOverrideChars = 200, kMaxValueChars = 40;  // of an assignment and its parts, in error messages
 
 /// Keeps the first message of the parser instead of printing it.
 class FirstError : public pb::io::ErrorCollector {
@@ -70,7 +70,7 @@ Status set_value(Cursor& cursor, const pb::FieldDescriptor& field, const std::st
     return {};
   }
   if (field.cpp_type() == pb::FieldDescriptor::CPPTYPE_ENUM && !field.enum_type()->FindValueByName(value))
-    return make_error(ErrorCode::BadInput, "\"{}\" is not a value of {} ({})", value, field.name(),
+    return make_error(ErrorCode::BadInput, "\"{}\" is not a value of {} ({})", excerpt(value, kMaxValueChars), field.name(),
                       known_values(*field.enum_type()));
   if (field.cpp_type() == pb::FieldDescriptor::CPPTYPE_MESSAGE && !value.starts_with('{'))
     return make_error(ErrorCode::BadInput, "{} is a group of fields, name one of them ({})", field.name(),
@@ -80,7 +80,7 @@ Status set_value(Cursor& cursor, const pb::FieldDescriptor& field, const std::st
   pb::TextFormat::Parser parser;
   parser.RecordErrorsTo(&error);
   if (parser.ParseFieldValueFromString(number, &field, cursor.message)) return {};
-  return make_error(ErrorCode::BadInput, "\"{}\" is not a value for {}{}{}", value, field.name(),
+  return make_error(ErrorCode::BadInput, "\"{}\" is not a value for {}{}{}", excerpt(value, kMaxValueChars), field.name(),
                     error.text().empty() ? "" : ": ", error.text());
 }
 
@@ -98,7 +98,7 @@ Status step_into_list(Cursor& cursor, const pb::FieldDescriptor& field, std::str
   const int last = std::min<int>(size, kMaxSphereColliders - 1);
   const auto index = parse_index(part);
   if (!index || *index > last)
-    return make_error(ErrorCode::BadInput, "\"{}\" is not an index of {} (0 .. {})", part, cursor.walked,
+    return make_error(ErrorCode::BadInput, "\"{}\" is not an index of {} (0 .. {})", excerpt(part, kMaxValueChars), cursor.walked,
                       last);
   cursor.step(part);
   cursor.message = *index < size ? reflection->MutableRepeatedMessage(cursor.message, &field, *index)
@@ -129,7 +129,7 @@ Status set_text_of_list(Cursor& cursor, const pb::FieldDescriptor& field, std::s
   const int size = reflection->FieldSize(*cursor.message, &field);
   const auto index = parse_index(part);
   if (!index || *index > size)
-    return make_error(ErrorCode::BadInput, "\"{}\" is not an index of {} (0 .. {})", part, cursor.walked,
+    return make_error(ErrorCode::BadInput, "\"{}\" is not an index of {} (0 .. {})", excerpt(part, kMaxValueChars), cursor.walked,
                       size);
   if (*index == size) {
     reflection->AddString(cursor.message, &field, value);
@@ -146,7 +146,7 @@ Status assign(Cursor cursor, std::string_view path, const std::string& value) {
     const std::string_view rest = dot == std::string_view::npos ? std::string_view{} : path.substr(dot + 1);
     const auto* field = cursor.type().FindFieldByName(part);
     if (!field)
-      return make_error(ErrorCode::BadInput, "{} has no field \"{}\" ({})", cursor.name(), part,
+      return make_error(ErrorCode::BadInput, "{} has no field \"{}\" ({})", cursor.name(), excerpt(part, kMaxValueChars),
                         known_fields(cursor.type()));
     cursor.step(part);
     if (field->is_map() && !rest.empty()) return set_map_entry(cursor, *field, rest, value);
@@ -166,7 +166,7 @@ Status assign(Cursor cursor, std::string_view path, const std::string& value) {
     if (rest.empty()) return set_value(cursor, *field, value);
     if (field->cpp_type() != pb::FieldDescriptor::CPPTYPE_MESSAGE)
       return make_error(ErrorCode::BadInput, "{} is a single value and has no field \"{}\"", cursor.walked,
-                        rest);
+                        excerpt(rest, kMaxValueChars));
     cursor.message = cursor.message->GetReflection()->MutableMessage(cursor.message, field);
     path = rest;
   }

@@ -299,6 +299,7 @@ void visit(Visitor& v, ServerStatus& m) {
   });
   v.text("recording", m.recording, kMaxTextChars);
   v.timecode("timecode", m.timecode);
+  v.measure("away_s", m.away_s);
 }
 template <>
 inline constexpr const char* kKind<Goodbye> = "goodbye";

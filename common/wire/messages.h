@@ -305,6 +305,7 @@ struct ServerStatus {
   std::vector<LiveInputStatus> live_inputs = {};  // at most kMaxLiveInputs
   std::string recording = {};  // for a person: the file that is written; empty = none
   std::optional<Timecode> timecode{};  // of the newest state; none where nobody counts
+  double away_s = 0.0;  // a relay's: how long its server has been away; 0 = it is there
   bool operator==(const ServerStatus&) const = default;
 };
 /// The server closes right after it.

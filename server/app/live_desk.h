@@ -19,9 +19,6 @@
 
 namespace strandcast {
 
-/// First source id of live inputs among the sources of motion; session ids count from 1.
-inline constexpr uint64_t kFirstLiveSourceId = uint64_t{1} << 63;
-
 /// Checks every input separately; BadInput and NotFound name the field. Opens nothing.
 Status check_live(const std::vector<LiveDesc>& live);
 /// Returns a line per input: the accepted senders, the subject that the head follows, and how its data is

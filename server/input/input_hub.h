@@ -49,6 +49,8 @@
 
 namespace strandcast {
 
+/// First source id of live inputs among the sources of motion; session ids count from 1.
+inline constexpr uint64_t kFirstLiveSourceId = uint64_t{1} << 63;
 inline constexpr size_t kMaxBufferedSamples = 1024;
 
 template <class Value>

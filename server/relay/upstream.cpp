@@ -5,6 +5,7 @@
 
 #include "common/base/profile.h"
 #include "common/base/thread_name.h"
+#include "common/base/units.h"
 #include "common/log/log.h"
 #include "common/strands/strand_codec.h"
 
@@ -17,6 +18,7 @@ constexpr uint16_t kFirstStream = 0;
 constexpr auto kLookInterval = std::chrono::milliseconds(100);
 /// A server that knows relays sends the list of its streams right behind its Welcome.
 constexpr int64_t kListNs = 5'000'000'000;
+constexpr int64_t kStatusNs = 500'000'000;
 /// Frames that are older say that none come.
 constexpr double kMaxFrameAgeS = 2.0;
 
@@ -126,6 +128,7 @@ void Upstream::run() {
     follow_clock();
     begin_if_complete();
     look_for_list(time_ns);
+    repeat_away(time_ns);
     Links ended = std::exchange(ended_, {});
     lock.unlock();
     ended.clear();
@@ -253,16 +256,32 @@ bool Upstream::on_lost(const StreamKey& key, const Error& error) {
   }
   // All heads have one server.
   log_line(number_ == 0 ? LogLevel::Warn : LogLevel::Debug, "relay", error.to_string() + "; trying again");
-  if (was_connected) tell_away(error);
+  if (was_connected) tell_away(error, now_ns());
   return true;
 }
 
 /// Tells the viewers, once, that the server is away.
-void Upstream::tell_away(const Error& error) {
-  if (std::exchange(was_away_, true)) return;
+void Upstream::tell_away(const Error& error, int64_t since_ns) {
+  if (away_since_ns_ != 0) return;
+  away_since_ns_ = since_ns;
   net_->broadcast(
       Notice{true, fmt::format("The server is away; this relay tries again: {}", error.to_string())},
       number_);
+}
+
+void Upstream::tell_back() {
+  if (std::exchange(away_since_ns_, 0) == 0) return;
+  status_.away_s = 0.0;
+  net_->broadcast(status_, number_);
+  net_->broadcast(Notice{false, "The server is back."}, number_);
+}
+
+/// As often as the server itself would send a status.
+void Upstream::repeat_away(int64_t time_ns) {
+  if (away_since_ns_ == 0 || time_ns - away_told_ns_ < kStatusNs) return;
+  away_told_ns_ = time_ns;
+  status_.away_s = static_cast<double>(time_ns - away_since_ns_) / kNsPerS;
+  net_->broadcast(status_, number_);
 }
 
 /// What is still open may come to life again; those who watch are told meanwhile.
@@ -271,7 +290,7 @@ void Upstream::on_silence(const StreamKey& key, bool is_silent) {
   if (find(key) == nullptr || key.stream_id != kFirstStream || !is_connected_) return;
   if (!is_silent) {
     trouble_.reset();
-    if (std::exchange(was_away_, false)) net_->broadcast(Notice{false, "The server is back."}, number_);
+    tell_back();
     return;
   }
   const Error error =
@@ -279,7 +298,7 @@ void Upstream::on_silence(const StreamKey& key, bool is_silent) {
                  std::chrono::duration_cast<std::chrono::seconds>(kSilentServer).count());
   log_line(number_ == 0 ? LogLevel::Warn : LogLevel::Debug, "relay", error.to_string());
   trouble_ = error;
-  tell_away(error);
+  tell_away(error, now_ns() - std::chrono::nanoseconds(kSilentServer).count());
 }
 
 void Upstream::on_event(const StreamKey& key, ClientEvent event) {
@@ -394,7 +413,7 @@ void Upstream::begin_if_complete() {
   log_info("relay", "{} is back", server());
   take_list(next_.streams);
   tell_relayed();
-  if (std::exchange(was_away_, false)) net_->broadcast(Notice{false, "The server is back."}, number_);
+  tell_back();
 }
 
 /// Another server, the same one started anew, or other hair: nothing of before is of use to anybody.
@@ -402,7 +421,7 @@ void Upstream::begin_anew(const char* reason) {
   if (relayed_ != nullptr) ++counters_.reconnects;
   log_info("relay", "relaying '{}' of {}, {} strands by {}", next_.welcome.scene_name, server(),
            next_.welcome.strand_count, next_.welcome.codec);
-  was_away_ = false;
+  away_since_ns_ = 0;
   end_streams([](const auto& entry) { return entry.first != kFirstStream; });
   demand_.clear();
   relayed_ = std::make_shared<const Relayed>(next_);

@@ -115,7 +115,9 @@ class Upstream {
   void on_frame(Stream& stream, MediaEvent media);
   bool on_lost(const StreamKey& key, const Error& error);
   void on_silence(const StreamKey& key, bool is_silent);
-  void tell_away(const Error& error);
+  void tell_away(const Error& error, int64_t since_ns);
+  void tell_back();
+  void repeat_away(int64_t time_ns);
   void on_first_event(ClientEvent event);
   void take_list(const StreamList& list);
   void begin_if_complete();
@@ -142,7 +144,8 @@ class Upstream {
   bool is_stopping_ = false;
   std::optional<std::string> head_;  // nothing: it rests
   bool is_connected_ = false;        // class 0
-  bool was_away_ = false;            // and viewers were told
+  int64_t away_since_ns_ = 0;        // viewers were told that the server is away; 0: it is there
+  int64_t away_told_ns_ = 0;         // the last time
   std::optional<Error> trouble_;
   std::optional<Error> failure_;
   Relayed next_;        // as far as it has come

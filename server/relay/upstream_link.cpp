@@ -128,7 +128,7 @@ Error UpstreamLink::hear(ViewerClient& client) {
       const std::lock_guard lock(mutex_);
       if (lost_for_) return *std::exchange(lost_for_, std::nullopt);
     }
-    next_ = beside.pump_beside(client.heard_ns());
+    next_ = beside.pump_beside({client.heard_ns()});
     if (next_ != nullptr)
       return at(config_.address.to_string(),
                 make_error(ErrorCode::Timeout, "nothing has come for {} ms, and a new connection takes over",

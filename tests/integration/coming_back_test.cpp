@@ -2,6 +2,7 @@
 // proxies before them, that hang, break off, answer nonsense or are started anew.
 #include <gmock/gmock.h>
 
+#include <array>
 #include <atomic>
 #include <functional>
 #include <mutex>
@@ -15,11 +16,14 @@
 #include "client/app/steady_client.h"
 #include "client/app/view_report.h"
 #include "client/app/views.h"
+#include "common/base/file.h"
 #include "common/strands/strand_codec.h"
+#include "common/wire/close_code.h"
 #include "server/relay/relay.h"
 #include "tests/support/client_config.h"
 #include "tests/support/eventually.h"
 #include "tests/support/fake_server.h"
+#include "tests/support/temporary_folder.h"
 
 namespace strandcast::coming_back_test {
 namespace {
@@ -357,6 +361,33 @@ TEST(ComingBack, ASilentConnectionThatSpeaksFirstStays) {
   EXPECT_EQ(live->reconnects(), 0u);
 }
 
+// What a misled proxy says first: no Welcome, but a frame of any kind.
+TEST(ComingBack, AFrameInsteadOfAWelcomeIsNotFinal) {
+  const Door door({[](FakePeer& peer) {
+                     peer.upgrade();
+                     constexpr std::array<std::byte, 5> kRandom = {std::byte{0xe7}, std::byte{0x11}, std::byte{0x5a},
+                                                                   std::byte{0x03}, std::byte{0xff}};
+                     peer.send_bytes(kRandom);
+                     peer.read_to_end();
+                   },
+                   [](FakePeer& peer) { serve(peer, 2); }});
+  SteadyClient steady(config_for(door.port()));
+  EXPECT_TRUE(eventually([&] {
+    const Status pumped = steady.pump(milliseconds(2), [](ClientEvent&) {});
+    EXPECT_TRUE(pumped) << pumped.error().to_string();
+    return !pumped || steady.is_connected();
+  }));
+  EXPECT_TRUE(steady.is_connected());
+}
+
+TEST(ComingBack, WhoWasInItOutlivesANameThatIsNotKnownYet) {
+  const Door door({[](FakePeer& peer) { peer.answer_http(404, "no such session"); },
+                   [](FakePeer& peer) { peer.answer_http(404, "no such session"); },
+                   [](FakePeer& peer) { serve(peer, 2); }});
+  EXPECT_FALSE(connect_patiently(config_for(door.port())));
+  EXPECT_TRUE(connect_patiently(config_for(door.port()), kCommandPatience, Standing::Member));
+}
+
 std::string text_in(const ViewReport& report, const std::string& key) {
   for (const ReportEntry& entry : report)
     if (entry.key == key) return entry.text;
@@ -399,6 +430,29 @@ TEST(ComingBack, AHeadlessReportAddsUpOverConnections) {
   EXPECT_GT(std::stod(text_in(*report, "seconds")), std::stod(text_in(*report, "outage_s")));
 }
 
+TEST(ComingBack, AReportIsWrittenThoughTheEndIsFinal) {
+  const Door door({[](FakePeer& peer) {
+                     peer.welcome(make_welcome(kStrands, kVertices));
+                     peer.send(*asset_frame());
+                     peer.send(*keyframe(1));
+                     peer.read_until<FrameAck>();
+                     peer.close(static_cast<uint16_t>(CloseCode::Kicked), "for a test");
+                   }});
+  const TemporaryFolder folder;
+  ViewOptions options;
+  options.address = {"127.0.0.1", door.port()};
+  options.mode = StreamMode::Strands;
+  options.is_headless = true;
+  options.after_frames = 1'000'000;
+  options.report = folder.path() / "report.txt";
+  const std::atomic<bool> stop{false};
+  EXPECT_FALSE(run_headless(options, stop));
+  const auto text = load_text(options.report, 1u << 20);
+  ASSERT_TRUE(text) << text.error().to_string();
+  EXPECT_THAT(*text, HasSubstr("decoded_frames"));
+  EXPECT_THAT(*text, HasSubstr("server_sim_ms=unknown")) << "no status came";
+}
+
 // ---- relays ----
 
 TEST(ComingBack, ARelayWaitsForAListOfStreamsThatDoesNotCome) {
@@ -416,6 +470,43 @@ TEST(ComingBack, ARelayWaitsForAListOfStreamsThatDoesNotCome) {
   EXPECT_TRUE(eventually([&] { return (*relay)->failure() || door.count() > 1; }));
   EXPECT_TRUE(eventually([&] { return (*relay)->failure() || (*relay)->readiness().ok(); }));
   EXPECT_FALSE((*relay)->failure()) << (*relay)->failure()->to_string();
+}
+
+// The relay itself speaks on: its viewers are told, and count what they missed.
+TEST(ComingBack, WhoIsBehindARelayKnowsThatTheServerIsAway) {
+  std::atomic<bool> has_joined{false};
+  std::vector<FakeServer::Script> scripts = {[&](FakePeer& peer) {
+    if (!peer.welcome(make_welcome(kStrands, kVertices))) return;
+    peer.send(stream_list());
+    peer.send(*asset_frame());
+    peer.send(*keyframe(1));
+    while (const auto ping = peer.read_until<Ping>())
+      if (has_joined || !peer.send(Pong{ping->client_time_ns, now_ns(), now_ns()})) break;
+    peer.reset();
+  }};
+  for (int i = 0; i < 3; ++i)
+    scripts.emplace_back([](FakePeer& peer) { peer.answer_http(503, "not yet"); });
+  scripts.emplace_back([](FakePeer& peer) { serve(peer, 2); });
+  const Door above(scripts);
+  RelayConfig config;
+  config.net.port = 0;
+  config.upstream.address = {"127.0.0.1", above.port()};
+  const auto relay = Relay::start(config);
+  ASSERT_TRUE(relay) << relay.error().to_string();
+  const auto live = LiveConnection::begin(config_for((*relay)->port()));
+  SteadyClient steady(config_for((*relay)->port()));
+  const auto pump = [&] {
+    live->pump(milliseconds(2));
+    (void)steady.pump(milliseconds(2), [](ClientEvent&) {});
+  };
+  ASSERT_TRUE(eventually([&] { return pump(), live->is_connected() && steady.is_connected(); }));
+  has_joined = true;
+  ASSERT_TRUE(eventually([&] { return pump(), !live->is_connected() && !steady.is_connected(); }));
+  EXPECT_THAT(live->trouble(), HasSubstr("nothing has come to this relay from its server"));
+  ASSERT_TRUE(eventually([&] { return pump(), live->is_connected() && steady.is_connected(); }));
+  EXPECT_GT(live->outage_s(), 0.0);
+  EXPECT_GT(steady.policy().outage_s(now_ns()), 0.0);
+  EXPECT_EQ(live->reconnects(), 0u) << "the relay was always there";
 }
 
 TEST(ComingBack, AnUnknownOpcodeEndsNoRelay) {

@@ -107,6 +107,7 @@ inline std::vector<ServerMessage> sample_server_messages() {
   status.live_inputs = {live, LiveInputStatus{}};
   status.recording = "take 5.mcap: 12.5 s, 3.2 MB";
   status.timecode = Timecode{{24000, 1001}, false, 89'356, 0.5};
+  status.away_s = 2.5;
   return {
       welcome,
       Pong{1, -2, INT64_MAX},

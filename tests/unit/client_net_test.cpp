@@ -276,7 +276,44 @@ TEST(ReconnectPolicy, ASilenceIsDoubtedAndThreeSecondsOfItAreNoConnection) {
   EXPECT_TRUE(is_doubted(1'000 * kMsNs, 2'500 * kMsNs));
   EXPECT_FALSE(is_silent(1'000 * kMsNs, 3'999 * kMsNs));
   EXPECT_TRUE(is_silent(1'000 * kMsNs, 4'000 * kMsNs));
-  EXPECT_THAT(silence_text("hair:1", 0, 4'000 * kMsNs), testing::HasSubstr("not connected"));
+  EXPECT_THAT(silence_text("hair:1", {1}, 4'000 * kMsNs), testing::HasSubstr("not connected"));
+}
+
+TEST(ReconnectPolicy, ASilenceOfTheSameConnectionIsAnOutage) {
+  ReconnectPolicy policy(1);
+  policy.on_welcome(1'000 * kMsNs);
+  policy.on_heard({2'000 * kMsNs}, 4'000 * kMsNs);
+  EXPECT_EQ(policy.outage_s(4'000 * kMsNs), 0.0) << "it may still speak";
+  policy.on_heard({2'000 * kMsNs}, 9'000 * kMsNs);
+  EXPECT_NEAR(policy.outage_s(9'000 * kMsNs), 7.0, 1e-9);
+  EXPECT_NEAR(policy.running_outage_s(9'000 * kMsNs), 7.0, 1e-9);
+  policy.on_heard({10'000 * kMsNs}, 10'000 * kMsNs);  // it speaks again
+  EXPECT_NEAR(policy.outage_s(20'000 * kMsNs), 8.0, 1e-9);
+  EXPECT_EQ(policy.running_outage_s(20'000 * kMsNs), 0.0);
+  EXPECT_EQ(policy.reconnects(), 0u);
+  policy.on_heard({20'000 * kMsNs}, 25'000 * kMsNs);  // and not once more before it is lost
+  (void)policy.on_lost(make_error(ErrorCode::Timeout, "nothing received"), 30'000 * kMsNs, 20'000 * kMsNs);
+  policy.on_welcome(31'000 * kMsNs);
+  EXPECT_NEAR(policy.outage_s(40'000 * kMsNs), 8.0 + 11.0, 1e-9) << "counted once";
+}
+
+TEST(ReconnectPolicy, ARelayThatHearsNothingIsNoConnection) {
+  Heard heard{10'000 * kMsNs};
+  hear(heard, 2.0, 10'000 * kMsNs);
+  EXPECT_EQ(silent_since_ns(heard, 10'000 * kMsNs), 8'000 * kMsNs) << "the relay itself speaks";
+  EXPECT_THAT(silence_text("relay:1", heard, 10'000 * kMsNs),
+              testing::HasSubstr("to this relay from its server for 2 s"));
+  ReconnectPolicy policy(1);
+  policy.on_welcome(9'000 * kMsNs);
+  policy.on_heard(heard, 10'000 * kMsNs);
+  EXPECT_NEAR(policy.outage_s(10'000 * kMsNs), 1.0, 1e-9) << "before it came it had nothing to lose";
+  // The relay is lost too.
+  (void)policy.on_lost(make_error(ErrorCode::Unavailable, "reset"), 12'000 * kMsNs, 12'000 * kMsNs);
+  EXPECT_NEAR(policy.outage_s(13'000 * kMsNs), 4.0, 1e-9);
+  hear(heard, 0.0, 14'000 * kMsNs);
+  EXPECT_EQ(silent_since_ns(heard, 10'001 * kMsNs), 0);
+  hear(heard, 1e300, 14'000 * kMsNs);
+  EXPECT_NE(silent_since_ns(heard, 14'000 * kMsNs), 0) << "any number of a server's";
 }
 
 /// The page has the same numbers: `name = 250` in its source, where underscores may stand in a number.

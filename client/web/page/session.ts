@@ -313,6 +313,7 @@ class Connection {
   private readonly timers: number[] = [];
   private lastReceivedMs = performance.now();
   private isSilent = false;
+  private isAway = false; // the relay's server
   private now?: StrandDecoder;
   private next?: StrandDecoder;
   private assetPayload?: Uint8Array;
@@ -423,6 +424,8 @@ class Connection {
     if (message.status) {
       for (const motion of message.status.picture_motions) this.motions.set(motion.sim_time_ns, motion.motion_time_ns);
       this.net.post({ kind: 'status', status: message.status });
+      this.isAway = message.status.away_s > 0;
+      this.listen();
     }
     if (message.notice && this.welcome) this.net.post({ kind: 'notice', isError: message.notice.is_error, text: message.notice.text });
     if (message.quality) {
@@ -485,10 +488,11 @@ class Connection {
   private listen(): void {
     const silentMs = performance.now() - this.lastReceivedMs;
     if (silentMs > IDLE_MS) return this.giveUp(`nothing came from the server for ${IDLE_MS / 1000} s`);
-    const isSilent = silentMs > SILENT_MS;
+    const isSilent = silentMs > SILENT_MS || this.isAway;
     if (isSilent === this.isSilent) return;
     this.isSilent = isSilent;
-    this.net.post({ kind: 'state', state: isSilent ? 'silent' : 'open', reason: isSilent ? `nothing has come for ${SILENT_MS / 1000} s` : '', retryMs: 0 });
+    const reason = !isSilent ? '' : this.isAway ? 'nothing comes to this relay from its server' : `nothing has come for ${SILENT_MS / 1000} s`;
+    this.net.post({ kind: 'state', state: isSilent ? 'silent' : 'open', reason, retryMs: 0 });
   }
 
   // ---- clock

@@ -107,7 +107,7 @@ export const ServerStatus = {
   dropped_frames: [9, 'uint64'], rejected_samples: [10, 'uint64'], quarantined_strands: [11, 'uint64'],
   overstretched_strands: [12, 'uint64'], queue_delay_ms: [13, 'double'], slow_motion: [14, 'string'],
   picture_motions: [15, PictureMotion, 'repeated'], detail: [16, 'string'], live_inputs: [24, LiveInput, 'repeated'],
-  recording: [28, 'string'], timecode: [29, Timecode],
+  recording: [28, 'string'], timecode: [29, Timecode], away_s: [30, 'double'],
 } as const;
 export const Goodbye = { reason: [1, 'string'] } as const;
 export const Notice = {
