@@ -23,7 +23,7 @@
 #include "server/app/codec_choice.h"
 #include "server/app/explain.h"
 #include "server/app/groom_check.h"
-#include "server/app/live_desk.h"
+#include "server/app/live_manager.h"
 #include "server/app/options.h"
 #include "server/app/server_passes.h"
 #include "server/app/service_manager.h"

@@ -60,8 +60,7 @@ bool LiveConnection::pump(std::chrono::milliseconds timeout) {
 
 std::string LiveConnection::trouble() const {
   if (is_connected()) return {};
-  if (is_silent())
-    return silence_text(attempts_.config().address.to_string(), session_->heard(), now_ns());
+  if (is_silent()) return silence_text(attempts_.config().address.to_string(), session_->heard(), now_ns());
   return attempts_.last_error() ? attempts_.last_error()->to_string() : std::string();
 }
 

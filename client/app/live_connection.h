@@ -36,8 +36,8 @@ class LiveConnection {
   ViewerSession& session() { return *session_; }
   /// What the sessions before that one counted.
   const SessionTotals& earlier() const { return earlier_; }
-  /// Returns whether there is a session on which the server said something within kSilentServer, behind a relay
-  /// too.
+  /// Returns whether there is a session on which the server said something within kSilentServer, behind a
+  /// relay too.
   bool is_connected() const { return is_open_ && !is_silent(); }
   /// How often the server was found again.
   uint64_t reconnects() const { return attempts_.policy().reconnects(); }

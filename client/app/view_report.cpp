@@ -208,8 +208,7 @@ std::string to_summary(const ViewReport& report) {
       v("scene"), v("strands"), v("vertices_per_strand"), v("mode"), v("codec"), v("mode_reason"),
       v("decoded_frames"), v("seconds"), v("frames_per_s"), v("bytes_per_frame"), v("mbit_per_s"),
       v("decode_ms_median"), v("decode_ms_p99"), v("render_ms_median"), v("rendered_pictures"), motion,
-      dropped, server, outage,
-      slow == "none" || slow == "?" ? std::string() : fmt::format("  {}\n", slow));
+      dropped, server, outage, slow == "none" || slow == "?" ? std::string() : fmt::format("  {}\n", slow));
 }
 
 }  // namespace strandcast

@@ -17,6 +17,7 @@
 #include "client/app/picture_latency.h"
 #include "common/base/profile.h"
 #include "common/base/result.h"
+#include "common/client/reconnect_policy.h"
 #include "common/client/viewer_client.h"
 #include "common/pictures/picture_decoder.h"
 #include "common/replay/strand_replay.h"

@@ -23,9 +23,9 @@ namespace strandcast {
 
 /// Blocks until a connection is there, `patience` is over or an error is final: the last error then, or what
 /// config.cancel says. Member: somebody who has been in it before.
-Result<std::unique_ptr<ViewerClient>> connect_patiently(
-    const ClientConfig& config, std::chrono::milliseconds patience = kCommandPatience,
-    Standing standing = Standing::Newcomer);
+Result<std::unique_ptr<ViewerClient>> connect_patiently(const ClientConfig& config,
+                                                        std::chrono::milliseconds patience = kCommandPatience,
+                                                        Standing standing = Standing::Newcomer);
 
 template <class Session>
 class Attempts {
@@ -67,8 +67,8 @@ class Attempts {
     log_info("net", "connected to {}", config_.address.to_string());
     return std::move(opened).value();
   }
-  /// Where there is one: as pump(), without waiting, while the connection is doubted. Call it often: who stood
-  /// still itself has heard nothing meanwhile.
+  /// Where there is one: as pump(), without waiting, while the connection is doubted. Call it often: who
+  /// stood still itself has heard nothing meanwhile.
   std::unique_ptr<Session> pump_beside(const Heard& heard) {
     const int64_t time_ns = now_ns();
     const bool was_awake = !is_doubted(std::exchange(looked_ns_, time_ns), time_ns);

@@ -54,7 +54,8 @@ bool is_doubted(int64_t heard_ns, int64_t time_ns);
 /// What has come lately on a connection that is open; times by now_ns().
 struct Heard {
   int64_t last_ns = 0;  // anything
-  /// Since when the relay there has heard nothing of its own server; 0: it hears it, or the server itself is there.
+  /// Since when the relay there has heard nothing of its own server; 0: it hears it, or the server itself is
+  /// there.
   int64_t away_since_ns = 0;
 };
 /// Takes in how long a status says that its server has been away.
@@ -75,7 +76,7 @@ class ReconnectPolicy {
   /// An attempt failed, or the connection ended whose last byte came at `heard_ns` (0: now). Delay before the
   /// next attempt, or nothing when the error is final.
   std::optional<std::chrono::milliseconds> on_lost(const Error& error, int64_t time_ns, int64_t heard_ns = 0);
-  /// The connection is open; called as often as it is looked at. Silences of an open connection are outages.
+  /// Looks at an open connection, again and again: its silences are outages.
   void on_heard(const Heard& heard, int64_t time_ns);
   /// An attempt beside a connection that there still is failed; as on_lost().
   std::optional<std::chrono::milliseconds> on_failed(const Error& error);
@@ -87,7 +88,7 @@ class ReconnectPolicy {
   uint64_t reconnects() const { return welcomes_ > 0 ? welcomes_ - 1 : 0; }
   /// Time without a connection since the first Welcome, s, silences included.
   double outage_s(int64_t time_ns) const;
-  /// That of the outage that lasts, s; 0: none does.
+  /// Length so far of the outage that lasts, s; 0: none does.
   double running_outage_s(int64_t time_ns) const;
   /// Time since the first Welcome, s; 0 before it.
   double since_first_s(int64_t time_ns) const;

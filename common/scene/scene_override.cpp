@@ -18,7 +18,8 @@ namespace {
 
 namespace pb = google::protobuf;
 
-constexpr size_t kMaxOverrideChars = 200, kMaxValueChars = 40;  // of an assignment and its parts, in error messages
+constexpr size_t kMaxOverrideChars = 200,
+                 kMaxValueChars = 40;  // of an assignment and its parts, in error messages
 
 /// Keeps the first message of the parser instead of printing it.
 class FirstError : public pb::io::ErrorCollector {
@@ -70,8 +71,8 @@ Status set_value(Cursor& cursor, const pb::FieldDescriptor& field, const std::st
     return {};
   }
   if (field.cpp_type() == pb::FieldDescriptor::CPPTYPE_ENUM && !field.enum_type()->FindValueByName(value))
-    return make_error(ErrorCode::BadInput, "\"{}\" is not a value of {} ({})", excerpt(value, kMaxValueChars), field.name(),
-                      known_values(*field.enum_type()));
+    return make_error(ErrorCode::BadInput, "\"{}\" is not a value of {} ({})", excerpt(value, kMaxValueChars),
+                      field.name(), known_values(*field.enum_type()));
   if (field.cpp_type() == pb::FieldDescriptor::CPPTYPE_MESSAGE && !value.starts_with('{'))
     return make_error(ErrorCode::BadInput, "{} is a group of fields, name one of them ({})", field.name(),
                       known_fields(*field.message_type()));
@@ -80,8 +81,8 @@ Status set_value(Cursor& cursor, const pb::FieldDescriptor& field, const std::st
   pb::TextFormat::Parser parser;
   parser.RecordErrorsTo(&error);
   if (parser.ParseFieldValueFromString(number, &field, cursor.message)) return {};
-  return make_error(ErrorCode::BadInput, "\"{}\" is not a value for {}{}{}", excerpt(value, kMaxValueChars), field.name(),
-                    error.text().empty() ? "" : ": ", error.text());
+  return make_error(ErrorCode::BadInput, "\"{}\" is not a value for {}{}{}", excerpt(value, kMaxValueChars),
+                    field.name(), error.text().empty() ? "" : ": ", error.text());
 }
 
 std::optional<int> parse_index(std::string_view text) {
@@ -98,8 +99,8 @@ Status step_into_list(Cursor& cursor, const pb::FieldDescriptor& field, std::str
   const int last = std::min<int>(size, kMaxSphereColliders - 1);
   const auto index = parse_index(part);
   if (!index || *index > last)
-    return make_error(ErrorCode::BadInput, "\"{}\" is not an index of {} (0 .. {})", excerpt(part, kMaxValueChars), cursor.walked,
-                      last);
+    return make_error(ErrorCode::BadInput, "\"{}\" is not an index of {} (0 .. {})",
+                      excerpt(part, kMaxValueChars), cursor.walked, last);
   cursor.step(part);
   cursor.message = *index < size ? reflection->MutableRepeatedMessage(cursor.message, &field, *index)
                                  : reflection->AddMessage(cursor.message, &field);
@@ -129,8 +130,8 @@ Status set_text_of_list(Cursor& cursor, const pb::FieldDescriptor& field, std::s
   const int size = reflection->FieldSize(*cursor.message, &field);
   const auto index = parse_index(part);
   if (!index || *index > size)
-    return make_error(ErrorCode::BadInput, "\"{}\" is not an index of {} (0 .. {})", excerpt(part, kMaxValueChars), cursor.walked,
-                      size);
+    return make_error(ErrorCode::BadInput, "\"{}\" is not an index of {} (0 .. {})",
+                      excerpt(part, kMaxValueChars), cursor.walked, size);
   if (*index == size) {
     reflection->AddString(cursor.message, &field, value);
   } else {
@@ -146,8 +147,8 @@ Status assign(Cursor cursor, std::string_view path, const std::string& value) {
     const std::string_view rest = dot == std::string_view::npos ? std::string_view{} : path.substr(dot + 1);
     const auto* field = cursor.type().FindFieldByName(part);
     if (!field)
-      return make_error(ErrorCode::BadInput, "{} has no field \"{}\" ({})", cursor.name(), excerpt(part, kMaxValueChars),
-                        known_fields(cursor.type()));
+      return make_error(ErrorCode::BadInput, "{} has no field \"{}\" ({})", cursor.name(),
+                        excerpt(part, kMaxValueChars), known_fields(cursor.type()));
     cursor.step(part);
     if (field->is_map() && !rest.empty()) return set_map_entry(cursor, *field, rest, value);
     if (field->is_repeated() && field->cpp_type() == pb::FieldDescriptor::CPPTYPE_STRING)

@@ -10,7 +10,7 @@
 #include "common/base/version.h"
 #include "common/log/log.h"
 #include "common/scene/scene_file.h"
-#include "server/app/live_desk.h"
+#include "server/app/live_manager.h"
 #include "server/source/scene_change.h"
 
 namespace strandcast {

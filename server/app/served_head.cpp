@@ -42,7 +42,7 @@ Status ServedHead::load(OtherHeads others) {
   RETURN_IF_ERROR(make_strand_encoder(scene.stream.codec));
   RETURN_IF_ERROR(check_live(scene.live));
   if (config_.record || config_.record_folder) {
-    ASSIGN_OR_RETURN(records_, RecordDesk::make(config_.record, config_.record_folder));
+    ASSIGN_OR_RETURN(records_, RecordManager::make(config_.record, config_.record_folder));
     config_.tap = records_->first_tap();
   }
   ASSIGN_OR_RETURN(sender_,
@@ -113,9 +113,9 @@ Status ServedHead::choose_codecs() {
   return {};
 }
 
-LiveDesk::Target ServedHead::live_target() {
+LiveManager::Target ServedHead::live_target() {
   StreamHub* hub = hub_.get();
-  LiveDesk::Target target;
+  LiveManager::Target target;
   target.live = config_.scene.live;
   target.inputs = &inputs_;
   target.listener.on_motion = [hub](uint64_t id, const MotionSamples& samples, int64_t arrival_ns) {
@@ -129,23 +129,23 @@ LiveDesk::Target ServedHead::live_target() {
 
 NetHead ServedHead::admit(Whole whole) {
   live_ = whole.live;
-  desk_ = std::make_unique<SessionDesk>(SessionDesk::Parts{
+  manager_ = std::make_unique<SessionManager>(SessionManager::Parts{
       config_.scene, *hub_, *source_, inputs_, stages_, codecs_, asset_frame_, is_drawn_by_processors_,
       config_.scene.live.empty() ? nullptr : live_, number_, std::move(whole.heads), std::move(whole.scene),
       [this] { return quality_reason(); }, records_.get(), whole.records, std::move(whole.sources)});
-  desk_->set_metrics(std::move(whole.metrics));
-  NetHead head{name(), desk_.get(), hub_->strand_classes(), {}};
+  manager_->set_metrics(std::move(whole.metrics));
+  NetHead head{name(), manager_.get(), hub_->strand_classes(), {}};
   for (const StrandCodecInfo& codec : codecs_) head.strand_codecs.push_back(codec.bytes);
   return head;
 }
 
 Status ServedHead::start(NetServer& net) {
   net_ = &net;
-  desk_->connect(net);
+  manager_->connect(net);
   if (records_ != nullptr)
-    RETURN_IF_ERROR(
-        records_->attach({*hub_, *source_, [this] { return describe_recording(); },
-                          [this] { return desk_->asset(); }, config_.scene.name, config_.shared != nullptr}));
+    RETURN_IF_ERROR(records_->attach({*hub_, *source_, [this] { return describe_recording(); },
+                                      [this] { return manager_->asset(); }, config_.scene.name,
+                                      config_.shared != nullptr}));
   stages_.set_source_times([this](int64_t arrival_ns) { return inputs_.source_time_ns(arrival_ns); });
   if (!config_.trace_path.empty()) RETURN_IF_ERROR(stages_.open_trace(config_.trace_path));
   RETURN_IF_ERROR(source_->start(*hub_, config_.scene.stream));
@@ -204,9 +204,9 @@ void ServedHead::tell_status() {
   status.picture_motions = hub_->take_picture_motions();
   status.live_inputs = now.live_inputs;
   if (records_ != nullptr) records_->add(status);
-  desk_->tell_status(std::move(status));
-  desk_->tell_state_times();
-  desk_->tell_streams();
+  manager_->tell_status(std::move(status));
+  manager_->tell_state_times();
+  manager_->tell_streams();
 }
 
 /// What who follows the head is told besides its pose.
@@ -267,7 +267,7 @@ void ServedHead::lower_quality() {
       "simulated it may: strandcast-ctl set detail.simulated_share=0.5, then quality=full");
   source_->post(
       SetParameter{std::string("quality=") + kFastQuality},
-      [this](const Notice&) { desk_->tell_parameters(); }, "quality auto");
+      [this](const Notice&) { manager_->tell_parameters(); }, "quality auto");
 }
 
 std::optional<SceneDesc> ServedHead::scene() const {
@@ -283,7 +283,7 @@ ServerCounters ServedHead::counters() const {
   const RuntimeFacts facts = hub_->total().facts;
   counters.strand_viewers = facts.strand_viewers;
   counters.frame_viewers = facts.frame_viewers;
-  counters.viewers = desk_->viewer_count();
+  counters.viewers = manager_->viewer_count();
   counters.input = inputs_.counters();
   counters.sim = source_->stats();
   count_strands(counters);

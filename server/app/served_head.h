@@ -13,9 +13,9 @@
 
 #include "server/app/frame_stages.h"
 #include "server/app/heads_painter.h"
-#include "server/app/live_desk.h"
+#include "server/app/live_manager.h"
 #include "server/app/server.h"
-#include "server/app/session_desk.h"
+#include "server/app/session_manager.h"
 #include "server/app/slow_motion.h"
 
 namespace strandcast {
@@ -34,16 +34,16 @@ class ServedHead {
   ServedHead& operator=(const ServedHead&) = delete;
 
   /// Returns the recordings; null if recording is not possible.
-  RecordDesk* records() { return records_.get(); }
+  RecordManager* records() { return records_.get(); }
   /// Returns the inputs that live sources drive.
-  LiveDesk::Target live_target();
+  LiveManager::Target live_target();
   /// Parts of the server that heads share.
   struct Whole {
-    LiveDesk* live = nullptr;                         // null: no head has live inputs
+    LiveManager* live = nullptr;                      // null: no head has live inputs
     std::vector<std::string> heads;                   // names of all where there are several
     std::function<std::optional<SceneDesc>()> scene;  // with all heads, as it runs; from any thread
     std::function<std::string()> metrics;             // likewise
-    const RecordDesks* records = nullptr;             // of all heads, where there are several that record
+    const RecordManagers* records = nullptr;          // of all heads, where there are several that record
     std::vector<StateSource*> sources = {};           // of all heads, where there are several
   };
   /// Makes the handler of this head's sessions.
@@ -67,7 +67,7 @@ class ServedHead {
   gl::PassReports passes() const;
   std::string stage_metrics() const { return stages_.metrics(); }
   std::optional<Error> failure() const { return source_->failure(); }
-  bool is_shut_down_wanted() const { return desk_->is_shut_down_wanted(); }
+  bool is_shut_down_wanted() const { return manager_->is_shut_down_wanted(); }
 
  private:
   ServedHead(const ServerConfig& config, size_t number) : config_(config), number_(number) {}
@@ -88,19 +88,19 @@ class ServedHead {
   const size_t number_;
   bool is_drawn_by_processors_ = true;  // pictures, whatever simulates
   InputHub inputs_;
-  std::unique_ptr<RecordDesk> records_;  // null: nothing is recorded, nor can be
+  std::unique_ptr<RecordManager> records_;  // null: nothing is recorded, nor can be
   FrameStages stages_;
   std::vector<StrandCodecInfo> codecs_;  // that strands are served by, the scene's first
   EncodedFramePtr asset_frame_;          // at first
   RenderDeviceConfig painting_;
-  LiveDesk* live_ = nullptr;
+  LiveManager* live_ = nullptr;
   NetServer* net_ = nullptr;
   // In the order in which each is used by those below it.
   SharedSlot shared_;  // outlives who uses it
   std::unique_ptr<HeadSender> sender_;
   std::unique_ptr<StreamHub> hub_;
   std::unique_ptr<StateSource> source_;
-  std::unique_ptr<SessionDesk> desk_;
+  std::unique_ptr<SessionManager> manager_;
 
   mutable std::mutex idle_passes_mutex_;  // guards the two below
   mutable LookDesc idle_look_;

@@ -12,7 +12,7 @@
 #include "common/base/worker_pool.h"
 #include "common/log/log.h"
 #include "server/app/head_files.h"
-#include "server/app/live_desk.h"
+#include "server/app/live_manager.h"
 #include "server/app/process_metrics.h"
 #include "server/app/served_head.h"
 #include "server/app/server_metrics.h"
@@ -81,7 +81,7 @@ class Server::State {
 
  private:
   Status open_live();
-  void record(RecordDesk& own, const RecordCommand& command) const;
+  void record(RecordManager& own, const RecordCommand& command) const;
   Status listen();
   void run_status();
   std::vector<PaintedHead> other_heads(size_t own) const;
@@ -90,8 +90,8 @@ class Server::State {
 
   const ServerConfig config_;
   std::vector<std::unique_ptr<ServedHead>> heads_;  // the scene's own first
-  std::unique_ptr<LiveDesk> live_;                  // null where the scene asks for none
-  std::unique_ptr<RecordDesks> records_;            // of several heads, where they may be recorded
+  std::unique_ptr<LiveManager> live_;               // null where the scene asks for none
+  std::unique_ptr<RecordManagers> records_;         // of several heads, where they may be recorded
   std::unique_ptr<NetServer> net_;
 
   std::mutex mutex_;  // guards has_stopped_
@@ -130,7 +130,7 @@ std::vector<PaintedHead> Server::State::other_heads(size_t own) const {
 }
 
 /// Of all heads, where there are several. Nobody waits for the answer, so the log has it.
-void Server::State::record(RecordDesk& own, const RecordCommand& command) const {
+void Server::State::record(RecordManager& own, const RecordCommand& command) const {
   const auto reply = [](const Notice& said) {
     if (said.is_error)
       log_warn("record", "{}", said.text);
@@ -151,19 +151,19 @@ void Server::State::record(RecordDesk& own, const RecordCommand& command) const 
 
 /// The sockets of live motion capture, where any is asked for.
 Status Server::State::open_live() {
-  std::vector<LiveDesk::Target> targets;
+  std::vector<LiveManager::Target> targets;
   bool is_wanted = false;
   for (const auto& head : heads_) {
     targets.push_back(head->live_target());
     if (heads_.size() > 1) targets.back().head = head->name();
-    if (RecordDesk* const own = head->records(); own != nullptr)
+    if (RecordManager* const own = head->records(); own != nullptr)
       targets.back().listener.on_record = [this, own](const RecordCommand& command) {
         record(*own, command);
       };
     is_wanted = is_wanted || !targets.back().live.empty();
   }
   if (!is_wanted) return {};
-  ASSIGN_OR_RETURN(live_, LiveDesk::open(std::move(targets), config_.live_allowed));
+  ASSIGN_OR_RETURN(live_, LiveManager::open(std::move(targets), config_.live_allowed));
   return {};
 }
 
@@ -178,9 +178,9 @@ Status Server::State::listen() {
       whole.sources.push_back(&head->source());
     }
   if (heads_.size() > 1 && heads_.front()->records() != nullptr) {
-    std::vector<RecordDesks::Of> records;
+    std::vector<RecordManagers::Of> records;
     for (const auto& head : heads_) records.push_back({head->name(), head->records()});
-    records_ = std::make_unique<RecordDesks>(std::move(records));
+    records_ = std::make_unique<RecordManagers>(std::move(records));
   }
   whole.records = records_.get();
   std::vector<NetHead> heads;

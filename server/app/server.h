@@ -13,7 +13,7 @@
 #include "common/base/result.h"
 #include "common/scene/scene_desc.h"
 #include "server/app/head_sender.h"
-#include "server/app/record_desk.h"
+#include "server/app/record_manager.h"
 #include "server/app/stage_clock.h"
 #include "server/encode/picture_painter.h"
 #include "server/input/input_hub.h"

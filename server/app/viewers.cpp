@@ -73,7 +73,7 @@ Demand Viewers::demand_of(const Viewer& viewer, const Subscription& wanted, cons
 /// On an error the viewer stays as it was.
 Status Viewers::change(Viewer& viewer, Subscription wanted, const PictureView& view) {
   ASSIGN_OR_RETURN(wanted.pictures.picture_class,
-                   desk_.set_demand(viewer.reader, demand_of(viewer, wanted, view)));
+                   demand_sink_.set_demand(viewer.reader, demand_of(viewer, wanted, view)));
   *viewer.subscription = std::move(wanted);
   viewer.view = view;
   return {};
@@ -98,7 +98,7 @@ Result<Viewers::Place> Viewers::add(SessionId session, ReaderId reader, Subscrip
   RenderSize wished = scene_picture_size(scene_);
   if (hello.frame_width > 0) wished.width = hello.frame_width;
   if (hello.frame_height > 0) wished.height = hello.frame_height;
-  place.size = fit_picture(wished, desk_.picture_budget());
+  place.size = fit_picture(wished, demand_sink_.picture_budget());
   viewer.size = place.size;
   viewer.view = make_scene_view(scene_, place.size, hello.picture_codecs);
   viewer.ladder = make_picture_ladder(viewer.view.codec, viewer.view.quality);
@@ -160,7 +160,7 @@ Result<std::string> Viewers::set_window(SessionId session, const WindowChange& w
   RenderSize wished = viewer.size;
   if (window.frame_width > 0) wished.width = window.frame_width;
   if (window.frame_height > 0) wished.height = window.frame_height;
-  RenderSize size = fit_picture(wished, desk_.picture_budget());
+  RenderSize size = fit_picture(wished, demand_sink_.picture_budget());
   if (viewer.view.codec == PictureCodec::H264)
     size = {size.width - size.width % kH264SizeStep, size.height - size.height % kH264SizeStep};
   PictureView view = viewer.view;

@@ -40,8 +40,8 @@ class Viewers {
     PictureView view;
   };
 
-  /// Makes an empty set; `desk` must outlive it.
-  Viewers(const SceneDesc& scene, DemandDesk& desk) : scene_(scene), desk_(desk) {}
+  /// Makes an empty set; `demand_sink` must outlive it.
+  Viewers(const SceneDesc& scene, DemandSink& demand_sink) : scene_(scene), demand_sink_(demand_sink) {}
 
   /// Sets the camera of viewers that join from now on, until they send their own.
   void set_scene_camera(const CameraDesc& camera) { scene_.camera = camera; }
@@ -129,7 +129,7 @@ class Viewers {
 
   SceneDesc scene_;
   std::map<SessionId, Viewer> viewers_;
-  DemandDesk& desk_;
+  DemandSink& demand_sink_;
   std::atomic<uint32_t> viewer_count_{0};
 };
 

@@ -111,10 +111,11 @@ void InputHub::accept(Stream<Value>& stream, uint64_t source_id, const TimedSamp
     if (stream.owner && sample.arrival_ns - stream.accepted_ns <= stale_ns) {
       ++counters_.not_owner;
       const uint64_t owner = *stream.owner;
-      tell_refusal(source_id, fmt::format("{} sends, and one at a time is heard",
-                                          owner < kFirstLiveSourceId
-                                              ? fmt::format("source {}", owner)
-                                              : fmt::format("live input {}", owner - kFirstLiveSourceId + 1)));
+      tell_refusal(source_id,
+                   fmt::format("{} sends, and one at a time is heard",
+                               owner < kFirstLiveSourceId
+                                   ? fmt::format("source {}", owner)
+                                   : fmt::format("live input {}", owner - kFirstLiveSourceId + 1)));
       return;
     }
     stream.owner = source_id;

@@ -4,13 +4,13 @@
 #include <utility>
 
 #include "common/log/log.h"
-#include "server/app/session_desk.h"
+#include "server/app/session_manager.h"
 
 namespace strandcast {
 
-Relay::Relay(const RelayConfig& config) : voices_(config.upstream, config.idle_voice_ns) {
+Relay::Relay(const RelayConfig& config) : uplinks_(config.upstream, config.idle_uplink_ns) {
   const bool has_all_heads = config.upstream.head.empty();
-  const RelayDeskParts parts{make_start_id(), has_all_heads, voices_, [this] { return counters(); }};
+  const RelayManagerParts parts{make_start_id(), has_all_heads, uplinks_, [this] { return counters(); }};
   for (size_t i = 0; i < (has_all_heads ? kMaxHeads : 1); ++i)
     heads_.push_back(std::make_unique<RelayedHead>(config.upstream, parts, i));
 }
@@ -20,15 +20,15 @@ Result<std::unique_ptr<Relay>> Relay::start(const RelayConfig& config) {
   NetConfig net = config.net;
   net.page = built_in_page();
   std::vector<NetHead> places;
-  for (const auto& head : relay->heads_) places.push_back({.name = {}, .handler = &head->desk});
+  for (const auto& head : relay->heads_) places.push_back({.name = {}, .handler = &head->manager});
   ASSIGN_OR_RETURN(relay->net_, NetServer::listen(net, std::move(places)));
-  relay->voices_.start(*relay->net_);
+  relay->uplinks_.start(*relay->net_);
   for (size_t i = 0; i < relay->heads_.size(); ++i) {
-    RelayDesk& desk = relay->heads_[i]->desk;
-    desk.connect(*relay->net_);
+    RelayManager& manager = relay->heads_[i]->manager;
+    manager.connect(*relay->net_);
     Upstream::Hooks hooks;
-    hooks.on_relayed = [&desk](RelayedPtr relayed) { desk.set_relayed(std::move(relayed)); };
-    hooks.on_camera = [&desk](const CameraChange& camera) { desk.move_views(camera); };
+    hooks.on_relayed = [&manager](RelayedPtr relayed) { manager.set_relayed(std::move(relayed)); };
+    hooks.on_camera = [&manager](const CameraChange& camera) { manager.move_views(camera); };
     hooks.on_heads = [self = relay.get(), i](const std::vector<std::string>& names) {
       if (i == 0) self->follow_heads(names);
     };
@@ -56,7 +56,7 @@ void Relay::follow_heads(const std::vector<std::string>& names) {
 
 uint32_t Relay::viewer_count() const {
   uint32_t viewers = 0;
-  for (const auto& head : heads_) viewers += head->desk.viewer_count();
+  for (const auto& head : heads_) viewers += head->manager.viewer_count();
   return viewers;
 }
 
@@ -73,14 +73,14 @@ Status Relay::readiness() const {
 
 bool Relay::is_shut_down_wanted() const {
   return std::any_of(heads_.begin(), heads_.end(),
-                     [](const auto& head) { return head->desk.is_shut_down_wanted(); });
+                     [](const auto& head) { return head->manager.is_shut_down_wanted(); });
 }
 
 void Relay::stop() {
   // Viewers first, so that they hear of it; then the first head, which has the others followed.
   if (net_ != nullptr) net_->stop();
   for (const auto& head : heads_) head->upstream.stop();
-  voices_.stop();
+  uplinks_.stop();
 }
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
 // Relay: passes the streams of another server, or relay, on to viewers of its own: no scene, no simulation.
-// Threads: the network's; for each head one for its streams and one for its voices; one for each session at
+// Threads: the network's; for each head one for its streams and one for its uplinks; one for each session at
 // the server above. Several relays may live in one process.
 #pragma once
 
@@ -8,14 +8,14 @@
 #include <optional>
 #include <vector>
 
-#include "server/relay/relay_desk.h"
+#include "server/relay/relay_manager.h"
 
 namespace strandcast {
 
 struct RelayConfig {
   NetConfig net;
   UpstreamConfig upstream;
-  int64_t idle_voice_ns = kIdleVoiceNs;
+  int64_t idle_uplink_ns = kIdleUplinkNs;
 };
 
 class Relay {
@@ -49,17 +49,17 @@ class Relay {
   /// One head, or a place for one that the server above may have.
   struct RelayedHead {
     Upstream upstream;
-    RelayDesk desk;
+    RelayManager manager;
 
-    RelayedHead(const UpstreamConfig& config, const RelayDeskParts& parts, size_t number)
-        : upstream(config, parts.id, number), desk(parts, upstream, number) {}
+    RelayedHead(const UpstreamConfig& config, const RelayManagerParts& parts, size_t number)
+        : upstream(config, parts.id, number), manager(parts, upstream, number) {}
   };
 
   explicit Relay(const RelayConfig& config);
   void follow_heads(const std::vector<std::string>& names);
 
   // In the order in which each is used by those below it.
-  Voices voices_;
+  Uplinks uplinks_;
   std::vector<std::unique_ptr<RelayedHead>> heads_;  // the first first
   std::unique_ptr<NetServer> net_;
 };

@@ -51,7 +51,7 @@ class SimulationSource : public StateSource {
       told_ = look_of(scene_);
     }
     ASSIGN_OR_RETURN(loop_, SimLoop::start(std::move(config), inputs_, sink));
-    teller_ = std::jthread([this](const std::stop_token& stop) {
+    announcer_ = std::jthread([this](const std::stop_token& stop) {
       name_thread("look");
       tell_late_looks(stop);
     });
@@ -59,7 +59,7 @@ class SimulationSource : public StateSource {
   }
   void stop() override {
     if (loop_ != nullptr) loop_->stop();
-    teller_ = {};  // told to stop, and waited for
+    announcer_ = {};  // told to stop, and waited for
     const std::lock_guard telling(telling_mutex_);
     const std::lock_guard lock(mutex_);
     sink_ = nullptr;
@@ -140,7 +140,7 @@ class SimulationSource : public StateSource {
 
   bool has_other_look() const { return sink_ != nullptr && look_of(scene_) != told_; }
 
-  /// Of many changes in a short time only the last is told, by teller_.
+  /// Of many changes in a short time only the last is told, by announcer_.
   void tell_look() {
     const std::lock_guard telling(telling_mutex_);
     LookChange look;
@@ -181,7 +181,7 @@ class SimulationSource : public StateSource {
   uint32_t looks_in_loop_ = 0;  // that move hair, or came after one that does
 
   std::unique_ptr<SimLoop> loop_;  // null before start()
-  std::jthread teller_;
+  std::jthread announcer_;
 };
 
 }  // namespace

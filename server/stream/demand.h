@@ -26,9 +26,9 @@ struct Demand {
 };
 
 /// Interface through which readers state their demands.
-class DemandDesk {
+class DemandSink {
  public:
-  virtual ~DemandDesk() = default;
+  virtual ~DemandSink() = default;
   /// Replaces the reader's demand and returns the class of its pictures, 0 without pictures. Unavailable or
   /// BadInput as in PictureViews::assign(), NotFound for an unknown reader; then the previous demand stays.
   virtual Result<PictureClass> set_demand(ReaderId reader, const Demand& demand) = 0;

@@ -29,7 +29,7 @@ struct SourceDemand {
   bool is_watched() const { return has_state_readers || facts.strand_viewers + facts.frame_viewers > 0; }
 };
 
-class DemandBook : public DemandDesk {
+class DemandBook : public DemandSink {
  public:
   /// Makes an empty book. `scene_view` as in PictureViews; `picture_source` is the strand stream from which
   /// pictures are drawn.

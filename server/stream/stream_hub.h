@@ -38,7 +38,7 @@ struct StreamHubConfig {
   std::string picture_codec = {};  // that pictures are drawn from; empty = what every viewer can decode
 };
 
-class StreamHub : public StateSink, public DemandDesk {
+class StreamHub : public StateSink, public DemandSink {
  public:
   /// Makes the hub. NotFound for an unknown codec. Starts only the frame thread, which sleeps.
   static Result<std::unique_ptr<StreamHub>> make(StreamHubConfig config);

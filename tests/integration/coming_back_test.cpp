@@ -365,8 +365,8 @@ TEST(ComingBack, ASilentConnectionThatSpeaksFirstStays) {
 TEST(ComingBack, AFrameInsteadOfAWelcomeIsNotFinal) {
   const Door door({[](FakePeer& peer) {
                      peer.upgrade();
-                     constexpr std::array<std::byte, 5> kRandom = {std::byte{0xe7}, std::byte{0x11}, std::byte{0x5a},
-                                                                   std::byte{0x03}, std::byte{0xff}};
+                     constexpr std::array<std::byte, 5> kRandom = {
+                         std::byte{0xe7}, std::byte{0x11}, std::byte{0x5a}, std::byte{0x03}, std::byte{0xff}};
                      peer.send_bytes(kRandom);
                      peer.read_to_end();
                    },
@@ -432,12 +432,12 @@ TEST(ComingBack, AHeadlessReportAddsUpOverConnections) {
 
 TEST(ComingBack, AReportIsWrittenThoughTheEndIsFinal) {
   const Door door({[](FakePeer& peer) {
-                     peer.welcome(make_welcome(kStrands, kVertices));
-                     peer.send(*asset_frame());
-                     peer.send(*keyframe(1));
-                     peer.read_until<FrameAck>();
-                     peer.close(static_cast<uint16_t>(CloseCode::Kicked), "for a test");
-                   }});
+    peer.welcome(make_welcome(kStrands, kVertices));
+    peer.send(*asset_frame());
+    peer.send(*keyframe(1));
+    peer.read_until<FrameAck>();
+    peer.close(static_cast<uint16_t>(CloseCode::Kicked), "for a test");
+  }});
   const TemporaryFolder folder;
   ViewOptions options;
   options.address = {"127.0.0.1", door.port()};
@@ -484,8 +484,7 @@ TEST(ComingBack, WhoIsBehindARelayKnowsThatTheServerIsAway) {
       if (has_joined || !peer.send(Pong{ping->client_time_ns, now_ns(), now_ns()})) break;
     peer.reset();
   }};
-  for (int i = 0; i < 3; ++i)
-    scripts.emplace_back([](FakePeer& peer) { peer.answer_http(503, "not yet"); });
+  for (int i = 0; i < 3; ++i) scripts.emplace_back([](FakePeer& peer) { peer.answer_http(503, "not yet"); });
   scripts.emplace_back([](FakePeer& peer) { serve(peer, 2); });
   const Door above(scripts);
   RelayConfig config;
@@ -579,7 +578,7 @@ TEST(ComingBack, AFeederGoesOnWithTheMotionWhereItWas) {
   EXPECT_LT(after_m.front() - before_m.back(), done->outage_s) << "the motion has waited";
 }
 
-// Nobody above hears it, as behind a relay all of whose voices are taken.
+// Nobody above hears it, as behind a relay all of whose uplinks are taken.
 TEST(ComingBack, AFeedThatIsNotHeardFails) {
   for (const bool is_heard : {true, false}) {
     std::atomic<bool> stop{false};

@@ -319,14 +319,14 @@ TEST_F(RecordCommands, ASenderOfMotionBeginsAndEndsTakes) {
   const uint16_t port = test::free_udp_port();
   on_stage.scene.live = {LiveDesc{.protocol = "vmc", .port = port}};
   if (!start(on_stage)) return;
-  test::UdpSocket desk;
+  test::UdpSocket manager;
   const auto is_recorded = [&] { return server_->counters().record.has_value(); };
   const std::vector<test::OscValue> slate = {std::string("12A/x"), int32_t{3}};
   for (const char* const name : {"12A_x-T03.mcap", "12A_x-T03-2.mcap"}) {
-    desk.send(test::osc("/strandcast/record/start", slate), port);
+    manager.send(test::osc("/strandcast/record/start", slate), port);
     ASSERT_TRUE(eventually(is_recorded)) << name;
     record_states(3);
-    desk.send(test::osc("/strandcast/record/stop", {}), port);
+    manager.send(test::osc("/strandcast/record/stop", {}), port);
     ASSERT_TRUE(eventually([&] { return !is_recorded(); }));
     const auto reader = RecordingReader::open(file(name));
     ASSERT_TRUE(reader) << reader.error().to_string();
@@ -410,12 +410,12 @@ TEST_F(RecordCommands, ASenderEndsNoRecordingThatBeganWithTheServer) {
   const uint16_t port = test::free_udp_port();
   both.scene.live = {LiveDesc{.protocol = "vmc", .port = port}};
   if (!start(both)) return;
-  test::UdpSocket desk;
-  desk.send(test::osc("/strandcast/record/start", {std::string("12A")}), port);
+  test::UdpSocket manager;
+  manager.send(test::osc("/strandcast/record/start", {std::string("12A")}), port);
   ASSERT_TRUE(eventually([&] { return file_count() == 2u; }));
   record_states(3);
   for (int i = 0; i < 2; ++i) {
-    desk.send(test::osc("/strandcast/record/stop", {}), port);
+    manager.send(test::osc("/strandcast/record/stop", {}), port);
     record_states(10);
   }
   EXPECT_TRUE(server_->counters().record.has_value());

@@ -297,13 +297,13 @@ TEST_F(Relays, WhoOnlyAsksTakesNoSessionOfTheServers) {
   EXPECT_EQ(server_->counters().net.joined_sessions, sessions_before + 1);
 }
 
-// Who only watches leaves voices to those who steer and feed, also where all come from one address.
+// Who only watches leaves uplinks to those who steer and feed, also where all come from one address.
 TEST_F(Relays, ManyWatchersSilenceNobodyWhoSteers) {
   if (!begin()) return;
   const auto relay = relay_of(server_->port());
   ASSERT_NE(relay, nullptr);
   std::vector<std::unique_ptr<ViewerClient>> clients;
-  for (size_t i = 0; i < kMaxVoices; ++i) {
+  for (size_t i = 0; i < kMaxUplinks; ++i) {
     clients.push_back(speaker_at(*relay));
     ASSERT_NE(clients.back(), nullptr);
     ASSERT_TRUE(clients.back()->send(ParameterRequest{"solver", 0, true}));
@@ -316,9 +316,9 @@ TEST_F(Relays, ManyWatchersSilenceNobodyWhoSteers) {
         const auto* notice = std::get_if<Notice>(&event);
         refused += notice != nullptr && notice->is_error ? 1 : 0;
       }
-    return answered + refused == kMaxVoices;
+    return answered + refused == kMaxUplinks;
   }));
-  EXPECT_EQ(answered, kMaxVoicesPerAddress);
+  EXPECT_EQ(answered, kMaxUplinksPerAddress);
   const auto controller = speaker_at(*relay, Role::Controller);
   ASSERT_NE(controller, nullptr);
   ASSERT_TRUE(controller->send(ControlCommand{Command::Pause}));
@@ -333,12 +333,12 @@ TEST_F(Relays, ManyWatchersSilenceNobodyWhoSteers) {
   EXPECT_TRUE(relay->readiness().ok()) << "the stream goes on";
 }
 
-TEST_F(Relays, AVoiceThatSaysNothingIsClosedAndOpenedAgain) {
+TEST_F(Relays, AnUplinkThatSaysNothingIsClosedAndOpenedAgain) {
   if (!begin()) return;
   RelayConfig config;
   config.net.port = 0;
   config.upstream.address = {"127.0.0.1", server_->port()};
-  config.idle_voice_ns = 1;
+  config.idle_uplink_ns = 1;
   auto relay = Relay::start(config);
   ASSERT_TRUE(relay) << relay.error().to_string();
   ASSERT_TRUE(eventually([&] { return (*relay)->readiness().ok(); }));

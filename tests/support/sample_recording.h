@@ -88,7 +88,7 @@ inline std::vector<RecordedMessage> sample_recorded_messages() {
       RecordedMotion{3, 77, motion},
       RecordedWind{4, 78, {{{-7, {1.5f, -3.0f, 0.25f}}}}},
       step,
-      RecordedChange{12, SetParameter{"wind.mean_mps.x=3"}, "session 5 (controller 'desk')", {true, "no"}},
+      RecordedChange{12, SetParameter{"wind.mean_mps.x=3"}, "session 5 (controller 'manager')", {true, "no"}},
       RecordedChange{13, ControlCommand{Command::Reset}, "", {false, "done"}},
       RecordedStream{14, "delta", 2e-4},
       RecordedState{15, 250'000'000, 0xfedcba9876543210u, Timecode{{25, 1}, false, 1}},

@@ -41,9 +41,9 @@ VALUES = {
     "kMaxHttpReadBytes": 8 * 1024 + 1, "kCatchUpShare": 0.125, "kJobShare": 0.25, "kBlockingShare": 0.25,
     "wrong_token_window_ms": 60e3, "wrong_token_block_ms": 60e3}
 # A row names these by their header.
-OF_HEADER = {"server/relay/voices.h": {
-    "kMaxVoices": "40 of viewers", "kMaxWatchersVoices": "24 watchers", "kMaxVoicesPerAddress": "of one address 12", "kSpeakAgainNs": "2 s",
-    "kIdleVoiceNs": "90 s"}}
+OF_HEADER = {"server/relay/uplinks.h": {
+    "kMaxUplinks": "40 of viewers", "kMaxWatchersUplinks": "24 watchers", "kMaxUplinksPerAddress": "of one address 12", "kSpeakAgainNs": "2 s",
+    "kIdleUplinkNs": "90 s"}}
 # Structs, or of two values in two places: their tests have them (PictureViews, LiveMocap, SnapshotTimeline, ClientHostile and the like).
 ELSEWHERE = {"kHardwareBudget", "kSoftwareBudget", "kReservedPictureClasses", "kMaxDatagramBytes", "kMaxMessageBytes", "kKeptSnapshots",
              "kMaxShownChars", "kStopGrace", "kFarewellTimeout", "kDoubtedServer"}
@@ -123,7 +123,7 @@ def planted(source, code=(), page=()):
 
 
 PLANTS = {
-    "a constant": {"code": ("kMaxVoices = 40", "kMaxVoices = 41")},
+    "a constant": {"code": ("kMaxUplinks = 40", "kMaxUplinks = 41")},
     "a unit": {"code": ("kMaxChainBytes = 16u << 20", "kMaxChainBytes = 16u << 10")},
     "a member": {"code": ("stalled_ms = 4'500", "stalled_ms = 4'600")},
     "a time": {"code": ("kSpeakAgainNs = 2'000'000'000", "kSpeakAgainNs = 200'000'000")},

@@ -22,7 +22,7 @@ MESSAGE = {
          "  uint32 toy_count = 2 [(is).range = \"1..9 toys\", (is).init = \"2\"];  // at once\n}\n\nmessage ClientMessage {"),
         ("    RecordCommand record_command", "    ToyRequest toy_request = 60 [(is).from = \"steers\"];\n    RecordCommand record_command"),
     ],
-    "server/app/session_desk.cpp": [
+    "server/app/session_manager.cpp": [
         ("                        [](const auto&) {}},",
          "                        [&](const ToyRequest& toy) { net_->send(session, Notice{toy.toy_count > 1, toy.what}); },\n"
          "                        [](const auto&) {}},"),
@@ -37,7 +37,7 @@ MESSAGE_SHOWS = {
     "client/web/page/wire.ts": ["ToyRequest = { what: [1, 'string'], toy_count: [2, 'uint32'] }", "toy_request: [60, ToyRequest]"],
     "proto/WIRE.md": [", 60 ToyRequest, 28 RecordCommand |"],
 }
-MESSAGE_COMPILES = ["server/app/session_desk.cpp", "toy.cpp"]
+MESSAGE_COMPILES = ["server/app/session_manager.cpp", "toy.cpp"]
 # That the fields are walked as declared: a writer that knows two kinds of call.
 TOY = """#include "common/wire/message_fields_private.h"
 #include "tests/support/sample_messages.h"

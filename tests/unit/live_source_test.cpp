@@ -363,7 +363,7 @@ TEST(LiveSource, WishesToRecordComeFromWhoeverMaySendAndOneByOne) {
   int64_t now_ns = kStart;
   EXPECT_TRUE(source->take(kFirst, tracker("head", 1.0f), now_ns));
   EXPECT_FALSE(source->advance(now_ns).recording);
-  // From another port than the performer's: a desk, not the performer.
+  // From another port than the performer's: a manager, not the performer.
   const std::vector<test::OscValue> slate = {std::string("12A"), int32_t{3}};
   EXPECT_TRUE(source->take(kSecond, test::osc("/strandcast/record/start", slate), now_ns));
   EXPECT_TRUE(source->take(kSecond, test::osc("/strandcast/record/stop", {}), now_ns));

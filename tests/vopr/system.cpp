@@ -17,7 +17,7 @@
 #include "client/app/steady_client.h"
 #include "server/app/server.h"
 #include "server/relay/relay.h"
-#include "server/relay/voices.h"
+#include "server/relay/uplinks.h"
 #include "tests/vopr/book.h"
 #include "tests/vopr/disk.h"
 #include "tests/vopr/net.h"
@@ -472,7 +472,7 @@ void System::start() {
   std::vector<NodeId> way = cast_.way_from(kFeeder, cast_.stage_of_viewer[0]);
   way.push_back(kController);
   Party& feeder = book_.add("feeder", std::move(way), true);
-  feeder.slow_ns = kSpeakAgainNs + kS;  // a relay's voice, and a status later
+  feeder.slow_ns = kSpeakAgainNs + kS;  // a relay's uplink, and a status later
   Party& controller = book_.add("controller", ways_.back(), false);
   controller_ = std::make_unique<Controller>(controller, feeder, book_, plants_);
   feeder_ = std::make_unique<Feeder>(cast_.stage_of_viewer[0], plants_);

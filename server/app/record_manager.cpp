@@ -1,4 +1,4 @@
-#include "server/app/record_desk.h"
+#include "server/app/record_manager.h"
 
 #include <algorithm>
 #include <array>
@@ -9,6 +9,7 @@
 #include "common/base/thread_name.h"
 #include "common/log/log.h"
 #include "server/app/head_files.h"
+#include "server/app/joined_answers.h"
 #include "server/net/roles.h"
 
 namespace strandcast {
@@ -122,8 +123,8 @@ std::string recording_file_name(const std::string& scene, int64_t unix_time_s) {
   return stem + time + kEnding;
 }
 
-Result<std::unique_ptr<RecordDesk>> RecordDesk::make(const std::optional<RecordConfig>& first,
-                                                     const std::optional<RecordFolder>& folder) {
+Result<std::unique_ptr<RecordManager>> RecordManager::make(const std::optional<RecordConfig>& first,
+                                                           const std::optional<RecordFolder>& folder) {
   std::optional<RecordFolder> whole = folder;
   if (whole) {
     std::error_code failure;
@@ -133,23 +134,23 @@ Result<std::unique_ptr<RecordDesk>> RecordDesk::make(const std::optional<RecordC
       return at(folder->path.string(),
                 make_error(ErrorCode::NotFound, "no folder for recordings can be made here (--record-dir)"));
   }
-  std::unique_ptr<RecordDesk> desk(new RecordDesk(std::move(whole)));
+  std::unique_ptr<RecordManager> manager(new RecordManager(std::move(whole)));
   if (first) {
-    ASSIGN_OR_RETURN(desk->whole_, Recorder::make(*first));
+    ASSIGN_OR_RETURN(manager->whole_, Recorder::make(*first));
   }
-  return desk;
+  return manager;
 }
 
-RecordDesk::~RecordDesk() {
+RecordManager::~RecordManager() {
   stop();
 }
 
-Status RecordDesk::attach(Stream stream) {
+Status RecordManager::attach(Stream stream) {
   stream_.emplace(std::move(stream));
   return whole_ != nullptr ? whole_->attach(stream_->hub) : Status();
 }
 
-void RecordDesk::begin() {
+void RecordManager::begin() {
   if (whole_ != nullptr) {
     whole_->set_shared(stream_->is_shared);
     whole_->begin(stream_->describe(), stream_->asset());
@@ -158,12 +159,12 @@ void RecordDesk::begin() {
   if (folder_->file_ending.empty())
     log_info("record", "who controls may record into {}", folder_->path.string());
   thread_ = std::thread([this] {
-    name_thread("record/desk");
+    name_thread("record/manager");
     run();
   });
 }
 
-void RecordDesk::stop() {
+void RecordManager::stop() {
   {
     const std::lock_guard lock(mutex_);
     is_stopping_ = true;
@@ -173,19 +174,19 @@ void RecordDesk::stop() {
   for (const auto& recorder : recorders()) recorder->stop();
 }
 
-std::vector<std::shared_ptr<Recorder>> RecordDesk::recorders() const {
+std::vector<std::shared_ptr<Recorder>> RecordManager::recorders() const {
   const std::lock_guard lock(mutex_);
   std::vector<std::shared_ptr<Recorder>> all = {whole_, take_};
   std::erase(all, nullptr);
   return all;
 }
 
-bool RecordDesk::has_take() const {
+bool RecordManager::has_take() const {
   const std::lock_guard lock(mutex_);
   return take_ != nullptr;
 }
 
-void RecordDesk::obey(const RecordCommand& command, Reply reply) {
+void RecordManager::obey(const RecordCommand& command, Reply reply) {
   if (!folder_) return reply(Notice{true, kNoRecordings});
   {
     const std::lock_guard lock(mutex_);
@@ -198,7 +199,7 @@ void RecordDesk::obey(const RecordCommand& command, Reply reply) {
   changed_.notify_all();
 }
 
-void RecordDesk::run() {
+void RecordManager::run() {
   std::unique_lock lock(mutex_);
   while (!is_stopping_) {
     const auto has_news = [this] { return is_stopping_ || order_.has_value(); };
@@ -217,7 +218,7 @@ void RecordDesk::run() {
   }
 }
 
-void RecordDesk::answer(const Order& order) {
+void RecordManager::answer(const Order& order) {
   const Notice said = carry_out(order.command);
   {
     // Whoever has the answer may ask for more.
@@ -227,7 +228,7 @@ void RecordDesk::answer(const Order& order) {
   order.reply(said);
 }
 
-Notice RecordDesk::carry_out(const RecordCommand& command) {
+Notice RecordManager::carry_out(const RecordCommand& command) {
   if (command.is_wanted) {
     const Result<std::string> begun = start_recording(command);
     return begun ? Notice{false, *begun} : Notice{true, begun.error().to_string()};
@@ -238,7 +239,7 @@ Notice RecordDesk::carry_out(const RecordCommand& command) {
   return Notice{true, "Nothing is being recorded: record start begins it."};
 }
 
-Status RecordDesk::check_room() const {
+Status RecordManager::check_room() const {
   const std::string path = folder_->path.string();
   const auto free_bytes = folder_->free_bytes(folder_->path);
   if (free_bytes && *free_bytes < kMinFreeRecordBytes)
@@ -260,7 +261,7 @@ Status RecordDesk::check_room() const {
 }
 
 /// Of a file that is not there.
-Result<std::filesystem::path> RecordDesk::choose_path(const RecordCommand& command) const {
+Result<std::filesystem::path> RecordManager::choose_path(const RecordCommand& command) const {
   const auto is_there = [](const std::filesystem::path& path) {
     std::error_code failure;
     return std::filesystem::symlink_status(path, failure).type() != std::filesystem::file_type::not_found;
@@ -280,7 +281,7 @@ Result<std::filesystem::path> RecordDesk::choose_path(const RecordCommand& comma
 }
 
 /// A file that is there by then; all heads together keep the limits of the folder.
-Result<std::unique_ptr<Recorder>> RecordDesk::make_recorder(const RecordCommand& command) const {
+Result<std::unique_ptr<Recorder>> RecordManager::make_recorder(const RecordCommand& command) const {
   const std::lock_guard lock(*folder_->beginning);
   ASSIGN_OR_RETURN(const std::filesystem::path path, choose_path(command));
   RETURN_IF_ERROR(check_room());
@@ -289,7 +290,7 @@ Result<std::unique_ptr<Recorder>> RecordDesk::make_recorder(const RecordCommand&
 
 /// Gives the step from which on it is so; `at_change` is called there, between two steps. Waits for the
 /// source, and only as long as that can answer.
-Result<uint64_t> RecordDesk::change_tap(StepTap* tap, std::function<void()> at_change) {
+Result<uint64_t> RecordManager::change_tap(StepTap* tap, std::function<void()> at_change) {
   const auto tapped = std::make_shared<Tapped>();
   stream_->source.set_tap(tap, [tapped, at_change = std::move(at_change)](uint64_t tick) {
     if (at_change) at_change();
@@ -311,7 +312,7 @@ Result<uint64_t> RecordDesk::change_tap(StepTap* tap, std::function<void()> at_c
 }
 
 /// One sentence of where it is.
-Result<std::string> RecordDesk::start_recording(const RecordCommand& command) {
+Result<std::string> RecordManager::start_recording(const RecordCommand& command) {
   for (const auto& present : recorders()) {
     if (present->failure()) {
       end(present);
@@ -339,7 +340,7 @@ Result<std::string> RecordDesk::start_recording(const RecordCommand& command) {
 }
 
 /// One sentence of what was recorded.
-std::string RecordDesk::end(const std::shared_ptr<Recorder>& recorder) {
+std::string RecordManager::end(const std::shared_ptr<Recorder>& recorder) {
   Recorder* const other = recorder == whole_ ? take_.get() : whole_.get();
   // Steps and states end together. Without an answer the source has stopped, and tells nobody anything.
   if (change_tap(other, [recorder] { recorder->refuse(); })) recorder->await_last_strands();
@@ -360,7 +361,7 @@ std::string RecordDesk::end(const std::shared_ptr<Recorder>& recorder) {
 }
 
 /// A disk that somebody's recording fills up is no use to anybody.
-std::string RecordDesk::reason_to_end(const Recorder& recorder) const {
+std::string RecordManager::reason_to_end(const Recorder& recorder) const {
   if (const std::optional<Error> failure = recorder.failure()) return failure->to_string();
   // The one of --record is the owner's.
   if (&recorder == whole_.get()) return {};
@@ -369,7 +370,7 @@ std::string RecordDesk::reason_to_end(const Recorder& recorder) const {
   return fmt::format("{:.1f} GB are free on its disk", static_cast<double>(*free_bytes) / kBytesPerGb);
 }
 
-void RecordDesk::watch() {
+void RecordManager::watch() {
   for (const auto& recorder : recorders()) {
     const std::string reason = reason_to_end(*recorder);
     if (reason.empty()) continue;
@@ -380,14 +381,14 @@ void RecordDesk::watch() {
   }
 }
 
-std::optional<std::string> RecordDesk::slate() const {
+std::optional<std::string> RecordManager::slate() const {
   const std::lock_guard lock(mutex_);
   if (take_ != nullptr && !take_->failure()) return take_slate_;
   if (whole_ != nullptr && !whole_->failure()) return std::string();
   return std::nullopt;
 }
 
-std::string RecordDesk::text() const {
+std::string RecordManager::text() const {
   std::string text;
   for (const auto& recorder : recorders()) {
     const std::optional<Error> failure = recorder->failure();
@@ -398,7 +399,7 @@ std::string RecordDesk::text() const {
   return ended_;
 }
 
-void RecordDesk::add(const ServerStatus& status) {
+void RecordManager::add(const ServerStatus& status) {
   const auto all = recorders();
   if (all.empty()) return;
   const SimStats simulated = stream_->source.stats();
@@ -408,14 +409,14 @@ void RecordDesk::add(const ServerStatus& status) {
   }
 }
 
-std::optional<Error> RecordDesk::failure() const {
+std::optional<Error> RecordManager::failure() const {
   for (const auto& recorder : recorders())
     if (const auto failure = recorder->failure()) return at(recorder->path().string(), *failure);
   const std::lock_guard lock(mutex_);
   return lost_;
 }
 
-std::optional<RecordCounters> RecordDesk::counters() const {
+std::optional<RecordCounters> RecordManager::counters() const {
   std::optional<RecordCounters> sum;
   for (const auto& recorder : recorders()) {
     const RecordCounters one = recorder->counters();
@@ -438,6 +439,33 @@ std::optional<RecordCounters> RecordDesk::counters() const {
   const std::lock_guard lock(mutex_);
   if (!sum && lost_) return lost_counters_;
   return sum;
+}
+
+// ---- all heads ----
+
+void RecordManagers::obey(const RecordCommand& command, const RecordManager::Reply& reply) const {
+  std::vector<Of> asked = all_;
+  if (!command.is_wanted) std::erase_if(asked, [](const Of& one) { return one.manager->text().empty(); });
+  if (asked.empty()) return all_.front().manager->obey(command, reply);
+  std::vector<std::string> heads;
+  for (const Of& one : asked) heads.push_back(one.head);
+  const auto answers = std::make_shared<JoinedAnswers>(std::move(heads), reply);
+  for (size_t i = 0; i < asked.size(); ++i)
+    asked[i].manager->obey(command, [answers, i](Notice notice) { answers->take(i, std::move(notice)); });
+}
+
+std::string RecordManagers::text() const {
+  std::string text, others;
+  for (const Of& one : all_) {
+    const std::string of_head = one.manager->text();
+    std::string& where = of_head.empty() ? others : text;
+    where += fmt::format("{}{}",
+                         where.empty()     ? ""
+                         : of_head.empty() ? ", "
+                                           : " | ",
+                         of_head.empty() ? one.head : of_head);
+  }
+  return text.empty() || others.empty() ? text : fmt::format("{} | not of {}", text, others);
 }
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-#include "server/relay/voices.h"
+#include "server/relay/uplinks.h"
 
 #include <algorithm>
 #include <type_traits>
@@ -28,17 +28,17 @@ constexpr bool is_for_one = std::is_same_v<Message, Notice> || std::is_same_v<Me
 
 }  // namespace
 
-void Voices::start(NetServer& net) {
+void Uplinks::start(NetServer& net) {
   net_ = &net;
   thread_ = std::thread([this] { run(); });
 }
 
-void Voices::stop() {
+void Uplinks::stop() {
   {
     const std::lock_guard lock(mutex_);
     is_stopping_ = true;
-    for (auto& [session, voice] : voices_) end(voice);
-    voices_.clear();
+    for (auto& [session, uplink] : uplinks_) end(uplink);
+    uplinks_.clear();
     for (auto& [head, enquiry] : enquiries_) {
       if (enquiry.link == nullptr) continue;
       enquiry.link->begin_stop();
@@ -51,8 +51,8 @@ void Voices::stop() {
 }
 
 /// Waits for those that end, and ends those that are idle.
-void Voices::run() {
-  name_thread("voices");
+void Uplinks::run() {
+  name_thread("uplinks");
   std::unique_lock lock(mutex_);
   while (true) {
     changed_.wait_for(lock, kIdleLook, [this] { return is_stopping_ || !ended_.empty(); });
@@ -65,65 +65,65 @@ void Voices::run() {
   }
 }
 
-void Voices::end_idle(int64_t time_ns) {
-  for (auto& [session, voice] : voices_) {
-    if (voice.link == nullptr || voice.is_kept || time_ns - voice.said_ns < idle_ns_) continue;
-    end(voice);
-    voice.ended_ns = 0;
+void Uplinks::end_idle(int64_t time_ns) {
+  for (auto& [session, uplink] : uplinks_) {
+    if (uplink.link == nullptr || uplink.is_kept || time_ns - uplink.said_ns < idle_ns_) continue;
+    end(uplink);
+    uplink.ended_ns = 0;
   }
 }
 
-void Voices::end(Voice& voice) {
-  if (voice.link == nullptr) return;
-  voice.link->begin_stop();
-  ended_.push_back(std::move(voice.link));
-  voice.ended_ns = now_ns();
+void Uplinks::end(Uplink& uplink) {
+  if (uplink.link == nullptr) return;
+  uplink.link->begin_stop();
+  ended_.push_back(std::move(uplink.link));
+  uplink.ended_ns = now_ns();
   changed_.notify_all();
 }
 
 template <class IsOne>
-size_t Voices::count_open(IsOne is_one) const {
-  return static_cast<size_t>(std::count_if(voices_.begin(), voices_.end(), [&](const auto& entry) {
+size_t Uplinks::count_open(IsOne is_one) const {
+  return static_cast<size_t>(std::count_if(uplinks_.begin(), uplinks_.end(), [&](const auto& entry) {
     return entry.second.link != nullptr && is_one(entry.second);
   }));
 }
 
 /// Those who only watch leave places to others, and one address leaves some to other addresses.
-std::optional<Error> Voices::why_full(const Speaker& speaker) const {
-  const bool is_full = count_open([](const Voice&) { return true; }) >= kMaxVoices ||
+std::optional<Error> Uplinks::why_full(const Speaker& speaker) const {
+  const bool is_full = count_open([](const Uplink&) { return true; }) >= kMaxUplinks ||
                        (speaker.hello.role == Role::Viewer &&
-                        count_open([](const Voice& one) { return one.is_watcher; }) >= kMaxWatchersVoices);
+                        count_open([](const Uplink& one) { return one.is_watcher; }) >= kMaxWatchersUplinks);
   if (is_full)
     return make_error(ErrorCode::Unavailable,
                       "{} of this relay say something or get pictures already: try again later",
-                      speaker.hello.role == Role::Viewer ? fmt::format("{} viewers", kMaxWatchersVoices)
-                                                         : fmt::format("{} sessions", kMaxVoices));
+                      speaker.hello.role == Role::Viewer ? fmt::format("{} viewers", kMaxWatchersUplinks)
+                                                         : fmt::format("{} sessions", kMaxUplinks));
   const bool is_watcher = speaker.hello.role == Role::Viewer;
   const size_t of_address = count_open(
-      [&](const Voice& one) { return one.address == speaker.address && one.is_watcher == is_watcher; });
-  if (of_address < kMaxVoicesPerAddress) return std::nullopt;
+      [&](const Uplink& one) { return one.address == speaker.address && one.is_watcher == is_watcher; });
+  if (of_address < kMaxUplinksPerAddress) return std::nullopt;
   return make_error(ErrorCode::Unavailable,
                     "{} sessions of this address say something or get pictures already: try again later",
-                    kMaxVoicesPerAddress);
+                    kMaxUplinksPerAddress);
 }
 
 /// Returns the session's link, opened where there is none; null while no new one may be tried.
-UpstreamLink* Voices::find_or_open(const Speaker& speaker, const Hello& hello, size_t head) {
+UpstreamLink* Uplinks::find_or_open(const Speaker& speaker, const Hello& hello, size_t head) {
   if (is_stopping_) return nullptr;
   const SessionId session = speaker.session;
-  Voice& voice = voices_.try_emplace(session).first->second;
-  voice.said_ns = now_ns();
-  if (voice.link != nullptr) return voice.link.get();
-  if (voice.ended_ns != 0 && now_ns() - voice.ended_ns < kSpeakAgainNs) return nullptr;
+  Uplink& uplink = uplinks_.try_emplace(session).first->second;
+  uplink.said_ns = now_ns();
+  if (uplink.link != nullptr) return uplink.link.get();
+  if (uplink.ended_ns != 0 && now_ns() - uplink.ended_ns < kSpeakAgainNs) return nullptr;
   const bool has_pictures = !hello.gets_no_stream;
   if (const std::optional<Error> error = why_full(speaker)) {
-    voice.ended_ns = now_ns();
+    uplink.ended_ns = now_ns();
     tell(session, *error, has_pictures);
     return nullptr;
   }
-  voice.address = speaker.address;
-  voice.is_watcher = speaker.hello.role == Role::Viewer;
-  voice.is_kept = has_pictures;
+  uplink.address = speaker.address;
+  uplink.is_watcher = speaker.hello.role == Role::Viewer;
+  uplink.is_kept = has_pictures;
   UpstreamLink::Hooks hooks;
   hooks.on_welcome = [](const Welcome&) { return Status(); };
   hooks.on_event = [this, session, head, has_pictures](ClientEvent event) {
@@ -135,11 +135,11 @@ UpstreamLink* Voices::find_or_open(const Speaker& speaker, const Hello& hello, s
   hooks.on_lost = [this, session, has_pictures](const Error& error) {
     return on_lost(session, error, has_pictures);
   };
-  voice.link = std::make_unique<UpstreamLink>(client_config_for(config_, hello), std::move(hooks));
-  return voice.link.get();
+  uplink.link = std::make_unique<UpstreamLink>(client_config_for(config_, hello), std::move(hooks));
+  return uplink.link.get();
 }
 
-void Voices::say(const Speaker& speaker, const ClientMessage& message) {
+void Uplinks::say(const Speaker& speaker, const ClientMessage& message) {
   const auto* request = std::get_if<ParameterRequest>(&message);
   if (request != nullptr && !request->is_watching) return ask(speaker, *request);
   const Hello& viewer = speaker.hello;
@@ -155,10 +155,10 @@ void Voices::say(const Speaker& speaker, const ClientMessage& message) {
   link->send(message);
   // What is watched comes without another word.
   if (request != nullptr || std::holds_alternative<StateTimesRequest>(message))
-    voices_[speaker.session].is_kept = true;
+    uplinks_[speaker.session].is_kept = true;
 }
 
-void Voices::open_pictures(const Speaker& speaker, size_t head) {
+void Uplinks::open_pictures(const Speaker& speaker, size_t head) {
   Hello hello = speaker.hello;
   hello.acknowledges = false;
   const std::lock_guard lock(mutex_);
@@ -168,7 +168,7 @@ void Voices::open_pictures(const Speaker& speaker, size_t head) {
 // ---- questions ----
 
 /// Anybody whom the relay lets in may ask: the relay asks in its own name, and answers come in order.
-void Voices::ask(const Speaker& speaker, const ParameterRequest& request) {
+void Uplinks::ask(const Speaker& speaker, const ParameterRequest& request) {
   const std::lock_guard lock(mutex_);
   if (is_stopping_) return;
   Enquiry& enquiry = enquiries_[speaker.hello.head];
@@ -180,7 +180,7 @@ void Voices::ask(const Speaker& speaker, const ParameterRequest& request) {
   open_enquiry(speaker.hello.head, enquiry).send(request);
 }
 
-UpstreamLink& Voices::open_enquiry(const std::string& head, Enquiry& enquiry) {
+UpstreamLink& Uplinks::open_enquiry(const std::string& head, Enquiry& enquiry) {
   if (enquiry.link != nullptr) return *enquiry.link;
   Hello hello;
   hello.name = "relay";
@@ -196,7 +196,7 @@ UpstreamLink& Voices::open_enquiry(const std::string& head, Enquiry& enquiry) {
 }
 
 /// A list, or an error instead of it; what everybody is told comes from elsewhere.
-void Voices::on_answer(const std::string& head, ClientEvent event) {
+void Uplinks::on_answer(const std::string& head, ClientEvent event) {
   auto* list = std::get_if<ParameterList>(&event);
   auto* notice = std::get_if<Notice>(&event);
   if (list == nullptr && (notice == nullptr || !notice->is_error)) return;
@@ -212,7 +212,7 @@ void Voices::on_answer(const std::string& head, ClientEvent event) {
 }
 
 /// The next question opens it again.
-bool Voices::on_enquiry_lost(const std::string& head, const Error& error) {
+bool Uplinks::on_enquiry_lost(const std::string& head, const Error& error) {
   const std::lock_guard lock(mutex_);
   Enquiry& enquiry = enquiries_[head];
   if (enquiry.link != nullptr) {
@@ -227,36 +227,36 @@ bool Voices::on_enquiry_lost(const std::string& head, const Error& error) {
 
 // ---- how they end ----
 
-void Voices::request_picture(SessionId session) {
+void Uplinks::request_picture(SessionId session) {
   const std::lock_guard lock(mutex_);
-  const auto found = voices_.find(session);
-  if (found != voices_.end() && found->second.link != nullptr) found->second.link->request_keyframe();
+  const auto found = uplinks_.find(session);
+  if (found != uplinks_.end() && found->second.link != nullptr) found->second.link->request_keyframe();
 }
 
-void Voices::leave(SessionId session) {
+void Uplinks::leave(SessionId session) {
   const std::lock_guard lock(mutex_);
-  const auto found = voices_.find(session);
-  if (found == voices_.end()) return;
+  const auto found = uplinks_.find(session);
+  if (found == uplinks_.end()) return;
   end(found->second);
-  voices_.erase(found);
+  uplinks_.erase(found);
 }
 
-size_t Voices::count() const {
+size_t Uplinks::count() const {
   const std::lock_guard lock(mutex_);
   const auto enquiries = std::count_if(enquiries_.begin(), enquiries_.end(),
                                        [](const auto& entry) { return entry.second.link != nullptr; });
-  return count_open([](const Voice&) { return true; }) + static_cast<size_t>(enquiries);
+  return count_open([](const Uplink&) { return true; }) + static_cast<size_t>(enquiries);
 }
 
 /// Who came for pictures has nothing else to stay for.
-void Voices::tell(SessionId session, const Error& error, bool has_pictures) {
+void Uplinks::tell(SessionId session, const Error& error, bool has_pictures) {
   if (has_pictures)
     net_->close(session, close_code_for(error), error.to_string());
   else
     net_->send(session, Notice{true, error.to_string()});
 }
 
-void Voices::on_event(SessionId session, size_t head, ClientEvent event) {
+void Uplinks::on_event(SessionId session, size_t head, ClientEvent event) {
   if (auto* media = std::get_if<MediaEvent>(&event)) {
     const Opcode opcode = media->header.opcode;
     if (is_chained_picture(opcode) || opcode == Opcode::JpegFrame)
@@ -271,10 +271,10 @@ void Voices::on_event(SessionId session, size_t head, ClientEvent event) {
       event);
 }
 
-bool Voices::on_lost(SessionId session, const Error& error, bool has_pictures) {
+bool Uplinks::on_lost(SessionId session, const Error& error, bool has_pictures) {
   const std::lock_guard lock(mutex_);
-  const auto found = voices_.find(session);
-  if (found == voices_.end()) return false;
+  const auto found = uplinks_.find(session);
+  if (found == uplinks_.end()) return false;
   end(found->second);
   tell(session, error, has_pictures);
   return false;

@@ -1,5 +1,6 @@
-// SessionDesk: the application's side of sessions: admits them, gives each a demand on the stream, forwards
-// their messages, and changes them between strands and pictures. Network thread, unless stated otherwise.
+// SessionManager: the application's side of sessions: admits them, gives each a demand on the stream,
+// forwards their messages, and changes them between strands and pictures. Network thread, unless stated
+// otherwise.
 #pragma once
 
 #include <atomic>
@@ -12,13 +13,12 @@
 #include <string_view>
 #include <vector>
 
-#include "server/app/codec_desk.h"
-#include "server/app/control_budget.h"
+#include "server/app/codec_manager.h"
 #include "server/app/frame_stages.h"
-#include "server/app/live_desk.h"
+#include "server/app/live_manager.h"
 #include "server/app/parameter_watch.h"
-#include "server/app/record_desks.h"
-#include "server/app/stream_teller.h"
+#include "server/app/record_manager.h"
+#include "server/app/stream_announcer.h"
 #include "server/app/viewers.h"
 #include "server/input/input_hub.h"
 #include "server/net/net_server.h"
@@ -28,15 +28,36 @@
 
 namespace strandcast {
 
+/// Sustained number of commands and changes per second of one controller.
+inline constexpr double kControlsPerS = 60.0;
+/// Number of commands and changes that a controller may send at once after a quiet time.
+inline constexpr double kControlBurst = 120.0;
+
+/// Limits how many commands and changes each controller may send; the simulation bounds their cost. Plain
+/// logic on given times.
+class ControlBudget {
+ public:
+  /// Counts one command or change; returns false if it exceeds the limit.
+  bool take(SessionId session, int64_t time_ns);
+  void remove(SessionId session) { buckets_.erase(session); }
+
+ private:
+  struct Bucket {
+    double left = kControlBurst;
+    int64_t time_ns = 0;
+  };
+  std::map<SessionId, Bucket> buckets_;
+};
+
 /// Returns 16 hex digits that differ at every start of a server or relay.
 std::string make_start_id();
 
 /// Makes the message of an asset. LimitExceeded if the asset is too large for a message.
 Result<EncodedFramePtr> make_asset_frame(const SceneAsset& asset);
 
-class SessionDesk : public NetHandler, private StreamReader {
+class SessionManager : public NetHandler, private StreamReader {
  public:
-  /// Objects that must outlive the desk. `asset` is the message for viewers of strands.
+  /// Objects that must outlive the manager. `asset` is the message for viewers of strands.
   struct Parts {
     const SceneDesc& scene;
     StreamHub& hub;
@@ -46,20 +67,20 @@ class SessionDesk : public NetHandler, private StreamReader {
     std::vector<StrandCodecInfo> codecs;  // that strands are served by, as served_codecs()
     EncodedFramePtr asset;
     bool is_drawn_by_processors = true;   // pictures
-    LiveDesk* live = nullptr;             // null: no live inputs
+    LiveManager* live = nullptr;          // null: no live inputs
     size_t head = 0;                      // number of this one among those of the server
     std::vector<std::string> heads = {};  // names of all where there are several
     /// Returns the scene with all heads as it runs; empty if there is no scene.
     std::function<std::optional<SceneDesc>()> whole_scene = {};
     /// Returns why that quality runs which does, where nobody has chosen it.
     std::function<std::string()> quality_reason = {};
-    RecordDesk* records = nullptr;             // null: nothing is recorded here
-    const RecordDesks* all_records = nullptr;  // of all heads, where there are several
-    std::vector<StateSource*> sources = {};    // likewise
+    RecordManager* records = nullptr;             // null: nothing is recorded here
+    const RecordManagers* all_records = nullptr;  // of all heads, where there are several
+    std::vector<StateSource*> sources = {};       // likewise
   };
-  explicit SessionDesk(Parts parts);
+  explicit SessionManager(Parts parts);
 
-  /// Connects the desk to the network before `net` starts; `net` must outlive the sessions.
+  /// Connects the manager to the network before `net` starts; `net` must outlive the sessions.
   void connect(NetServer& net);
   /// Sets the function that returns further lines for /metrics; any thread may call it.
   void set_metrics(std::function<std::string()> metrics) { metrics_ = std::move(metrics); }
@@ -126,8 +147,8 @@ class SessionDesk : public NetHandler, private StreamReader {
   const Parts parts_;
   const std::string session_id_;
   Viewers viewers_;
-  CodecDesk codecs_;
-  StreamTeller teller_;
+  CodecManager codecs_;
+  StreamAnnouncer announcer_;
   ControlBudget control_budget_;
   ControlBudget parameter_budget_;  // of requests for parameters
   ParameterWatch parameter_watch_;

@@ -1,4 +1,4 @@
-#include "server/app/live_desk.h"
+#include "server/app/live_manager.h"
 
 #include <algorithm>
 #include <utility>
@@ -69,19 +69,19 @@ Result<std::vector<std::string>> explain_live(const std::vector<LiveDesc>& live,
   return lines;
 }
 
-LiveDesk::LiveDesk(std::vector<Target> targets, std::vector<Input> inputs)
+LiveManager::LiveManager(std::vector<Target> targets, std::vector<Input> inputs)
     : targets_(std::move(targets)),
       inputs_(std::move(inputs)),
       lines_(RepeatLimits()),
       refusal_lines_(kRefusalLines),
       troubles_(inputs_.size()) {}
 
-LiveDesk::~LiveDesk() {
+LiveManager::~LiveManager() {
   stop();
 }
 
-Result<std::unique_ptr<LiveDesk>> LiveDesk::open(std::vector<Target> targets,
-                                                 const std::vector<AddressRange>& allowed) {
+Result<std::unique_ptr<LiveManager>> LiveManager::open(std::vector<Target> targets,
+                                                       const std::vector<AddressRange>& allowed) {
   std::vector<Input> inputs;
   std::vector<LivePort> ports;
   for (size_t head = 0; head < targets.size(); ++head) {
@@ -99,38 +99,38 @@ Result<std::unique_ptr<LiveDesk>> LiveDesk::open(std::vector<Target> targets,
       inputs.push_back(std::move(input));
     }
   }
-  std::unique_ptr<LiveDesk> desk(new LiveDesk(std::move(targets), std::move(inputs)));
-  ASSIGN_OR_RETURN(desk->receiver_, LiveReceiver::open(ports, allowed, *desk));
-  for (const Input& input : desk->inputs_) log_info("mocap", "{}", desk->name_of(input));
+  std::unique_ptr<LiveManager> manager(new LiveManager(std::move(targets), std::move(inputs)));
+  ASSIGN_OR_RETURN(manager->receiver_, LiveReceiver::open(ports, allowed, *manager));
+  for (const Input& input : manager->inputs_) log_info("mocap", "{}", manager->name_of(input));
   if (!allowed.empty())
     log_warn("mocap",
              "more than this machine may send motion, and nothing says who it is: protocols of motion "
              "capture know no passwords");
-  return desk;
+  return manager;
 }
 
-void LiveDesk::start() {
+void LiveManager::start() {
   receiver_->start();
 }
 
-void LiveDesk::stop() {
+void LiveManager::stop() {
   if (receiver_ != nullptr) receiver_->stop();
 }
 
 template <class Work>
-void LiveDesk::for_head(size_t head, Work work) const {
+void LiveManager::for_head(size_t head, Work work) const {
   for (const Input& input : inputs_)
     if (input.head == head) work(*input.source);
 }
 
 template <class Work>
-void LiveDesk::for_socket(size_t socket, Work work) const {
+void LiveManager::for_socket(size_t socket, Work work) const {
   for (const Input& input : inputs_)
     if (input.socket == socket) work(input);
 }
 
 /// All that hear a socket would ask its peer for the same.
-LiveSource& LiveDesk::first_of(size_t socket) const {
+LiveSource& LiveManager::first_of(size_t socket) const {
   const auto first = std::find_if(inputs_.begin(), inputs_.end(),
                                   [&](const Input& input) { return input.socket == socket; });
   return *first->source;
@@ -138,21 +138,21 @@ LiveSource& LiveDesk::first_of(size_t socket) const {
 
 // ---- from any thread
 
-std::vector<LiveInputStatus> LiveDesk::status(size_t head) const {
+std::vector<LiveInputStatus> LiveManager::status(size_t head) const {
   const std::lock_guard lock(mutex_);
   std::vector<LiveInputStatus> all;
   for_head(head, [&](LiveSource& source) { all.push_back(source.status(now_ns())); });
   return all;
 }
 
-std::vector<LiveDesc> LiveDesk::live(size_t head) const {
+std::vector<LiveDesc> LiveManager::live(size_t head) const {
   const std::lock_guard lock(mutex_);
   std::vector<LiveDesc> all;
   for_head(head, [&](LiveSource& source) { all.push_back(source.live()); });
   return all;
 }
 
-Notice LiveDesk::choose_subject(const std::string& subject, size_t head) {
+Notice LiveManager::choose_subject(const std::string& subject, size_t head) {
   bool is_seen = false;
   for_head(head, [&](LiveSource& source) { is_seen = is_seen || source.has_seen(subject); });
   // Of several inputs those that see it; where none does, all wait for it.
@@ -171,7 +171,7 @@ Notice LiveDesk::choose_subject(const std::string& subject, size_t head) {
                              seen.empty() ? "nobody" : seen)};
 }
 
-Notice LiveDesk::obey(const LiveCommand& command, size_t head) {
+Notice LiveManager::obey(const LiveCommand& command, size_t head) {
   const std::lock_guard lock(mutex_);
   if (command.action == LiveAction::ChooseSubject) return choose_subject(command.subject, head);
   if (command.action == LiveAction::Reset) {
@@ -188,8 +188,8 @@ Notice LiveDesk::obey(const LiveCommand& command, size_t head) {
 
 // ---- the receiver's thread
 
-bool LiveDesk::on_bytes(size_t socket, const std::string& sender, std::span<const std::byte> bytes,
-                        int64_t arrival_ns) {
+bool LiveManager::on_bytes(size_t socket, const std::string& sender, std::span<const std::byte> bytes,
+                           int64_t arrival_ns) {
   const std::lock_guard lock(mutex_);
   bool is_of_use = false;
   for_socket(socket, [&](const Input& input) {
@@ -199,7 +199,7 @@ bool LiveDesk::on_bytes(size_t socket, const std::string& sender, std::span<cons
   return is_of_use;
 }
 
-void LiveDesk::on_refused(size_t socket, const std::string& sender, const std::string& remedy) {
+void LiveManager::on_refused(size_t socket, const std::string& sender, const std::string& remedy) {
   const std::lock_guard lock(mutex_);
   for_socket(socket, [](const Input& input) { input.source->refuse(); });
   const LogBudget::Verdict verdict = refusal_lines_.take(address_of(sender), now_ns());
@@ -209,14 +209,14 @@ void LiveDesk::on_refused(size_t socket, const std::string& sender, const std::s
     log_warn("mocap", "{}: {} may not send: {}", first_of(socket).describe(), sender, remedy);
 }
 
-void LiveDesk::on_connection(size_t socket) {
+void LiveManager::on_connection(size_t socket) {
   const std::lock_guard lock(mutex_);
   for_socket(socket, [](const Input& input) { input.source->begin_connection(); });
   troubles_[socket].clear();
   log_info("mocap", "{}: connected", first_of(socket).describe());
 }
 
-void LiveDesk::on_no_connection(size_t socket, const std::string& why) {
+void LiveManager::on_no_connection(size_t socket, const std::string& why) {
   const std::lock_guard lock(mutex_);
   // Tried every few seconds, told once.
   if (std::exchange(troubles_[socket], why) == why) return;
@@ -227,17 +227,17 @@ void LiveDesk::on_no_connection(size_t socket, const std::string& why) {
                LiveNoteKind::Connection});
 }
 
-std::vector<std::byte> LiveDesk::greeting(size_t socket) {
+std::vector<std::byte> LiveManager::greeting(size_t socket) {
   const std::lock_guard lock(mutex_);
   return first_of(socket).greeting();
 }
 
-std::vector<std::byte> LiveDesk::request(size_t socket) {
+std::vector<std::byte> LiveManager::request(size_t socket) {
   const std::lock_guard lock(mutex_);
   return first_of(socket).request();
 }
 
-bool LiveDesk::on_tick(int64_t now_ns) {
+bool LiveManager::on_tick(int64_t now_ns) {
   const std::lock_guard lock(mutex_);
   bool is_active = false;
   for (const Input& input : inputs_) {
@@ -250,7 +250,7 @@ bool LiveDesk::on_tick(int64_t now_ns) {
 }
 
 /// What is due goes to the inputs, and to who listens to them.
-void LiveDesk::pass_on(const Input& input, int64_t now_ns) {
+void LiveManager::pass_on(const Input& input, int64_t now_ns) {
   const Target& target = targets_[input.head];
   const LiveSource::Due due = input.source->advance(now_ns);
   for (const MotionSamples& samples : due.motion) {
@@ -277,12 +277,12 @@ void LiveDesk::pass_on(const Input& input, int64_t now_ns) {
 }
 
 /// Of an input, for people, with the head that it moves where there are several.
-std::string LiveDesk::name_of(const Input& input) const {
+std::string LiveManager::name_of(const Input& input) const {
   const std::string& head = targets_[input.head].head;
   return head.empty() ? input.source->describe() : fmt::format("{}: {}", head, input.source->describe());
 }
 
-void LiveDesk::write(const std::string& name, const LiveNote& note) {
+void LiveManager::write(const std::string& name, const LiveNote& note) {
   if (!lines_.take(fmt::format("{} {}", static_cast<int>(note.kind), name), note.text)) return;
   if (note.is_warning)
     log_warn("mocap", "{}", note.text);

@@ -1,15 +1,15 @@
-#include "server/app/stream_teller.h"
+#include "server/app/stream_announcer.h"
 
 #include <utility>
 
 namespace strandcast {
 
-StreamList StreamTeller::list() const {
+StreamList StreamAnnouncer::list() const {
   const std::lock_guard lock(mutex_);
   return list_;
 }
 
-void StreamTeller::change(const std::function<void(StreamList&)>& edit) {
+void StreamAnnouncer::change(const std::function<void(StreamList&)>& edit) {
   const std::lock_guard lock(mutex_);
   StreamList list = list_;
   edit(list);
@@ -18,13 +18,13 @@ void StreamTeller::change(const std::function<void(StreamList&)>& edit) {
   for (const SessionId relay : relays_) net_->send(relay, list_);
 }
 
-void StreamTeller::add(SessionId session) {
+void StreamAnnouncer::add(SessionId session) {
   const std::lock_guard lock(mutex_);
   relays_.insert(session);
   net_->send(session, list_);
 }
 
-void StreamTeller::remove(SessionId session) {
+void StreamAnnouncer::remove(SessionId session) {
   const std::lock_guard lock(mutex_);
   relays_.erase(session);
 }

@@ -1,4 +1,4 @@
-#include "server/app/session_desk.h"
+#include "server/app/session_manager.h"
 
 #include <algorithm>
 #include <random>
@@ -6,6 +6,7 @@
 
 #include "common/base/profile.h"
 #include "common/base/text.h"
+#include "common/base/units.h"
 #include "common/base/version.h"
 #include "common/log/log.h"
 #include "common/scene/scene_file.h"
@@ -51,20 +52,20 @@ Result<EncodedFramePtr> make_asset_frame(const SceneAsset& asset) {
   return frame;
 }
 
-SessionDesk::SessionDesk(Parts parts)
+SessionManager::SessionManager(Parts parts)
     : parts_(std::move(parts)),
       session_id_(make_start_id()),
       viewers_(parts_.scene, parts_.hub),
       codecs_({parts_.codecs, parts_.source.asset()->rest_position_m.size(), parts_.scene.step_rate_hz}),
       asset_(parts_.asset) {}
 
-EncodedFramePtr SessionDesk::asset() const {
+EncodedFramePtr SessionManager::asset() const {
   const std::lock_guard lock(asset_mutex_);
   return asset_;
 }
 
 /// Returns the frame of a new asset; null where none can be made: then everybody keeps the old shape.
-EncodedFramePtr SessionDesk::follow_shape(const SceneAsset& asset) {
+EncodedFramePtr SessionManager::follow_shape(const SceneAsset& asset) {
   Result<EncodedFramePtr> frame = make_asset_frame(asset);
   if (!frame) {
     log_error("app", "{}", frame.error().to_string());
@@ -75,16 +76,16 @@ EncodedFramePtr SessionDesk::follow_shape(const SceneAsset& asset) {
   return asset_;
 }
 
-void SessionDesk::connect(NetServer& net) {
+void SessionManager::connect(NetServer& net) {
   net_ = &net;
-  teller_.connect(net);
+  announcer_.connect(net);
   list_classes(parts_.hub.strand_classes(), {});
   tell_streams();
   // It hears of changes of the stream while no session is there, too.
   (void)parts_.hub.add(*this);
 }
 
-Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hello) {
+Result<Admission> SessionManager::on_hello(const Visitor& visitor, const Hello& hello) {
   if (hello.mode == StreamMode::Frames && !visitor.subscription.is_empty())
     if (const std::optional<Error> error = parts_.hub.picture_failure())
       return make_error(ErrorCode::Unavailable, "no pictures can be drawn here: {}", error->to_string());
@@ -104,7 +105,7 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
     return place.error();
   }
   viewers_.note_address(visitor.session, visitor.address);
-  if (is_relay) teller_.add(visitor.session);
+  if (is_relay) announcer_.add(visitor.session);
   if (!parts_.heads.empty() && hello.head.empty()) whole_viewers_.insert(visitor.session);
   Admission admission;
   admission.welcome = make_welcome(*place, codec);
@@ -116,7 +117,7 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
 }
 
 /// The fewest strands by the codec that the predicting one falls back to.
-std::optional<Admission::Preview> SessionDesk::preview(const ViewerCodec& codec) const {
+std::optional<Admission::Preview> SessionManager::preview(const ViewerCodec& codec) const {
   const size_t fallback = codec.codec + 1;
   if (!parts_.codecs[codec.codec].predicts || fallback >= parts_.codecs.size()) return std::nullopt;
   const std::vector<StrandClass> classes = parts_.hub.strand_classes();
@@ -127,7 +128,7 @@ std::optional<Admission::Preview> SessionDesk::preview(const ViewerCodec& codec)
                             parts_.codecs[fallback].name};
 }
 
-Welcome SessionDesk::make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const {
+Welcome SessionManager::make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const {
   const SceneDesc& scene = parts_.scene;
   const std::shared_ptr<const SceneAsset> asset = parts_.source.asset();
   Welcome welcome;
@@ -151,7 +152,7 @@ Welcome SessionDesk::make_welcome(const Viewers::Place& place, const ViewerCodec
   return welcome;
 }
 
-void SessionDesk::on_message(SessionId session, const ClientMessage& message, int64_t arrival_ns) {
+void SessionManager::on_message(SessionId session, const ClientMessage& message, int64_t arrival_ns) {
   std::visit(Overloaded{[&](const MotionSamples& samples) {
                           tell_refusal(session, parts_.inputs.push(session, samples, arrival_ns));
                           parts_.hub.tell_motion(session, samples, arrival_ns);
@@ -177,25 +178,25 @@ void SessionDesk::on_message(SessionId session, const ClientMessage& message, in
              message);
 }
 
-void SessionDesk::tell_refusal(SessionId session, std::string why) {
+void SessionManager::tell_refusal(SessionId session, std::string why) {
   if (!why.empty()) net_->send(session, Notice{true, std::move(why)});
 }
 
-void SessionDesk::on_need(SessionId, const StreamNeed& need) {
+void SessionManager::on_need(SessionId, const StreamNeed& need) {
   if (need.kind == StreamNeed::Kind::Picture)
     parts_.hub.request_whole(need.picture_class);
   else
     parts_.hub.request_keyframe(need.stream_id);
 }
 
-void SessionDesk::obey(SessionId session, const ControlCommand& command) {
+void SessionManager::obey(SessionId session, const ControlCommand& command) {
   // Each of these waits for the one before, and a test makes many.
   const bool is_counted = command.command == Command::StepOnce && command.step_count > 0;
   if (is_counted || may_control(session, name_of(command.command))) control(session, command);
 }
 
 /// The head that the session named, else all.
-void SessionDesk::control(SessionId session, const ControlCommand& command) {
+void SessionManager::control(SessionId session, const ControlCommand& command) {
   StateSource::Reply reply = reply_to(session, name_of(command.command));
   const std::string who = viewers_.describe(session);
   if (!whole_viewers_.contains(session)) return parts_.source.post(command, std::move(reply), who);
@@ -205,7 +206,7 @@ void SessionDesk::control(SessionId session, const ControlCommand& command) {
         command, [answers, i](Notice notice) { answers->take(i, std::move(notice)); }, who);
 }
 
-void SessionDesk::obey(SessionId session, const SetParameter& parameter) {
+void SessionManager::obey(SessionId session, const SetParameter& parameter) {
   if (!may_control(session, parameter.assignment)) return;
   if (const Status status = may_change(parameter.assignment); !status)
     net_->send(session, Notice{true, status.error().message});
@@ -214,7 +215,7 @@ void SessionDesk::obey(SessionId session, const SetParameter& parameter) {
 }
 
 /// Another shape of the hair is another asset, of which a recording has one, and pictures of several heads.
-Status SessionDesk::may_change(const std::string& assignment) const {
+Status SessionManager::may_change(const std::string& assignment) const {
   const bool reshapes = assignment.starts_with("hair.length") || assignment.starts_with("hair.curl") ||
                         assignment.starts_with("hair=");
   if (!reshapes) return {};
@@ -228,11 +229,11 @@ Status SessionDesk::may_change(const std::string& assignment) const {
   return {};
 }
 
-std::vector<ParameterInfo> SessionDesk::listed(const SceneDesc& scene) const {
+std::vector<ParameterInfo> SessionManager::listed(const SceneDesc& scene) const {
   return list_parameters(scene, parts_.quality_reason ? parts_.quality_reason() : std::string());
 }
 
-void SessionDesk::answer(SessionId session, const ParameterRequest& request) {
+void SessionManager::answer(SessionId session, const ParameterRequest& request) {
   if (!parameter_budget_.take(session, now_ns()))
     return net_->send(session, Notice{true, "Too many requests for parameters: this one was left out."});
   const std::optional<SceneDesc> scene = parts_.source.scene();
@@ -242,14 +243,14 @@ void SessionDesk::answer(SessionId session, const ParameterRequest& request) {
   net_->send(session, list_of(parameters, request));
 }
 
-void SessionDesk::tell_parameters() {
+void SessionManager::tell_parameters() {
   if (parameter_watch_.is_empty()) return;
   const std::optional<SceneDesc> scene = parts_.source.scene();
   if (!scene) return;
   for (auto& [session, list] : parameter_watch_.news(listed(*scene))) net_->send(session, std::move(list));
 }
 
-void SessionDesk::answer(SessionId session, const SceneRequest&) {
+void SessionManager::answer(SessionId session, const SceneRequest&) {
   if (!may_control(session, "save the scene")) return;
   const std::optional<SceneDesc> scene = parts_.whole_scene();
   SceneText answer{scene ? to_line(*scene) : std::string()};
@@ -264,7 +265,7 @@ void SessionDesk::answer(SessionId session, const SceneRequest&) {
     net_->send(session, std::move(answer));
 }
 
-void SessionDesk::obey(SessionId session, const LiveCommand& command) {
+void SessionManager::obey(SessionId session, const LiveCommand& command) {
   if (!may_control(session,
                    fmt::format("live motion capture: {} {}", name_of(command.action), command.subject)))
     return;
@@ -273,7 +274,7 @@ void SessionDesk::obey(SessionId session, const LiveCommand& command) {
                           : Notice{true, "This server has no live inputs: start it with --mocap PROTOCOL."});
 }
 
-void SessionDesk::obey(SessionId session, const CameraCommand& command) {
+void SessionManager::obey(SessionId session, const CameraCommand& command) {
   const std::string whose =
       command.session == 0 ? std::string("all") : fmt::format("session {}", command.session);
   if (!may_control(session, "camera of " + whose)) return;
@@ -292,7 +293,7 @@ void SessionDesk::obey(SessionId session, const CameraCommand& command) {
   net_->send(session, Notice{aimed->movable.empty(), std::move(said)});
 }
 
-void SessionDesk::obey(SessionId session, const RecordCommand& command) {
+void SessionManager::obey(SessionId session, const RecordCommand& command) {
   const std::string what = command.is_wanted ? "record start " + command.name : "record stop";
   if (!may_control(session, what)) return;
   if (parts_.all_records != nullptr && whole_viewers_.contains(session))
@@ -301,7 +302,7 @@ void SessionDesk::obey(SessionId session, const RecordCommand& command) {
   net_->send(session, Notice{true, std::string(kNoRecordings)});
 }
 
-void SessionDesk::answer(SessionId session, const StateTimesRequest& request) {
+void SessionManager::answer(SessionId session, const StateTimesRequest& request) {
   const std::lock_guard lock(times_mutex_);
   if (request.is_wanted)
     times_readers_.insert(session);
@@ -309,7 +310,7 @@ void SessionDesk::answer(SessionId session, const StateTimesRequest& request) {
     times_readers_.erase(session);
 }
 
-void SessionDesk::tell_status(ServerStatus status) {
+void SessionManager::tell_status(ServerStatus status) {
   if (parts_.records != nullptr) status.recording = parts_.records->text();
   if (parts_.all_records == nullptr) return net_->broadcast(std::move(status), parts_.head);
   ServerStatus whole = status;
@@ -321,7 +322,7 @@ void SessionDesk::tell_status(ServerStatus status) {
       parts_.head);
 }
 
-void SessionDesk::tell_state_times() {
+void SessionManager::tell_state_times() {
   const std::lock_guard lock(times_mutex_);
   if (times_readers_.empty()) return;
   const StateTimes times{parts_.stages.take_states(now_ns())};
@@ -329,9 +330,9 @@ void SessionDesk::tell_state_times() {
   for (const SessionId session : times_readers_) net_->send(session, times);
 }
 
-void SessionDesk::tell_streams() {
+void SessionManager::tell_streams() {
   const SimulatedModel model = model_of(parts_.source.stats());
-  teller_.change([&](StreamList& list) {
+  announcer_.change([&](StreamList& list) {
     list.codecs.clear();
     for (const StrandCodecInfo& codec : parts_.codecs) list.codecs.push_back(codec.name);
     list.solver = model.solver;
@@ -342,7 +343,7 @@ void SessionDesk::tell_streams() {
 
 /// Returns the reply that answers the session, logs a refusal, and tells changed parameters after a
 /// success.
-StateSource::Reply SessionDesk::reply_to(SessionId session, const std::string& what) {
+StateSource::Reply SessionManager::reply_to(SessionId session, const std::string& what) {
   return [this, session, who = viewers_.describe(session),
           what = one_line(what, kMaxLoggedCharacters)](Notice notice) {
     if (notice.is_error) log_info("app", "{}: {} was refused: {}", who, what, notice.text);
@@ -353,7 +354,7 @@ StateSource::Reply SessionDesk::reply_to(SessionId session, const std::string& w
 }
 
 /// Within the controller's budget, and on record.
-bool SessionDesk::may_control(SessionId session, std::string_view what) {
+bool SessionManager::may_control(SessionId session, std::string_view what) {
   if (!control_budget_.take(session, now_ns())) {
     net_->send(session, Notice{true, fmt::format("More than {:.0f} commands a second: this one was left out.",
                                                  kControlsPerS)});
@@ -364,8 +365,8 @@ bool SessionDesk::may_control(SessionId session, std::string_view what) {
 }
 
 /// Posted behind what is being done, so that a joining session has its Welcome first.
-void SessionDesk::tell_quality(SessionId session, const Viewers::Pictures& pictures,
-                               const std::string& reason) {
+void SessionManager::tell_quality(SessionId session, const Viewers::Pictures& pictures,
+                                  const std::string& reason) {
   const PictureView& view = pictures.view;
   FrameQuality quality;
   quality.stream_id = picture_stream_id(pictures.picture_class);
@@ -378,7 +379,7 @@ void SessionDesk::tell_quality(SessionId session, const Viewers::Pictures& pictu
   net_->send(session, quality);
 }
 
-bool SessionDesk::on_picture_step(SessionId session, size_t step, const std::string& reason) {
+bool SessionManager::on_picture_step(SessionId session, size_t step, const std::string& reason) {
   const Result<Viewers::Pictures> pictures = viewers_.set_picture_step(session, step);
   if (!pictures) return false;
   log_info("net", "session {}: pictures of {} x {}, quality {}; {}", session, pictures->view.size.width,
@@ -387,7 +388,7 @@ bool SessionDesk::on_picture_step(SessionId session, size_t step, const std::str
   return true;
 }
 
-void SessionDesk::move_camera(SessionId session, const CameraChange& camera) {
+void SessionManager::move_camera(SessionId session, const CameraChange& camera) {
   if (const Status status = viewers_.set_camera(session, camera.camera); !status)
     net_->send(session, Notice{true, status.error().to_string()});
   else
@@ -395,7 +396,7 @@ void SessionDesk::move_camera(SessionId session, const CameraChange& camera) {
 }
 
 /// Whose pictures have no room any more when its window is seen again may come back like anybody else.
-void SessionDesk::follow_window(SessionId session, const WindowChange& window) {
+void SessionManager::follow_window(SessionId session, const WindowChange& window) {
   const RenderSize before = viewers_.picture_size(session);
   const bool was_hidden = viewers_.is_hidden(session);
   Result<std::string> why = viewers_.set_window(session, window);
@@ -410,7 +411,7 @@ void SessionDesk::follow_window(SessionId session, const WindowChange& window) {
 }
 
 /// Looks whether this session should change between strands and frames.
-LinkAnswer SessionDesk::on_link(SessionId session, const LinkState& link, int64_t time_ns) {
+LinkAnswer SessionManager::on_link(SessionId session, const LinkState& link, int64_t time_ns) {
   const StreamHub& hub = parts_.hub;
   const std::vector<StrandClass> classes = hub.strand_classes();
   const size_t view_count = hub.picture_views().size() + (link.mode == StreamMode::Strands ? 1 : 0);
@@ -435,13 +436,13 @@ LinkAnswer SessionDesk::on_link(SessionId session, const LinkState& link, int64_
   return answer;
 }
 
-void SessionDesk::on_change(SessionId session, SubscriptionChange change) {
+void SessionManager::on_change(SessionId session, SubscriptionChange change) {
   if (change == SubscriptionChange::Strands) return viewers_.note_strand_class(session);
   viewers_.note_mode(session, now_ns());
   if (const auto pictures = viewers_.pictures(session)) tell_quality(session, *pictures, "to begin with");
 }
 
-Status SessionDesk::readiness() {
+Status SessionManager::readiness() {
   if (const std::optional<Error> error = parts_.source.failure()) return *error;
   const SimStats stats = parts_.source.stats();
   // One step or command that takes long keeps everybody waiting, also while it is paused.
@@ -459,7 +460,7 @@ Status SessionDesk::readiness() {
                     age_s, kMaxReadyStepAgeS);
 }
 
-void SessionDesk::on_left(SessionId session) {
+void SessionManager::on_left(SessionId session) {
   const std::string who = viewers_.describe(session);
   parts_.source.leave(who);
   if (whole_viewers_.erase(session) > 0)
@@ -469,56 +470,66 @@ void SessionDesk::on_left(SessionId session) {
   answer(session, StateTimesRequest{false});
   parameter_watch_.remove(session);
   codecs_.remove(session);
-  teller_.remove(session);
+  announcer_.remove(session);
   parts_.inputs.remove_source(session);
   parts_.hub.remove(viewers_.remove(session));
 }
 
-void SessionDesk::list_classes(const std::vector<StrandClass>& classes, const std::string& reason) {
-  teller_.change([&](StreamList& list) {
+void SessionManager::list_classes(const std::vector<StrandClass>& classes, const std::string& reason) {
+  announcer_.change([&](StreamList& list) {
     list.classes = classes;
     if (classes.size() > kMaxListedClasses) list.classes.resize(kMaxListedClasses);
     list.reason = reason;
   });
 }
 
-void SessionDesk::on_strands(const EncodedFramePtr& frame) {
+void SessionManager::on_strands(const EncodedFramePtr& frame) {
   parts_.stages.note_encoded(frame->header.sim_time_ns, now_ns());
   net_->publish_strands(frame, parts_.head);
 }
-void SessionDesk::on_picture(PictureClass picture_class, const PicturePtr& picture) {
+void SessionManager::on_picture(PictureClass picture_class, const PicturePtr& picture) {
   net_->publish_picture(picture_class, picture, parts_.head);
 }
-void SessionDesk::on_picture_refused(PictureClass picture_class, const Error& error) {
+void SessionManager::on_picture_refused(PictureClass picture_class, const Error& error) {
   net_->send_to_class(picture_class, Notice{true, "This view cannot be drawn: " + error.to_string()},
                       parts_.head);
 }
-void SessionDesk::on_look_refused(PictureClass picture_class, const Error& error) {
+void SessionManager::on_look_refused(PictureClass picture_class, const Error& error) {
   net_->send_to_class(picture_class,
                       Notice{true, "The server's pictures keep their look, this one cannot be drawn there: " +
                                        error.to_string()},
                       parts_.head);
 }
-void SessionDesk::on_look_change(const LookChange& look) {
+void SessionManager::on_look_change(const LookChange& look) {
   net_->broadcast(look, parts_.head);
 }
-void SessionDesk::on_pictures_failed(const Error& error) {
+void SessionManager::on_pictures_failed(const Error& error) {
   net_->broadcast(Notice{true, "No pictures can be drawn: " + error.to_string()}, parts_.head);
 }
-void SessionDesk::on_stream_change(const std::vector<StrandClass>& classes,
-                                   std::shared_ptr<void> until_told) {
+void SessionManager::on_stream_change(const std::vector<StrandClass>& classes,
+                                      std::shared_ptr<void> until_told) {
   constexpr const char* kReason = "the stream was changed";
   list_classes(classes, kReason);
   net_->set_strand_classes(
       classes, kReason, [until_told] {}, parts_.head);
 }
 
-void SessionDesk::on_shape_change(const std::shared_ptr<const SceneAsset>& asset,
-                                  std::shared_ptr<void> until_told) {
+void SessionManager::on_shape_change(const std::shared_ptr<const SceneAsset>& asset,
+                                     std::shared_ptr<void> until_told) {
   const EncodedFramePtr frame = follow_shape(*asset);
   if (frame != nullptr)
     net_->renew_asset(
         frame, [until_told] {}, parts_.head);
+}
+
+bool ControlBudget::take(SessionId session, int64_t time_ns) {
+  Bucket& bucket = buckets_.try_emplace(session, Bucket{kControlBurst, time_ns}).first->second;
+  const double passed_s = static_cast<double>(time_ns - bucket.time_ns) * kSPerNs;
+  bucket.left = std::min(kControlBurst, bucket.left + passed_s * kControlsPerS);
+  bucket.time_ns = time_ns;
+  if (bucket.left < 1.0) return false;
+  bucket.left -= 1.0;
+  return true;
 }
 
 }  // namespace strandcast

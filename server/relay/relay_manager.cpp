@@ -1,4 +1,4 @@
-#include "server/relay/relay_desk.h"
+#include "server/relay/relay_manager.h"
 
 #include <algorithm>
 #include <utility>
@@ -23,28 +23,28 @@ std::vector<StrandCodecInfo> codecs_of(const StreamList& streams) {
 
 }  // namespace
 
-void RelayDesk::connect(NetServer& net) {
+void RelayManager::connect(NetServer& net) {
   net_ = &net;
-  teller_.connect(net);
+  announcer_.connect(net);
 }
 
-void RelayDesk::set_relayed(RelayedPtr relayed) {
-  teller_.change([&](StreamList& list) { list = relayed->streams; });
+void RelayManager::set_relayed(RelayedPtr relayed) {
+  announcer_.change([&](StreamList& list) { list = relayed->streams; });
   const std::lock_guard lock(mutex_);
   relayed_ = std::move(relayed);
 }
 
-RelayedPtr RelayDesk::relayed() const {
+RelayedPtr RelayManager::relayed() const {
   const std::lock_guard lock(mutex_);
   return relayed_;
 }
 
-void RelayDesk::move_views(const CameraChange& camera) {
+void RelayManager::move_views(const CameraChange& camera) {
   const std::lock_guard lock(mutex_);
   for (const SessionId session : movable_) net_->send(session, camera);
 }
 
-Status RelayDesk::check(const Hello& hello, const Relayed& relayed) const {
+Status RelayManager::check(const Hello& hello, const Relayed& relayed) const {
   const auto& relays = relayed.welcome.relays;
   if (!hello.relay_id.empty() && std::find(relays.begin(), relays.end(), hello.relay_id) != relays.end())
     return make_error(ErrorCode::Unsupported,
@@ -59,13 +59,13 @@ Status RelayDesk::check(const Hello& hello, const Relayed& relayed) const {
                     hello.head, relayed.welcome.scene_name);
 }
 
-SimulatedModel RelayDesk::model(const Relayed& relayed) const {
+SimulatedModel RelayManager::model(const Relayed& relayed) const {
   const ServerStatus status = upstream_.status();
   return {relayed.streams.solver, relayed.streams.solver_cost, relayed.streams.substeps, status.is_paused,
           status.realtime_factor};
 }
 
-Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello) {
+Result<Admission> RelayManager::on_hello(const Visitor& visitor, const Hello& hello) {
   if (hello.relay_id == parts_.id)
     return make_error(ErrorCode::Unsupported,
                       "This relay stands behind itself: its --upstream must be another server.");
@@ -75,9 +75,9 @@ Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello
   RETURN_IF_ERROR(check(hello, *relayed));
   if (std::exchange(codecs_of_, relayed->welcome.session_id) != relayed->welcome.session_id)
     codecs_.emplace(
-        CodecDesk::Served{codecs_of(relayed->streams),
-                          size_t{relayed->welcome.strand_count} * size_t{relayed->welcome.vertex_count},
-                          relayed->welcome.step_rate_hz});
+        CodecManager::Served{codecs_of(relayed->streams),
+                             size_t{relayed->welcome.strand_count} * size_t{relayed->welcome.vertex_count},
+                             relayed->welcome.step_rate_hz});
   Hello viewer = hello;
   if (hello.head.empty())
     viewer.head = upstream_.head();  // who named none is about all of them up there, too
@@ -99,13 +99,13 @@ Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello
     if (hello.frame_width > 0) welcome.frame_width = hello.frame_width;
     if (hello.frame_height > 0) welcome.frame_height = hello.frame_height;
     welcome.mode_reason = "pictures were asked for, and come through a relay";
-    parts_.voices.open_pictures({visitor.session, viewer, visitor.peer}, number_);
+    parts_.uplinks.open_pictures({visitor.session, viewer, visitor.peer}, number_);
   } else {
     admission.asset = relayed->asset;
   }
   if (!hello.relay_id.empty()) {
     subscription.strands.strand_class = hello.strand_class;
-    teller_.add(visitor.session);
+    announcer_.add(visitor.session);
   }
   leaves_[visitor.session] = {viewer, visitor.peer, &subscription, {}, false};
   follow_demand();
@@ -116,13 +116,13 @@ Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello
   return admission;
 }
 
-void RelayDesk::say(SessionId session, const ClientMessage& message) {
+void RelayManager::say(SessionId session, const ClientMessage& message) {
   const auto found = leaves_.find(session);
   if (found != leaves_.end())
-    parts_.voices.say({session, found->second.hello, found->second.address}, message);
+    parts_.uplinks.say({session, found->second.hello, found->second.address}, message);
 }
 
-void RelayDesk::on_message(SessionId session, const ClientMessage& message, int64_t) {
+void RelayManager::on_message(SessionId session, const ClientMessage& message, int64_t) {
   const auto found = leaves_.find(session);
   if (found == leaves_.end()) return;
   Leaf& leaf = found->second;
@@ -138,7 +138,7 @@ void RelayDesk::on_message(SessionId session, const ClientMessage& message, int6
 }
 
 /// What no window shows is not fetched either; pictures stop and change at the server above.
-void RelayDesk::follow_window(SessionId session, Leaf& leaf, const WindowChange& window) {
+void RelayManager::follow_window(SessionId session, Leaf& leaf, const WindowChange& window) {
   if (window.frame_width > 0) leaf.hello.frame_width = window.frame_width;
   if (window.frame_height > 0) leaf.hello.frame_height = window.frame_height;
   leaf.subscription->set_hidden(window.is_hidden);
@@ -146,18 +146,18 @@ void RelayDesk::follow_window(SessionId session, Leaf& leaf, const WindowChange&
   follow_demand();
 }
 
-void RelayDesk::on_need(SessionId session, const StreamNeed& need) {
+void RelayManager::on_need(SessionId session, const StreamNeed& need) {
   switch (need.kind) {
     case StreamNeed::Kind::Keyframe:
       return upstream_.join(session, need.stream_id);
     case StreamNeed::Kind::Anchor:
       return upstream_.request_keyframe(need.stream_id);
     case StreamNeed::Kind::Picture:
-      return parts_.voices.request_picture(session);
+      return parts_.uplinks.request_picture(session);
   }
 }
 
-LinkAnswer RelayDesk::on_link(SessionId session, const LinkState& link, int64_t time_ns) {
+LinkAnswer RelayManager::on_link(SessionId session, const LinkState& link, int64_t time_ns) {
   LinkAnswer answer;
   const auto found = leaves_.find(session);
   const RelayedPtr relayed = this->relayed();
@@ -177,7 +177,7 @@ LinkAnswer RelayDesk::on_link(SessionId session, const LinkState& link, int64_t 
 }
 
 /// What anybody needs is got once for all of them.
-void RelayDesk::follow_demand() {
+void RelayManager::follow_demand() {
   std::set<uint16_t> streams;
   uint32_t viewers = 0;
   for (const auto& [session, leaf] : leaves_) {
@@ -189,19 +189,19 @@ void RelayDesk::follow_demand() {
   upstream_.set_demand(std::move(streams));
 }
 
-void RelayDesk::on_left(SessionId session) {
+void RelayManager::on_left(SessionId session) {
   {
     const std::lock_guard lock(mutex_);
     movable_.erase(session);
   }
   leaves_.erase(session);
-  teller_.remove(session);
+  announcer_.remove(session);
   if (codecs_) codecs_->remove(session);
-  parts_.voices.leave(session);
+  parts_.uplinks.leave(session);
   follow_demand();
 }
 
-std::string RelayDesk::metrics() {
+std::string RelayManager::metrics() {
   const UpstreamCounters counters = parts_.counters();
   const auto total = [](std::string_view name, const char* help, uint64_t value) {
     return format_metric(name, "counter", help, static_cast<double>(value));
@@ -217,7 +217,7 @@ std::string RelayDesk::metrics() {
          now("relay_upstream_sessions",
              "Its sessions at the server above: those, and one for each viewer "
              "that says something or gets pictures.",
-             static_cast<double>(counters.streams + parts_.voices.count())) +
+             static_cast<double>(counters.streams + parts_.uplinks.count())) +
          total("relay_received_bytes_total", "Payload of the streams.", counters.received_bytes) +
          total("relay_frames_total", "Strand frames passed on.", counters.frames) +
          total("relay_keyframes_total", "Keyframes among them.", counters.keyframes) +

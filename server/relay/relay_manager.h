@@ -1,4 +1,4 @@
-// RelayDesk: what a relay does with the sessions of one head: lets them in as the server above would, says
+// RelayManager: what a relay does with the sessions of one head: lets them in as the server above would, says
 // which streams they need, and passes on what they say. Network thread, unless said otherwise.
 #pragma once
 
@@ -10,26 +10,26 @@
 #include <set>
 #include <string>
 
-#include "server/app/codec_desk.h"
-#include "server/app/stream_teller.h"
+#include "server/app/codec_manager.h"
+#include "server/app/stream_announcer.h"
 #include "server/net/net_server.h"
+#include "server/relay/uplinks.h"
 #include "server/relay/upstream.h"
-#include "server/relay/voices.h"
 
 namespace strandcast {
 
-/// What the desks of one relay have in common; all outlives the sessions.
-struct RelayDeskParts {
+/// What the managers of one relay have in common; all outlives the sessions.
+struct RelayManagerParts {
   std::string id;             // the relay's own
   bool has_all_heads = true;  // or one alone
-  Voices& voices;
+  Uplinks& uplinks;
   std::function<UpstreamCounters()> counters;  // of all heads
 };
 
-class RelayDesk : public NetHandler {
+class RelayManager : public NetHandler {
  public:
   /// `number`: of the head, as NetServer has it. `upstream` outlives the sessions.
-  RelayDesk(RelayDeskParts parts, Upstream& upstream, size_t number)
+  RelayManager(RelayManagerParts parts, Upstream& upstream, size_t number)
       : parts_(std::move(parts)), upstream_(upstream), number_(number) {}
 
   /// Before `net` starts; it outlives the sessions.
@@ -67,15 +67,15 @@ class RelayDesk : public NetHandler {
   void follow_window(SessionId session, Leaf& leaf, const WindowChange& window);
   void follow_demand();
 
-  const RelayDeskParts parts_;
+  const RelayManagerParts parts_;
   Upstream& upstream_;
   const size_t number_;
   NetServer* net_ = nullptr;
-  StreamTeller teller_;
+  StreamAnnouncer announcer_;
   std::map<SessionId, Leaf> leaves_;
-  std::optional<CodecDesk> codecs_;  // of the server above as it is now
-  std::string codecs_of_;            // its session_id
-  mutable std::mutex mutex_;         // guards the two below
+  std::optional<CodecManager> codecs_;  // of the server above as it is now
+  std::string codecs_of_;               // its session_id
+  mutable std::mutex mutex_;            // guards the two below
   RelayedPtr relayed_;
   std::set<SessionId> movable_;
   std::atomic<uint32_t> viewer_count_{0};

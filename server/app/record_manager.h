@@ -1,4 +1,4 @@
-// RecordDesk: the recordings of one head: the one that --record starts with it, and takes that controllers
+// RecordManager: the recordings of one head: the one that --record starts with it, and takes that controllers
 // start and stop in the folder of --record-dir, one at a time, beside it or without it. Work that may wait
 // for the disk runs on a thread of its own, which exists only with such a folder.
 #pragma once
@@ -51,7 +51,7 @@ std::string recording_name(const RecordCommand& command);
 /// Returns the file name of an unnamed recording, for example "builtin-20261126T151259Z.mcap".
 std::string recording_file_name(const std::string& scene, int64_t unix_time_s);
 
-class RecordDesk {
+class RecordManager {
  public:
   using Reply = StateSource::Reply;
   /// Parts of the head that are recorded; all of them must outlive stop().
@@ -64,18 +64,18 @@ class RecordDesk {
     bool is_shared = false;  // the simulation goes on from what keyframes tell
   };
 
-  /// Makes the desk, and the file of a recording that starts with the server. Returns the errors of
+  /// Makes the manager, and the file of a recording that starts with the server. Returns the errors of
   /// Recorder::make(), or NotFound if the folder is missing.
-  static Result<std::unique_ptr<RecordDesk>> make(const std::optional<RecordConfig>& first,
-                                                  const std::optional<RecordFolder>& folder);
+  static Result<std::unique_ptr<RecordManager>> make(const std::optional<RecordConfig>& first,
+                                                     const std::optional<RecordFolder>& folder);
   /// Calls stop() if it was not called.
-  ~RecordDesk();
-  RecordDesk(const RecordDesk&) = delete;
-  RecordDesk& operator=(const RecordDesk&) = delete;
+  ~RecordManager();
+  RecordManager(const RecordManager&) = delete;
+  RecordManager& operator=(const RecordManager&) = delete;
 
   /// Returns the tap of the recording that starts with the server; null without one.
   StepTap* first_tap() { return whole_.get(); }
-  /// Connects the desk to the stream; call it before the source starts.
+  /// Connects the manager to the stream; call it before the source starts.
   Status attach(Stream stream);
   /// Begins recording; call it after the source has started.
   void begin();
@@ -107,7 +107,7 @@ class RecordDesk {
     Reply reply;
   };
 
-  explicit RecordDesk(std::optional<RecordFolder> folder) : folder_(std::move(folder)) {}
+  explicit RecordManager(std::optional<RecordFolder> folder) : folder_(std::move(folder)) {}
   void run();
   void answer(const Order& order);
   Notice carry_out(const RecordCommand& command);
@@ -138,6 +138,28 @@ class RecordDesk {
   bool is_stopping_ = false;
 
   std::thread thread_;
+};
+
+/// The recordings of all heads of a server together. Any thread.
+class RecordManagers {
+ public:
+  struct Of {
+    std::string head;
+    RecordManager* manager;  // outlives this
+  };
+
+  /// Makes the group from the managers of several heads.
+  explicit RecordManagers(std::vector<Of> all) : all_(std::move(all)) {}
+
+  /// Starts or stops recording on every head. Replies once, with the answers of all managers; an error if one
+  /// manager failed.
+  void obey(const RecordCommand& command, const RecordManager::Reply& reply) const;
+  /// Describes the recordings of all heads like RecordManager::text(); names the heads that are not recorded
+  /// if some are.
+  std::string text() const;
+
+ private:
+  std::vector<Of> all_;
 };
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
-// CodecDesk: chooses which of the served codecs codes each session's strands, when the session joins and when
-// the choice turns out wrong. Network thread.
+// CodecManager: chooses which of the served codecs codes each session's strands, when the session joins and
+// when the choice turns out wrong. Network thread.
 #pragma once
 
 #include <map>
@@ -21,19 +21,19 @@ struct SimulatedModel {
   double realtime_factor = 1.0;
 };
 
-class CodecDesk {
+class CodecManager {
  public:
   struct Served {
     std::vector<StrandCodecInfo> codecs;  // as served_codecs()
     size_t vertices = 0;                  // of all strands
     double states_hz = 60.0;              // steps of the simulation
   };
-  explicit CodecDesk(Served served) : served_(std::move(served)) {}
+  explicit CodecManager(Served served) : served_(std::move(served)) {}
 
   /// Chooses the codec of a joining session. A session that gets strands and may change codec later is
   /// remembered; a relay gets the codec that it asks for.
   ViewerCodec admit(SessionId session, const Hello& hello, const SimulatedModel& model);
-  /// Measurements of a session. Pass them often: the desk checks whether the session can still afford its
+  /// Measurements of a session. Pass them often: the manager checks whether the session can still afford its
   /// codec.
   struct Look {
     const LinkState& link;

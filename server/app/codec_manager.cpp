@@ -1,4 +1,4 @@
-#include "server/app/codec_desk.h"
+#include "server/app/codec_manager.h"
 
 #include <fmt/format.h>
 
@@ -6,8 +6,8 @@
 
 namespace strandcast {
 
-ViewerCodecFacts CodecDesk::facts(const std::string& wish, double step_ns,
-                                  const SimulatedModel& model) const {
+ViewerCodecFacts CodecManager::facts(const std::string& wish, double step_ns,
+                                     const SimulatedModel& model) const {
   ViewerCodecFacts facts;
   facts.wish = wish;
   facts.step_ns = step_ns;
@@ -19,7 +19,7 @@ ViewerCodecFacts CodecDesk::facts(const std::string& wish, double step_ns,
   return facts;
 }
 
-ViewerCodec CodecDesk::admit(SessionId session, const Hello& hello, const SimulatedModel& model) {
+ViewerCodec CodecManager::admit(SessionId session, const Hello& hello, const SimulatedModel& model) {
   if (!hello.relay_id.empty()) {
     const auto wanted = std::find_if(served_.codecs.begin(), served_.codecs.end(),
                                      [&](const auto& one) { return one.name == hello.codec_wish; });
@@ -35,7 +35,7 @@ ViewerCodec CodecDesk::admit(SessionId session, const Hello& hello, const Simula
   return chosen;
 }
 
-std::optional<CodecAnswer> CodecDesk::consider(SessionId session, const Look& look, int64_t time_ns) {
+std::optional<CodecAnswer> CodecManager::consider(SessionId session, const Look& look, int64_t time_ns) {
   const auto found = watches_.find(session);
   if (found == watches_.end()) return std::nullopt;
   ViewerCodecWatch& watch = found->second;

@@ -1,4 +1,4 @@
-// Voices: viewers of a relay that say something, or get pictures, each by a session of its own at the server
+// Uplinks: viewers of a relay that say something, or get pictures, each by a session of its own at the server
 // above, with its own role and token: that server judges. What only asks for parameters goes by one session
 // for all. Any thread; nothing waits for the network.
 #pragma once
@@ -19,15 +19,15 @@
 namespace strandcast {
 
 /// At once: of the sessions that a server has for one address the relay's streams need some, too.
-inline constexpr size_t kMaxVoices = 40;
-/// Largest number of voices of sessions that only watch; the others are kept for controllers, sources and
+inline constexpr size_t kMaxUplinks = 40;
+/// Largest number of uplinks of sessions that only watch; the others are kept for controllers, sources and
 /// admins.
-inline constexpr size_t kMaxWatchersVoices = 24;
-/// Largest number of voices of one address: for sessions that only watch, and again for all others.
-inline constexpr size_t kMaxVoicesPerAddress = 12;
+inline constexpr size_t kMaxWatchersUplinks = 24;
+/// Largest number of uplinks of one address: for sessions that only watch, and again for all others.
+inline constexpr size_t kMaxUplinksPerAddress = 12;
 /// One by which nothing was said for so long ends, unless it brings pictures or what is watched. Longer than
 /// the steps of a command take (kLongestStepsNs).
-inline constexpr int64_t kIdleVoiceNs = 90'000'000'000;
+inline constexpr int64_t kIdleUplinkNs = 90'000'000'000;
 /// Questions of one viewer that wait for their answer; more are refused.
 inline constexpr size_t kMaxQuestionsOfOne = 4;
 /// Shortest time from a refusal to the next attempt for the same viewer.
@@ -40,14 +40,14 @@ struct Speaker {
   std::string address;  // what counts as one
 };
 
-class Voices {
+class Uplinks {
  public:
-  explicit Voices(UpstreamConfig config, int64_t idle_ns = kIdleVoiceNs)
+  explicit Uplinks(UpstreamConfig config, int64_t idle_ns = kIdleUplinkNs)
       : config_(std::move(config)), idle_ns_(idle_ns) {}
   /// stop(), if it was not called.
-  ~Voices() { stop(); }
-  Voices(const Voices&) = delete;
-  Voices& operator=(const Voices&) = delete;
+  ~Uplinks() { stop(); }
+  Uplinks(const Uplinks&) = delete;
+  Uplinks& operator=(const Uplinks&) = delete;
 
   /// `net` outlives stop().
   void start(NetServer& net);
@@ -63,7 +63,7 @@ class Voices {
   size_t count() const;
 
  private:
-  struct Voice {
+  struct Uplink {
     std::unique_ptr<UpstreamLink> link;  // null: it was refused, or lost, or idle
     int64_t ended_ns = 0;                // 0: it may be opened at once
     std::string address;
@@ -87,7 +87,7 @@ class Voices {
   size_t count_open(IsOne is_one) const;
   void on_event(SessionId session, size_t head, ClientEvent event);
   bool on_lost(SessionId session, const Error& error, bool has_pictures);
-  void end(Voice& voice);
+  void end(Uplink& uplink);
   void tell(SessionId session, const Error& error, bool has_pictures);
   void run();
 
@@ -97,7 +97,7 @@ class Voices {
   mutable std::mutex mutex_;  // guards all below; never held while a link ends
   std::condition_variable changed_;
   bool is_stopping_ = false;
-  std::map<SessionId, Voice> voices_;
+  std::map<SessionId, Uplink> uplinks_;
   std::map<std::string, Enquiry> enquiries_;          // by head
   std::vector<std::unique_ptr<UpstreamLink>> ended_;  // to be waited for
   std::thread thread_;

@@ -1,7 +1,7 @@
-// LiveDesk: runs a server's live inputs. It opens their sockets, passes received bytes to each LiveSource and
-// the results to the inputs and their readers, writes the log and answers commands. Heads that use the same
-// protocol, port and host share a socket, and each follows its own subject. Exists only if a scene has live
-// inputs. Functions run on the receiver's thread unless marked as callable from any thread.
+// LiveManager: runs a server's live inputs. It opens their sockets, passes received bytes to each LiveSource
+// and the results to the inputs and their readers, writes the log and answers commands. Heads that use the
+// same protocol, port and host share a socket, and each follows its own subject. Exists only if a scene has
+// live inputs. Functions run on the receiver's thread unless marked as callable from any thread.
 #pragma once
 
 #include <functional>
@@ -26,7 +26,7 @@ Status check_live(const std::vector<LiveDesc>& live);
 Result<std::vector<std::string>> explain_live(const std::vector<LiveDesc>& live,
                                               const std::vector<AddressRange>& allowed);
 
-class LiveDesk : public LiveHandler {
+class LiveManager : public LiveHandler {
  public:
   /// Observer of the motion that drives the head; called on the receiver's thread.
   struct Listener {
@@ -39,15 +39,15 @@ class LiveDesk : public LiveHandler {
   /// The live inputs of one head, and the receivers of their data.
   struct Target {
     std::vector<LiveDesc> live;
-    InputHub* inputs = nullptr;  // outlives the desk
+    InputHub* inputs = nullptr;  // outlives the manager
     Listener listener;
     std::string head = {};  // its name, for the log and errors; empty where there is one
   };
 
   /// Opens the sockets of all targets.
-  static Result<std::unique_ptr<LiveDesk>> open(std::vector<Target> targets,
-                                                const std::vector<AddressRange>& allowed);
-  ~LiveDesk() override;
+  static Result<std::unique_ptr<LiveManager>> open(std::vector<Target> targets,
+                                                   const std::vector<AddressRange>& allowed);
+  ~LiveManager() override;
 
   void start();
   void stop();
@@ -75,7 +75,7 @@ class LiveDesk : public LiveHandler {
     size_t head = 0;    // that it moves
     size_t socket = 0;  // that it hears
   };
-  LiveDesk(std::vector<Target> targets, std::vector<Input> inputs);
+  LiveManager(std::vector<Target> targets, std::vector<Input> inputs);
   template <class Work>
   void for_head(size_t head, Work work) const;
   template <class Work>

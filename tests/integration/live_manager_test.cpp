@@ -1,5 +1,5 @@
 // Live inputs by real sockets, without a simulation: servers that are asked, and who may answer.
-#include "server/app/live_desk.h"
+#include "server/app/live_manager.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,35 +16,35 @@
 #include "tests/support/log_capture.h"
 #include "tests/support/udp_socket.h"
 
-namespace strandcast::live_desk_test {
+namespace strandcast::live_manager_test {
 namespace {
 
 using test::UdpSocket;
 
 /// Inputs with what they feed.
-class LiveDesks : public testing::Test {
+class LiveManagers : public testing::Test {
  protected:
   [[nodiscard]] bool open(const LiveDesc& live, const std::vector<AddressRange>& allowed = {}) {
-    std::vector<LiveDesk::Target> targets(1);
+    std::vector<LiveManager::Target> targets(1);
     targets[0] = {
         {live}, &hub_, {[this](uint64_t, const MotionSamples&, int64_t) { ++told_; }, nullptr, nullptr}};
-    auto desk = LiveDesk::open(std::move(targets), allowed);
-    EXPECT_TRUE(desk) << desk.error().to_string();
-    if (!desk) return false;
-    desk_ = std::move(*desk);
-    desk_->start();
+    auto manager = LiveManager::open(std::move(targets), allowed);
+    EXPECT_TRUE(manager) << manager.error().to_string();
+    if (!manager) return false;
+    manager_ = std::move(*manager);
+    manager_->start();
     return true;
   }
   void TearDown() override {
-    if (desk_ != nullptr) desk_->stop();
+    if (manager_ != nullptr) manager_->stop();
   }
-  LiveInputStatus status() const { return desk_->status().front(); }
+  LiveInputStatus status() const { return manager_->status().front(); }
   glm::dvec3 head_m() { return hub_.sample(now_ns()).world_from_head.position_m; }
   bool is_head_at(const glm::dvec3& place_m) { return glm::distance(head_m(), place_m) < 1e-3; }
 
   InputHub hub_;
   std::atomic<uint64_t> told_{0};
-  std::unique_ptr<LiveDesk> desk_;
+  std::unique_ptr<LiveManager> manager_;
 };
 
 /// A server of VRPN for one connection at a time.
@@ -101,7 +101,7 @@ test::PacketBytes tracked(double time_s, double height_m) {
   return test::vrpn_pose(time_s, 0, 3, 0, {0, height_m, 0}, {0, 0, 0, 1});
 }
 
-TEST_F(LiveDesks, AServerOfVrpnIsAskedAndAskedAgain) {
+TEST_F(LiveManagers, AServerOfVrpnIsAskedAndAskedAgain) {
   test::LogCapture log;
   VrpnServer server;
   if (!open({.protocol = "vrpn", .host = "127.0.0.1", .port = server.port()})) return;
@@ -126,7 +126,7 @@ TEST_F(LiveDesks, AServerOfVrpnIsAskedAndAskedAgain) {
   EXPECT_GE(log.count("connected"), 3u);
 }
 
-TEST_F(LiveDesks, AServerThatIsNotThereIsWaitedForAndToldOnce) {
+TEST_F(LiveManagers, AServerThatIsNotThereIsWaitedForAndToldOnce) {
   test::LogCapture log;
   uint16_t port = 0;
   {
@@ -138,7 +138,7 @@ TEST_F(LiveDesks, AServerThatIsNotThereIsWaitedForAndToldOnce) {
   EXPECT_TRUE(status().is_stale);
 }
 
-TEST_F(LiveDesks, MotiveIsAskedAndAloneMayAnswer) {
+TEST_F(LiveManagers, MotiveIsAskedAndAloneMayAnswer) {
   test::LogCapture log;
   // An address of its own, for the port where it is asked is everybody's.
   const char* kMotive = "127.0.0.9";
@@ -164,7 +164,7 @@ TEST_F(LiveDesks, MotiveIsAskedAndAloneMayAnswer) {
   EXPECT_EQ(log.count("127.0.0.9 alone was asked"), 1u) << "once, however often";
 }
 
-TEST_F(LiveDesks, WhatIsMalformedHidesNothingElseAndIsSummedUp) {
+TEST_F(LiveManagers, WhatIsMalformedHidesNothingElseAndIsSummedUp) {
   test::LogCapture log;
   const uint16_t port = test::free_udp_port();
   if (!open({.protocol = "opentrack", .port = port})) return;
@@ -180,12 +180,12 @@ TEST_F(LiveDesks, WhatIsMalformedHidesNothingElseAndIsSummedUp) {
   }));
   EXPECT_EQ(log.count(tracker.name() + " sends"), 1u);
   EXPECT_EQ(log.count("malformed packet"), 4u);
-  (void)desk_->on_tick(now_ns() + 10 * kSInNs);
+  (void)manager_->on_tick(now_ns() + 10 * kSInNs);
   EXPECT_EQ(log.count("malformed packet"), 5u);
   EXPECT_EQ(log.count("(96 more like it)"), 1u);
 }
 
-TEST_F(LiveDesks, WhoIsNotAllowedIsNotRead) {
+TEST_F(LiveManagers, WhoIsNotAllowedIsNotRead) {
   // This machine's own address in the network counts as a stranger's.
   const std::string address = test::own_network_address();
   if (address.empty()) GTEST_SKIP() << "needs an address beside loopback's";
@@ -208,7 +208,7 @@ TEST_F(LiveDesks, WhoIsNotAllowedIsNotRead) {
   })) << "this machine always may";
 }
 
-TEST_F(LiveDesks, WhoIsAllowedIsHeard) {
+TEST_F(LiveManagers, WhoIsAllowedIsHeard) {
   const std::string address = test::own_network_address();
   if (address.empty()) GTEST_SKIP() << "needs an address beside loopback's";
   const uint16_t port = test::free_udp_port();
@@ -222,7 +222,7 @@ TEST_F(LiveDesks, WhoIsAllowedIsHeard) {
   EXPECT_EQ(status().sender, stage.name());
 }
 
-TEST_F(LiveDesks, LoopbackAloneIsListenedToWhereNothingElseIsAllowed) {
+TEST_F(LiveManagers, LoopbackAloneIsListenedToWhereNothingElseIsAllowed) {
   const std::string address = test::own_network_address();
   if (address.empty()) GTEST_SKIP() << "needs an address beside loopback's";
   const uint16_t port = test::free_udp_port();
@@ -239,4 +239,4 @@ TEST_F(LiveDesks, LoopbackAloneIsListenedToWhereNothingElseIsAllowed) {
 }
 
 }  // namespace
-}  // namespace strandcast::live_desk_test
+}  // namespace strandcast::live_manager_test

@@ -1,4 +1,4 @@
-// StreamTeller: tells relays the list of strand streams when they join and when it changes. Any thread.
+// StreamAnnouncer: tells relays the list of strand streams when they join and when it changes. Any thread.
 #pragma once
 
 #include <functional>
@@ -9,7 +9,7 @@
 
 namespace strandcast {
 
-class StreamTeller {
+class StreamAnnouncer {
  public:
   /// Sets the network before any session joins; `net` must outlive the sessions.
   void connect(NetServer& net) { net_ = &net; }
