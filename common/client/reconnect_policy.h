@@ -18,11 +18,11 @@ inline constexpr std::chrono::milliseconds kFirstReconnectDelay{250};
 inline constexpr std::chrono::milliseconds kLongestReconnectDelay{5000};
 /// Longest delay of a relay and of the commands of strandcast-ctl, since others wait for them, and of all
 /// others in their first attempts: most servers are away for seconds.
-inline constexpr std::chrono::milliseconds kLongestUrgentDelay{1000};
-inline constexpr uint32_t kUrgentAttempts = 30;
+inline constexpr std::chrono::milliseconds kLongestUrgentDelay{500};
+inline constexpr uint32_t kUrgentAttempts = 60;
 inline constexpr double kReconnectJitter = 0.25;  // relative, +-
 /// A connection that lived this long: start from the first delay.
-inline constexpr std::chrono::milliseconds kStableConnection{10'000};
+inline constexpr std::chrono::milliseconds kStableConnection{2'000};
 /// Nothing heard for so long, where a Pong and a status are due each second: a new connection is tried beside
 /// this one, and takes its place unless it speaks first.
 inline constexpr std::chrono::milliseconds kDoubtedServer{1500};

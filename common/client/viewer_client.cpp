@@ -70,8 +70,7 @@ Result<std::unique_ptr<ViewerClient>> ViewerClient::connect(const ClientConfig& 
     if (!made) return Error{ErrorCode::Unsupported, made.error().message, made.error().place};
     tls = std::move(made).value();
   }
-  auto connection = std::make_unique<Connection>(config, std::move(tls));
-  RETURN_IF_ERROR(connection->open());
+  ASSIGN_OR_RETURN(auto connection, Connection::open(config, tls));
   // A server that knows no names has one head.
   if (!config.hello.head.empty() && connection->welcome().scene_name != config.hello.head)
     return make_error(ErrorCode::NotFound, "the server has one head and none called '{}'", config.hello.head);

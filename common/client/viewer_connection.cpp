@@ -108,17 +108,40 @@ ViewerClient::Connection::~Connection() {
   thread_.join();
 }
 
-Status ViewerClient::Connection::open() {
+/// As RFC 8305 has it of addresses: what hangs is not waited for alone. The first that is let in is taken,
+/// and the first error ends them all: its sender tries again.
+Result<std::unique_ptr<ViewerClient::Connection>> ViewerClient::Connection::open(const ClientConfig& config,
+                                                                                 const TlsContextPtr& tls) {
+  std::vector<std::unique_ptr<Connection>> begun;
+  ClientConfig beside = config;
+  beside.on_step = {};  // the first tells
+  int64_t next_ns = now_ns();
+  while (true) {
+    if (begun.size() < kMostBeside && now_ns() >= next_ns) {
+      begun.push_back(std::make_unique<Connection>(begun.empty() ? config : beside, tls));
+      begun.back()->begin();
+      next_ns = now_ns() + std::chrono::nanoseconds(kDoubtedServer).count();
+    }
+    for (auto& connection : begun) {
+      const bool is_newest = connection == begun.back();
+      const auto outcome = connection->outcome(is_newest ? kCancelPoll : std::chrono::milliseconds(0));
+      if (outcome && !*outcome) return outcome->error();
+      if (outcome) return std::move(connection);
+    }
+    if (auto reason = config.cancel ? config.cancel() : std::nullopt)
+      return at(config.address.to_string(), std::move(*reason));
+  }
+}
+
+void ViewerClient::Connection::begin() {
   asio::post(io_, [this] { resolve(); });
   thread_ = std::thread([this] { run(); });
+}
+
+std::optional<Status> ViewerClient::Connection::outcome(std::chrono::milliseconds timeout) {
   std::unique_lock lock(mutex_);
-  while (!opened_.wait_for(lock, kCancelPoll, [this] { return outcome_.has_value(); })) {
-    lock.unlock();
-    auto reason = config_.cancel ? config_.cancel() : std::nullopt;
-    if (reason) asio::post(io_, [this, why = std::move(*reason)]() mutable { finish(std::move(why)); });
-    lock.lock();
-  }
-  return *outcome_;
+  opened_.wait_for(lock, timeout, [this] { return outcome_.has_value(); });
+  return outcome_;
 }
 
 Status ViewerClient::Connection::send(std::vector<std::byte> message) {

@@ -25,13 +25,21 @@ namespace strandcast {
 /// Largest WebSocket message from the server, and largest size of the buffer that receives it.
 inline constexpr size_t kMaxMessageBytes = kFrameHeaderBytes + kMaxMediaPayloadBytes;
 
+/// Connections that are begun one beside the other, each kDoubtedServer after the one before, until one is
+/// let in.
+inline constexpr size_t kMostBeside = 4;
+
 class ViewerClient::Connection {
  public:
+  /// Blocks as ViewerClient::connect() does.
+  static Result<std::unique_ptr<Connection>> open(const ClientConfig& config, const TlsContextPtr& tls);
+
   Connection(const ClientConfig& config, TlsContextPtr tls);
   ~Connection();
 
-  /// Runs until the Welcome or the first error.
-  Status open();
+  void begin();
+  /// Waits for the Welcome or the first error; nothing when neither has come within `timeout`.
+  std::optional<Status> outcome(std::chrono::milliseconds timeout);
   Status send(std::vector<std::byte> message);
   void request_keyframe();
   size_t queued_messages() const { return outbox_.message_count(); }

@@ -380,6 +380,21 @@ TEST(ComingBack, AFrameInsteadOfAWelcomeIsNotFinal) {
   EXPECT_TRUE(steady.is_connected());
 }
 
+// A proxy whose server is away accepts, and says nothing.
+TEST(ComingBack, AnAttemptThatHangsIsNotWaitedFor) {
+  const Door door({[](FakePeer& peer) { peer.wait_for_test_end(); },
+                   [](FakePeer& peer) {
+                     peer.upgrade();
+                     peer.wait_for_test_end();
+                   },
+                   [](FakePeer& peer) { serve(peer, 2); }});
+  ClientConfig config = config_for(door.port());
+  config.connect_timeout = config.welcome_timeout = std::chrono::seconds(20);
+  const auto client = ViewerClient::connect(config);
+  ASSERT_TRUE(client) << client.error().to_string();
+  EXPECT_EQ(door.count(), 3u);
+}
+
 TEST(ComingBack, WhoWasInItOutlivesANameThatIsNotKnownYet) {
   const Door door({[](FakePeer& peer) { peer.answer_http(404, "no such session"); },
                    [](FakePeer& peer) { peer.answer_http(404, "no such session"); },

@@ -24,7 +24,7 @@ void Book::disturb(NodeId a, NodeId b, int64_t end_ns, int64_t extra_ns) {
     if (!is_on_way) continue;
     const auto links = static_cast<int64_t>(party.way.size()) - 1;
     // What falls silent may be an attempt, of whoever is not well yet.
-    const int64_t attempt_ns = extra_ns > 0 && !party.was_well ? kAttemptNs : 0;
+    const int64_t attempt_ns = extra_ns > 0 && !party.was_well ? kDoubtNs : 0;
     party.fault_end_ns = std::max(party.fault_end_ns, end_ns);
     party.due_ns =
         std::max(party.due_ns, end_ns + extra_ns + attempt_ns + links * kWaitNs + kBackNs + party.slow_ns);

@@ -21,10 +21,8 @@ namespace strandcast::vopr {
 inline constexpr int64_t kBackNs = 2 * kS;
 /// The longest wait between two attempts.
 inline constexpr int64_t kWaitNs = int64_t{kLongestUrgentDelay.count()} * kMs * 5 / 4;
-/// Beside a connection that nothing comes through another is tried after this.
+/// Beside a connection or an attempt that nothing comes through another is tried after this.
 inline constexpr int64_t kDoubtNs = int64_t{kDoubtedServer.count()} * kMs;
-/// An attempt that nothing comes through is given up after this (ClientConfig: connecting, and the Welcome).
-inline constexpr int64_t kAttemptNs = 10 * kS;
 /// The newest state of a viewer that nothing disturbs came at most so long ago.
 inline constexpr int64_t kFreshNs = 1 * kS;
 /// An undisturbed controller has its answer within this.

@@ -3,10 +3,11 @@
 const FIRST_MS = 250;
 const LONGEST_MS = 5000;
 /** Longest delay of the first attempts. */
-const URGENT_MS = 1000;
-const URGENT_ATTEMPTS = 30;
+const URGENT_MS = 500;
+const URGENT_ATTEMPTS = 60;
 const JITTER = 0.25;
-const STABLE_MS = 10_000;
+const STABLE_MS = 2_000;
+const LASTING_MS = 10_000; // a silent connection that was left sooner is given longer the next time
 /** Nothing heard for so long: a new connection is tried beside this one, and takes its place unless it speaks first. */
 export const DOUBTED_MS = 1500;
 /** Nothing heard for so long: "not connected" is shown. */
@@ -64,7 +65,7 @@ export class ReconnectPolicy {
   constructor(private readonly random: () => number = Math.random) {}
   /** A silent connection was left for another. Where that happens soon again, long messages over a slow link look like silence. */
   replace(connectedForMs: number): void {
-    this.doubtMs = connectedForMs >= STABLE_MS ? DOUBTED_MS : 2 * this.doubtMs;
+    this.doubtMs = connectedForMs >= LASTING_MS ? DOUBTED_MS : 2 * this.doubtMs;
   }
   nextDelayMs(connectedForMs: number): number {
     if (connectedForMs >= STABLE_MS) this.attempts = 0;
