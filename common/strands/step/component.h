@@ -20,12 +20,25 @@ namespace strandcast::step {
 /// neighbours (in the first block the strand before, alone) go on from there.
 class Component {
  public:
-  Component(const tangent::Layout& layout, uint32_t slice, uint32_t vertex_count, NumberTables& tables)
-      : tables_(tables),
+  /// What a slice leaves to the next one.
+  struct Kept {
+    NumberTables tables;
+    size_t first = 0;                  // place of the first strand, which follows zeros
+    std::vector<int32_t> values = {};  // from these zeros on
+  };
+
+  /// Slices in turn share what is kept; neighbours may then be of any of them.
+  Component(const tangent::Layout& layout, const tangent::Neighbours& beside, uint32_t slice,
+            uint32_t vertex_count, Kept& kept)
+      : tables_(kept.tables),
         layout_(layout),
+        beside_(beside),
         begin_(layout.slice_begin[slice]),
         vertex_count_(vertex_count),
-        values_(size_t{layout.strands_in[slice] + 1} * vertex_count) {}  // the first strand follows zeros
+        kept_(kept) {
+    if (kept.values.empty()) kept.first = begin_;
+    kept.values.resize((begin_ + layout.strands_in[slice] + 1 - kept.first) * vertex_count);
+  }
 
   /// One strand; value_at(v) gives what it has there.
   template <class ValueAt>
@@ -51,16 +64,17 @@ class Component {
 
  private:
   const int32_t* strand_at(size_t place) const {
-    return values_.data() + (place + 1 - begin_) * vertex_count_;
+    return kept_.values.data() + (place + 1 - kept_.first) * vertex_count_;
   }
   template <class Code>
   void visit(size_t place, Code code) {
     std::array<const int32_t*, 2> beside;
     for (size_t i = 0; i < beside.size(); ++i) {
-      const size_t near = layout_.neighbour[i][place];
-      beside[i] = near == layout_.no_neighbour() ? strand_at(place) - vertex_count_ : strand_at(near);
+      const size_t near = beside_[i][place];
+      const int32_t* const before = place == begin_ ? kept_.values.data() : strand_at(place - 1);
+      beside[i] = near == layout_.no_neighbour() ? before : strand_at(near);
     }
-    int32_t* const own = values_.data() + (place + 1 - begin_) * vertex_count_;
+    int32_t* const own = kept_.values.data() + (place + 1 - kept_.first) * vertex_count_;
     for (uint32_t v = 0; v < vertex_count_; ++v) {
       int64_t way = int64_t{beside[0][v]} + beside[1][v];
       if (v > 0) way -= int64_t{beside[0][v - 1]} + beside[1][v - 1];
@@ -71,9 +85,10 @@ class Component {
 
   NumberTables& tables_;
   const tangent::Layout& layout_;
+  const tangent::Neighbours& beside_;
   size_t begin_;
   uint32_t vertex_count_;
-  std::vector<int32_t> values_;
+  Kept& kept_;
 };
 
 inline float at(const StrandBlocks& blocks, size_t place, uint32_t v, uint32_t axis) {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "common/strands/step/component.h"
 #include "common/strands/step/predictor.h"
 
 namespace strandcast::step {
@@ -68,10 +67,18 @@ struct EdgeFrame {
   }
 };
 
+/// Slices whose neighbours are of any slice come one after the other.
 template <class Work>
-void for_slices(const PredictorGround& ground, const Work& work) {
-  tangent::for_each_part(tangent::encode_terms(ground.layout, ground.workers), ground.layout.slice_count(),
-                         work);
+void for_slices(const PredictorGround& ground, Rounding rounding, const Work& work) {
+  const uint32_t count = ground.layout.slice_count();
+  if (rounding != Rounding::Fine)
+    return tangent::for_each_part(tangent::encode_terms(ground.layout, ground.workers), count, work);
+  for (uint32_t slice = 0; slice < count; ++slice) work(slice);
+}
+/// How velocities change along strands, w = along their edges; those of place i are in row i + 1, and the
+/// first strands follow zeros.
+std::vector<glm::vec4> no_changes(const tangent::Layout& layout) {
+  return std::vector<glm::vec4>(size_t{layout.stride + 1} * layout.vertex_count, glm::vec4(0.0f));
 }
 /// First vertex of a slice and the one after its last, strand by strand.
 std::pair<size_t, size_t> vertices_of(const tangent::Layout& layout, uint32_t slice) {
@@ -114,9 +121,9 @@ std::array<int32_t, 3> steps_of(const glm::vec3& apart_mps, const FineRule& rule
 
 /// Visits the velocities of a slice beside what is expected from the vertices before and the neighbours:
 /// across an edge how they go on there, along it how fast theirs grow, which is next to nothing.
-/// steps(first, apart_mps) gives three whole numbers.
+/// steps(first, apart_mps) gives three whole numbers; `changes`: those of slices before, to be gone on with.
 template <class Steps>
-void Predictor::visit_velocities(uint32_t slice, Steps steps) {
+void Predictor::visit_velocities(uint32_t slice, std::vector<glm::vec4>& changes, Steps steps) {
   const tangent::Layout& layout = ground_.layout;
   const uint32_t vertex_count = model_.vertex_count;
   const FineRule& rule = rule_of(rounding_);
@@ -124,14 +131,13 @@ void Predictor::visit_velocities(uint32_t slice, Steps steps) {
   const StrandBlocks& position = *moving(PlaneRole::Position);
   StrandBlocks& velocity = *moving(PlaneRole::Velocity);
   const size_t begin = layout.slice_begin[slice];
-  // Of each strand, w = along its edges; the first one follows zeros.
-  std::vector<glm::vec4> changes(size_t{layout.strands_in[slice] + 1} * vertex_count, glm::vec4(0.0f));
   for (size_t place = begin; place < begin + layout.strands_in[slice]; ++place) {
-    const auto changes_at = [&](size_t other) { return changes.data() + (other + 1 - begin) * vertex_count; };
+    const auto changes_at = [&](size_t other) { return changes.data() + (other + 1) * vertex_count; };
     std::array<const glm::vec4*, 2> beside;
     for (size_t i = 0; i < beside.size(); ++i) {
-      const size_t near = layout.neighbour[i][place];
-      beside[i] = near == layout.no_neighbour() ? changes_at(place) - vertex_count : changes_at(near);
+      const size_t near = this->beside()[i][place];
+      const glm::vec4* const before = place == begin ? changes.data() : changes_at(place - 1);
+      beside[i] = near == layout.no_neighbour() ? before : changes_at(near);
     }
     EdgeFrame frame;
     std::array<glm::vec3, 3> apart{};  // of the vertices before, the last one first
@@ -177,8 +183,9 @@ void Predictor::settle_finely(const tangent::Planes<int32_t>& decoded, float qua
   forget_history();
   put_positions(decoded, quantum_m);
   velocity_steps_.resize(3 * size_t{places_} * model_.vertex_count);
-  for_slices(ground_, [&](uint32_t slice) {
-    visit_velocities(slice, [&](size_t first, const glm::vec3& apart_mps) {
+  std::vector<glm::vec4> changes = no_changes(ground_.layout);
+  for_slices(ground_, rounding_, [&](uint32_t slice) {
+    visit_velocities(slice, changes, [&](size_t first, const glm::vec3& apart_mps) {
       const std::array<int32_t, 3> found = steps_of(apart_mps, rule_of(rounding_));
       std::copy(found.begin(), found.end(), &velocity_steps_[first]);
       return found;
@@ -236,7 +243,7 @@ void Predictor::visit_steps_beside(uint32_t slice, Code code) const {
     for (size_t at = 0; at < row; ++at) {
       const size_t i = place * row + at;
       uint32_t sum = (at >= 3 ? 2 * size_at(i - 3) : 0) + (at >= 6 ? size_at(i - 6) : 0);
-      for (const std::vector<uint32_t>& neighbour : layout.neighbour) {
+      for (const std::vector<uint32_t>& neighbour : beside()) {
         const size_t near = neighbour[place];
         if (near != layout.no_neighbour())
           sum += size_at(near * row + at);
@@ -279,8 +286,9 @@ void Predictor::read_fine(ValueReader& reader) {
 
 void Predictor::place_velocities() {
   forget_history();
-  for_slices(ground_, [&](uint32_t slice) {
-    visit_velocities(slice, [&](size_t first, const glm::vec3&) {
+  std::vector<glm::vec4> changes = no_changes(ground_.layout);
+  for_slices(ground_, rounding_, [&](uint32_t slice) {
+    visit_velocities(slice, changes, [&](size_t first, const glm::vec3&) {
       return std::array{velocity_steps_[first], velocity_steps_[first + 1], velocity_steps_[first + 2]};
     });
   });

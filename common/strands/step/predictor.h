@@ -16,7 +16,7 @@
 #include "common/kernels/step_model.h"
 #include "common/kernels/volume/volume_law.h"
 #include "common/strands/byte_io.h"
-#include "common/strands/step/numbers.h"
+#include "common/strands/step/component.h"
 #include "common/strands/step/step_reader.h"
 #include "common/strands/step/tip_mask.h"
 #include "common/strands/step/wire.h"
@@ -39,8 +39,8 @@ inline constexpr size_t kMostStepVertices = 2'000'000;
 
 class Predictor {
  public:
-  /// Tables of the components of a state: three planes with w, and the twist.
-  using ComponentTables = std::array<NumberTables, 13>;
+  /// One for each component of a state: three planes with w, and the twist.
+  using ComponentTables = std::array<Component::Kept, 13>;
 
   /// State that changes from frame to frame.
   struct State {
@@ -158,13 +158,14 @@ class Predictor {
   float share_history();
   void settle_planes();
   template <class Steps>
-  void visit_velocities(uint32_t slice, Steps steps);
+  void visit_velocities(uint32_t slice, std::vector<glm::vec4>& changes, Steps steps);
   template <class Code>
   void visit_steps_beside(uint32_t slice, Code code) const;
   void place_velocities();
   void forget_history();
   void find_history(const StepInput& first);
   bool is_fine() const { return rounding_ != Rounding::Coarse; }
+  const tangent::Neighbours& beside() const { return ground_.layout.*beside_of(rounding_); }
   void write_fine(ValueWriter& writer) const;
   void read_fine(ValueReader& reader);
   static void copy_blocks(const std::unique_ptr<StrandBlocks>& from, std::unique_ptr<StrandBlocks>& to);

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "common/base/check.h"
-#include "common/strands/step/component.h"
 #include "common/strands/step/predictor.h"
 
 namespace strandcast::step {
@@ -137,7 +136,7 @@ void Predictor::write_planes(uint32_t slice, ComponentTables& tables, ValueWrite
     const StrandBlocks& vectors = *moving(plane.role);
     const StrandBlocks& velocity = *moving(PlaneRole::Velocity);
     for (uint32_t axis = 0; axis < 3; ++axis) {
-      Component component(layout, slice, vectors.row_count(), tables[number++]);
+      Component component(layout, beside(), slice, vectors.row_count(), tables[number++]);
       for (size_t place = begin; place < end; ++place) {
         const float seconds = at(velocity, place, 0, 3);
         component.put_strand(place, writer, [&](uint32_t v) {
@@ -148,7 +147,7 @@ void Predictor::write_planes(uint32_t slice, ComponentTables& tables, ValueWrite
       }
     }
     if (plane.w_step == 0.0f) continue;
-    Component component(layout, slice, vectors.row_count(), tables[number++]);
+    Component component(layout, beside(), slice, vectors.row_count(), tables[number++]);
     for (size_t place = begin; place < end; ++place)
       component.put_strand(place, writer, [&](uint32_t v) {
         const float w = at(vectors, place, v, 3);
@@ -156,7 +155,7 @@ void Predictor::write_planes(uint32_t slice, ComponentTables& tables, ValueWrite
       });
   }
   if (moving(PlaneRole::RodAxis) == nullptr) return;
-  Component component(layout, slice, model_.vertex_count, tables[number++]);
+  Component component(layout, beside(), slice, model_.vertex_count, tables[number++]);
   for (size_t place = begin; place < end; ++place)
     component.put_strand(place, writer,
                          [&](uint32_t v) { return twist_steps_[place * model_.vertex_count + v]; });
@@ -206,14 +205,14 @@ void Predictor::read_planes(uint32_t slice, float history_s, ComponentTables& ta
   for (const StatePlane& plane : state_planes()) {
     StrandBlocks& vectors = *moving(plane.role);
     for (uint32_t axis = 0; axis < 3; ++axis) {
-      Component component(layout, slice, vectors.row_count(), tables[number++]);
+      Component component(layout, beside(), slice, vectors.row_count(), tables[number++]);
       for (size_t place = begin; place < end; ++place)
         component.take_strand(place, reader, [&](uint32_t v, int32_t value) {
           at(vectors, place, v, axis) = in_steps(value, plane.step);
         });
     }
     if (plane.w_step == 0.0f) continue;
-    Component component(layout, slice, vectors.row_count(), tables[number++]);
+    Component component(layout, beside(), slice, vectors.row_count(), tables[number++]);
     for (size_t place = begin; place < end; ++place)
       component.take_strand(place, reader, [&](uint32_t v, int32_t value) {
         at(vectors, place, v, 3) = v > 0 ? in_steps(value, plane.w_step) : value > 0 ? history_s : 0.0f;
@@ -233,7 +232,7 @@ void Predictor::read_planes(uint32_t slice, float history_s, ComponentTables& ta
     }
   }
   if (moving(PlaneRole::RodAxis) == nullptr) return;
-  Component component(layout, slice, model_.vertex_count, tables[number++]);
+  Component component(layout, beside(), slice, model_.vertex_count, tables[number++]);
   for (size_t place = begin; place < end; ++place)
     component.take_strand(place, reader, [&](uint32_t v, int32_t value) {
       constexpr int32_t kMostFineSteps = 1 << 20;

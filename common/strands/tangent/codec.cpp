@@ -13,12 +13,10 @@
 #include "common/base/check.h"
 #include "common/base/worker_pool.h"
 #include "common/strands/byte_io.h"
-#include "common/strands/step/exact_head.h"
 #include "common/strands/step/steps.h"
 #include "common/strands/strand_payload.h"
+#include "common/strands/tangent/chain.h"
 #include "common/strands/tangent/order.h"
-#include "common/strands/tangent/sparse_symbols.h"
-#include "common/strands/tangent/symbols.h"
 #include "common/strands/wrapping.h"
 #include "common/strands/zstd_block.h"
 
@@ -26,8 +24,10 @@ namespace strandcast::tangent {
 namespace {
 
 constexpr uint8_t kTangentNumber = 5;
-constexpr uint8_t kStepNumber = 14;
-/// The same with other steps of what fine anchors round.
+constexpr uint8_t kStepNumber = 15;
+/// The same, whose fine anchors have only neighbours of the same slice.
+constexpr uint8_t kSecondFineNumber = 14;
+/// And with other steps of what they round.
 constexpr uint8_t kFirstFineNumber = 13;
 /// Of the release 0.2.0: the same without fine anchors and graded fields.
 constexpr uint8_t kFirstStepNumber = 12;
@@ -48,47 +48,15 @@ constexpr uint8_t codec_number(Prediction prediction) {
 }
 
 constexpr step::Rounding fine_of(uint8_t number) {
-  return number == kFirstFineNumber ? step::Rounding::FirstFine : step::Rounding::Fine;
+  if (number == kFirstFineNumber) return step::Rounding::FirstFine;
+  return number == kSecondFineNumber ? step::Rounding::SecondFine : step::Rounding::Fine;
 }
 
-/// What a stream remembers on both sides.
-struct Chain {
-  History history;
-  SymbolSizes sizes;
-  Tables tables = make_first_tables();
-  // Of the "step" codec only.
-  SparseTables sparse_tables = make_first_sparse_tables();
-  BlockCounts blocks;
-  step::HeadBase head;
-  bool has_integers = false;  // any of sizes and blocks is not 0
-
-  void reset(const Layout& layout) {
-    history.reset(layout);
-    has_integers = true;
-    forget_integers(layout);
-    forget_tables();
-  }
-  /// After a fine anchor: what frames of steps learnt says nothing of it.
-  void forget_tables() {
-    tables = make_first_tables();
-    sparse_tables = make_first_sparse_tables();
-  }
-  /// After an anchor: what a joiner knows, and no more. The tables stay.
-  void forget_motion(const Layout& layout) {
-    history.forget_motion();
-    forget_integers(layout);
-  }
-  /// Sizes of a frame's integers; blocks are told beside them.
-  void learn(SymbolSizes& now) {
-    std::swap(sizes, now);
-    has_integers = true;
-  }
-  void forget_integers(const Layout& layout) {
-    if (!std::exchange(has_integers, false)) return;
-    sizes.reset(layout);
-    blocks.assign(block_count_of(layout), 0);
-  }
-};
+/// Has the frame be an anchor that is rounded so.
+void be_anchor(Frame& frame, step::Rounding rounding) {
+  frame.anchor_share = rounding == step::Rounding::Coarse ? 1.0f : kFineShare;
+  frame.beside = step::beside_of(rounding);
+}
 
 /// Flags of an exact frame, which has no integers.
 constexpr uint8_t kExactFlags = step::kStepFlag | step::kSparseFlag;
@@ -296,15 +264,20 @@ class Encoder final : public StrandEncoder {
     }
     flags_ |= kAnchorFlag;
     if (is_exact) flags_ |= step::kFineFlag;
-    frame_.anchor_share = is_exact ? kFineShare : 1.0f;
-    if (steps_) steps_->begin_anchor(is_exact ? step::Rounding::Fine : step::Rounding::Coarse);
-    frame_.shape_weights = fit_shape(layout_, snapshot.quantum_m, target_, workers_);
+    const step::Rounding rounding = is_exact ? step::Rounding::Fine : step::Rounding::Coarse;
+    be_anchor(frame_, rounding);
+    if (steps_) steps_->begin_anchor(rounding);
+    frame_.shape_weights = fit_shape(layout_, layout_.*frame_.beside, snapshot.quantum_m, target_, workers_);
     for (auto& escapes : frame_.shape_codes.escapes) escapes.clear();
     Slices slices(layout_.slice_count());
     Slices shape_slices(layout_.slice_count());
+    const auto quantise = [&](uint32_t slice) {
+      quantise_anchor(set_, {{layout_, chain_.history, slice, frame_}, target_});
+    };
+    for (uint32_t slice = 0; is_exact && slice < layout_.slice_count(); ++slice) quantise(slice);
     for_each_slices(layout_, encode_terms(layout_, workers_), [&](uint32_t first, uint32_t count) {
       for (uint32_t slice = first; slice < first + count; ++slice) {
-        quantise_anchor(set_, {{layout_, chain_.history, slice, frame_}, target_});
+        if (!is_exact) quantise(slice);
         if (followers == Followers::None) continue;
         Tables tables = chain_.tables;
         write_symbols(set_,
@@ -319,14 +292,7 @@ class Encoder final : public StrandEncoder {
       }
       finish(first, count, shape_slices);
     });
-    if (is_exact) {
-      chain_.forget_tables();
-      Tables tables = chain_.tables;
-      for (uint32_t slice = 0; slice < layout_.slice_count(); ++slice)
-        write_symbols(set_,
-                      {layout_, slice, frame_.shape_codes, no_sizes_, next_sizes_, tables, writers_[slice]});
-      finish(0, layout_.slice_count(), shape_slices);
-    }
+    if (is_exact) write_shapes_in_turn(shape_slices);
     end(snapshot);
     chain_.forget_motion(layout_);
     if (steps_) steps_->settle(chain_.history);
@@ -338,6 +304,16 @@ class Encoder final : public StrandEncoder {
       ++sequence_;
     frames.keyframe = make_keyframe(state, shape_slices);
     return frames;
+  }
+
+  /// Of a fine anchor: each slice with the tables that the one before ended with.
+  void write_shapes_in_turn(Slices& slices) {
+    chain_.forget_tables();
+    Tables tables = chain_.tables;
+    for (uint32_t slice = 0; slice < layout_.slice_count(); ++slice)
+      write_symbols(set_, {layout_, slice, frame_.shape_codes, no_sizes_, next_sizes_, tables,
+                           writers_[slice], frame_.beside});
+    finish(0, layout_.slice_count(), slices);
   }
 
   void finish(uint32_t first, uint32_t count, Slices& slices) {
@@ -466,7 +442,7 @@ class Decoder final : public StrandDecoder {
     const auto told =
         static_cast<uint8_t>(std::to_integer<uint8_t>(bytes[kFrameHeaderBytes]) & ~step::kExactBit);
     if (bytes[0] != std::byte{uint8_t(Opcode::StrandKeyframe)}) return chain_number_;
-    return told == kFirstStepNumber || told == kFirstFineNumber ? told : number_;
+    return told >= kFirstStepNumber && told < number_ ? told : number_;
   }
   bool is_exact(std::span<const std::byte> bytes) const {
     return steps_ && bytes.size() > kFrameHeaderBytes &&
@@ -524,12 +500,11 @@ class Decoder final : public StrandDecoder {
     const auto table_bytes = body.take<uint32_t>();
     const auto packed = body.take_bytes(table_bytes);
     const step::Moment moment{snapshot.tick, snapshot.sim_time_ns, snapshot.world_from_head, snapshot.bust};
-    frame_.anchor_share = 1.0f;
+    step::Rounding rounding = step::Rounding::Coarse;
     if (steps_ && body.ok()) {
-      ASSIGN_OR_RETURN(const step::Rounding rounding,
-                       steps_->read_state(body, moment, layout_, fine_of(number)));
-      if (rounding != step::Rounding::Coarse) frame_.anchor_share = kFineShare;
+      ASSIGN_OR_RETURN(rounding, steps_->read_state(body, moment, layout_, fine_of(number)));
     }
+    be_anchor(frame_, rounding);
     take_into(body, frame_.shape_weights);
     if (!body.ok())
       return make_error(ErrorCode::BadInput, "keyframe of {} bytes is cut off in its tables or weights",
@@ -537,9 +512,9 @@ class Decoder final : public StrandDecoder {
     RETURN_IF_ERROR(read_tables(packed, chain));
     const auto place = [&](uint32_t slice) { place_shape(set_, {layout_, chain.history, slice, frame_}); };
     Tables tables = chain.tables;
-    if (frame_.anchor_share < 1.0f) {
+    if (rounding != step::Rounding::Coarse) {
       RETURN_IF_ERROR(read_slices_in_turn(body.rest(), tables, frame_.shape_codes));
-      for_each_part(decode_terms(layout_, workers_), layout_.slice_count(), place);
+      for (uint32_t slice = 0; slice < layout_.slice_count(); ++slice) place(slice);
     } else {
       RETURN_IF_ERROR(read_slices(body.rest(), tables, no_sizes_, frame_.shape_codes, place));
     }
@@ -654,7 +629,8 @@ class Decoder final : public StrandDecoder {
       return make_error(ErrorCode::BadInput, "{} bytes have no room for what a delta begins with",
                         message.body.size());
     frame_.length_blend = head.length_blend;
-    frame_.anchor_share = (head.flags & step::kFineFlag) != 0 ? kFineShare : 1.0f;
+    const bool is_fine = (head.flags & step::kFineFlag) != 0;
+    be_anchor(frame_, is_fine ? fine_of(chain_number_) : step::Rounding::Coarse);
     if ((head.flags & step::kStepFlag) != 0)
       frame_.head = {snapshot.world_from_head, {}};
     else
@@ -665,10 +641,13 @@ class Decoder final : public StrandDecoder {
     if (!weights.is_spent())
       return make_error(ErrorCode::BadInput, "the weights do not end where their symbols end");
     frame_.apply_weights();
+    const auto place = [&](uint32_t slice) {
+      (is_anchor ? place_anchor : place_slice)(set_, {layout_, chain_.history, slice, frame_});
+    };
     RETURN_IF_ERROR(read_slices(slices, tables, chain_.sizes, frame_.codes, [&](uint32_t slice) {
-      const auto place = is_anchor ? place_anchor : place_slice;
-      place(set_, {layout_, chain_.history, slice, frame_});
+      if (!is_fine) place(slice);
     }));
+    for (uint32_t slice = 0; is_fine && slice < layout_.slice_count(); ++slice) place(slice);
     return give(message, frame_.lattice, snapshot);
   }
 
@@ -704,7 +683,7 @@ class Decoder final : public StrandDecoder {
                         rest.size());
     for (uint32_t slice = 0; slice < layout_.slice_count(); ++slice) {
       SliceSymbols symbols[] = {{slice, tables, readers[slice]}};
-      read_symbols(set_, {layout_, no_sizes_, codes, next_sizes_, symbols});
+      read_symbols(set_, {layout_, no_sizes_, codes, next_sizes_, symbols, frame_.beside});
     }
     return check_spent(readers);
   }

@@ -28,8 +28,8 @@ void add_block(const ShapeRow& row, const Planes<int32_t>& target, size_t place,
 
 }  // namespace
 
-ShapeWeights fit_shape(const Layout& layout, float quantum_m, const Planes<int32_t>& target,
-                       WorkerPool& workers) {
+ShapeWeights fit_shape(const Layout& layout, const Neighbours& beside, float quantum_m,
+                       const Planes<int32_t>& target, WorkerPool& workers) {
   constexpr double kNoise = 150.0;  // steps: what edges are off by
   std::array<double, kShapeFeatureCount> noise;
   noise.fill(kNoise);
@@ -38,7 +38,7 @@ ShapeWeights fit_shape(const Layout& layout, float quantum_m, const Planes<int32
     LeastSquares<kShapeFeatureCount> fit;
     for (uint32_t v = 0; v < layout.vertex_count; ++v) {
       if (shape_class(v) != c) continue;
-      const ShapeRow row(layout, quantum_m, target, v);
+      const ShapeRow row(layout, beside, quantum_m, target, v);
       for (size_t place = 0; place < layout.no_neighbour(); place += kStep)
         add_block(row, target, place, fit);
     }

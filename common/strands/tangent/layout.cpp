@@ -13,7 +13,9 @@ namespace {
 constexpr uint32_t kThinnings = 8;          // the coarsest level has one strand in so many
 constexpr uint32_t kStrandsPerSlice = 128;  // fewer than kThinnings times that: a single slice
 constexpr uint32_t kWindow = 64;            // places before a block that are searched for neighbours
-constexpr double kCells = 1024.0;           // of the curve, along each axis
+constexpr uint32_t kAlikeWindow = 512;  // along the curve, either way, that is searched for the most alike
+constexpr size_t kMostAlike = 400'000;  // vertices; of more the nearest roots are taken instead
+constexpr double kCells = 1024.0;       // of the curve, along each axis
 
 /// Strands in the order of a Morton curve through their roots.
 std::vector<uint32_t> curve_order(uint32_t strand_count, std::span<const glm::vec3> rest_in_head_m) {
@@ -47,6 +49,27 @@ uint32_t slice_of(uint32_t i, uint32_t strand_count) {
   return 4 + static_cast<uint32_t>(eighth / 2);
 }
 
+/// The two best of those that are tried.
+struct NearestTwo {
+  std::array<float, 2> squared = {INFINITY, INFINITY};
+  std::array<uint32_t, 2> place;
+
+  void consider(uint32_t other, float distance_squared) {
+    if (distance_squared < squared[0]) {
+      squared = {distance_squared, squared[0]};
+      place = {other, place[0]};
+    } else if (distance_squared < squared[1]) {
+      squared[1] = distance_squared;
+      place[1] = other;
+    }
+  }
+};
+
+float squared_distance(const glm::vec3& a, const glm::vec3& b) {
+  const glm::vec3 away = a - b;
+  return (away.x * away.x + away.y * away.y) + away.z * away.z;
+}
+
 void find_neighbours(Layout& layout, std::span<const glm::vec3> rest_in_head_m) {
   for (auto& neighbour : layout.neighbour) neighbour.assign(layout.stride, layout.no_neighbour());
   if (rest_in_head_m.empty()) return;
@@ -56,20 +79,36 @@ void find_neighbours(Layout& layout, std::span<const glm::vec3> rest_in_head_m) 
       if (layout.strand_at[place] == kNoStrand) continue;
       const glm::vec3 root = rest_in_head_m[layout.strand_at[place]];
       const uint32_t end = place / kBlockSize * kBlockSize;
-      std::array<float, 2> nearest = {INFINITY, INFINITY};
-      for (uint32_t other = std::max(begin, end > kWindow ? end - kWindow : 0u); other < end; ++other) {
-        const glm::vec3 away = rest_in_head_m[layout.strand_at[other]] - root;
-        const float squared = (away.x * away.x + away.y * away.y) + away.z * away.z;
-        if (squared < nearest[0]) {
-          nearest = {squared, nearest[0]};
-          layout.neighbour[1][place] = layout.neighbour[0][place];
-          layout.neighbour[0][place] = other;
-        } else if (squared < nearest[1]) {
-          nearest[1] = squared;
-          layout.neighbour[1][place] = other;
-        }
-      }
+      NearestTwo nearest{.place = {layout.no_neighbour(), layout.no_neighbour()}};
+      for (uint32_t other = std::max(begin, end > kWindow ? end - kWindow : 0u); other < end; ++other)
+        nearest.consider(other, squared_distance(rest_in_head_m[layout.strand_at[other]], root));
+      for (size_t i = 0; i < 2; ++i) layout.neighbour[i][place] = nearest.place[i];
     }
+  }
+}
+
+/// Strands that lie alike at rest move alike: roots count most, middles and tips half as much. `order`: the
+/// strands along the curve.
+void find_alike(Layout& layout, std::span<const uint32_t> order, std::span<const glm::vec3> rest_in_head_m) {
+  layout.alike = layout.neighbour;
+  const uint32_t count = layout.strand_count;
+  if (rest_in_head_m.empty() || rest_in_head_m.size() > kMostAlike) return;
+  const auto middle = rest_in_head_m.subspan(size_t{count} * (layout.vertex_count / 2), count);
+  const auto tip = rest_in_head_m.last(count);
+  for (uint32_t i = 0; i < count; ++i) {
+    const uint32_t strand = order[i];
+    const uint32_t place = layout.place_of[strand];
+    const uint32_t end = place / kBlockSize * kBlockSize;
+    NearestTwo nearest{.place = {layout.no_neighbour(), layout.no_neighbour()}};
+    for (uint32_t k = i - std::min(i, kAlikeWindow); k < std::min(count, i + kAlikeWindow + 1); ++k) {
+      const uint32_t other = order[k];
+      if (layout.place_of[other] >= end) continue;
+      const float apart = squared_distance(rest_in_head_m[other], rest_in_head_m[strand]);
+      const float middles = 0.5f * squared_distance(middle[other], middle[strand]);
+      nearest.consider(layout.place_of[other],
+                       (apart + middles) + 0.5f * squared_distance(tip[other], tip[strand]));
+    }
+    for (size_t n = 0; n < 2; ++n) layout.alike[n][place] = nearest.place[n];
   }
 }
 
@@ -102,6 +141,7 @@ Layout make_layout(uint32_t strand_count, uint32_t vertex_count, std::span<const
     if (strand != kNoStrand) layout.place_of[strand] = place;
   }
   find_neighbours(layout, rest_in_head_m);
+  find_alike(layout, order, rest_in_head_m);
 
   layout.rest_length_m.assign(layout.plane_size(), 0.0f);
   for (auto& edge : layout.rest_edge_m) edge.assign(layout.plane_size(), 0.0f);

@@ -15,20 +15,24 @@ namespace strandcast::tangent {
 inline constexpr uint32_t kBlockSize = 8;
 inline constexpr uint32_t kNoStrand = UINT32_MAX;
 
+/// Two places beside each place of a layout, in earlier blocks; `no_neighbour()` where there is none.
+using Neighbours = std::array<std::vector<uint32_t>, 2>;  // (stride)
+
 /// Strands in coding order. A place is a position in that order; slices begin at whole blocks, so some places
 /// at a slice's end hold no strand. The last block of all, `no_neighbour()`, holds zeros in every array.
 struct Layout {
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
-  uint32_t stride = 0;                // places, the block of zeros included
-  std::vector<uint32_t> strand_at;    // (stride) place -> strand, or kNoStrand
-  std::vector<uint32_t> place_of;     // (strand_count) strand -> place
-  std::vector<float> presence;        // (stride) 1, or 0 where there is no strand
-  std::vector<uint32_t> slice_begin;  // (slice_count + 1) first place of each slice
-  std::vector<uint32_t> strands_in;   // (slice_count) the first places of each slice hold strands
-  std::array<std::vector<uint32_t>, 2> neighbour;  // (stride) a place in an earlier block of the slice
-  std::vector<float> rest_length_m;                // (vertex_count x stride) of the segment before
-  std::array<std::vector<float>, 3> rest_edge_m;   // (vertex_count x stride) from the vertex before; roots
+  uint32_t stride = 0;                            // places, the block of zeros included
+  std::vector<uint32_t> strand_at;                // (stride) place -> strand, or kNoStrand
+  std::vector<uint32_t> place_of;                 // (strand_count) strand -> place
+  std::vector<float> presence;                    // (stride) 1, or 0 where there is no strand
+  std::vector<uint32_t> slice_begin;              // (slice_count + 1) first place of each slice
+  std::vector<uint32_t> strands_in;               // (slice_count) the first places of each slice hold strands
+  Neighbours neighbour;                           // the nearest roots, of the same slice
+  Neighbours alike;                               // the most alike at rest, of all slices
+  std::vector<float> rest_length_m;               // (vertex_count x stride) of the segment before
+  std::array<std::vector<float>, 3> rest_edge_m;  // (vertex_count x stride) from the vertex before; roots
 
   uint32_t slice_count() const { return static_cast<uint32_t>(slice_begin.size()) - 1; }
   uint32_t no_neighbour() const { return stride - kBlockSize; }

@@ -116,9 +116,10 @@ struct Frame {
   std::array<MotionClass, kMotionClassCount> motion;  // by apply_weights
   uint8_t length_blend = 0;  // of the last decoded length against the rest length, in 1/16
   Codes codes;
-  ShapeWeights shape_weights{};  // of an anchor
-  float anchor_share = 1.0f;     // of the steps of its integers
-  Codes shape_codes;             // of an anchor, for who has no history
+  ShapeWeights shape_weights{};                     // of an anchor
+  float anchor_share = 1.0f;                        // of the steps of its integers
+  Neighbours Layout::*beside = &Layout::neighbour;  // of an anchor
+  Codes shape_codes;                                // of an anchor, for who has no history
   Planes<int32_t> lattice;
   Planes<float> velocity;
   Planes<float> residual;
@@ -158,8 +159,8 @@ void fit_motion(simd::InstructionSet set, const Layout& layout, const History& h
                 const Planes<int32_t>& target, WorkerPool& workers, Frame& frame);
 
 /// Fits the weights of the shape prediction to `target`.
-ShapeWeights fit_shape(const Layout& layout, float quantum_m, const Planes<int32_t>& target,
-                       WorkerPool& workers);
+ShapeWeights fit_shape(const Layout& layout, const Neighbours& beside, float quantum_m,
+                       const Planes<int32_t>& target, WorkerPool& workers);
 
 /// Inputs of the work on one slice of a frame; `frame` is filled.
 struct SliceWork {
@@ -167,6 +168,9 @@ struct SliceWork {
   const History& history;
   uint32_t slice;
   Frame& frame;
+
+  /// Where the slice is one of an anchor.
+  const Neighbours& beside() const { return layout.*frame.beside; }
 };
 struct QuantiseWork {
   SliceWork of;

@@ -65,7 +65,7 @@ STRANDCAST_LANES void place_step_lanes(const SliceWork& of) {
 STRANDCAST_LANES void place_anchor_lanes(const SliceWork& of) {
   EscapeWalk escapes(of.frame.codes.escapes[of.slice], escape_step(of.frame.anchor_share));
   for_each_block(of, [&](const MotionRow& row, size_t place, const Expected& moved) STRANDCAST_LANES_LAMBDA {
-    const ShapeRow shape(of.layout, of.history.quantum_m, of.frame.lattice, row.vertex());
+    const ShapeRow shape(of.layout, of.beside(), of.history.quantum_m, of.frame.lattice, row.vertex());
     Expected expected = shape.expect(place, of.frame.shape_weights);
     expected.refine(of.frame.anchor_share);
     const size_t at = row.at(place);
@@ -79,7 +79,7 @@ STRANDCAST_LANES void place_anchor_lanes(const SliceWork& of) {
 STRANDCAST_LANES void place_shape_lanes(const SliceWork& of) {
   EscapeWalk escapes(of.frame.shape_codes.escapes[of.slice], escape_step(of.frame.anchor_share));
   for (uint32_t v = 0; v < of.layout.vertex_count; ++v) {
-    const ShapeRow shape(of.layout, of.history.quantum_m, of.frame.lattice, v);
+    const ShapeRow shape(of.layout, of.beside(), of.history.quantum_m, of.frame.lattice, v);
     for (size_t place = of.layout.slice_begin[of.slice]; place < of.layout.slice_begin[of.slice + 1];
          place += kLaneCount) {
       Expected expected = shape.expect(place, of.frame.shape_weights);

@@ -190,7 +190,7 @@ STRANDCAST_LANES void quantise_step_lanes(const QuantiseWork& work) {
 STRANDCAST_LANES void quantise_anchor_lanes(const QuantiseWork& work) {
   const SliceWork& of = work.of;
   for_each_block(of, [&](const MotionRow& row, size_t place, const Expected& moved) STRANDCAST_LANES_LAMBDA {
-    const ShapeRow shape(of.layout, of.history.quantum_m, of.frame.lattice, row.vertex());
+    const ShapeRow shape(of.layout, of.beside(), of.history.quantum_m, of.frame.lattice, row.vertex());
     Expected expected = shape.expect(place, of.frame.shape_weights);
     expected.refine(of.frame.anchor_share);
     const size_t at = row.at(place);

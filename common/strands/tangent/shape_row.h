@@ -89,8 +89,9 @@ struct Edges {
 class ShapeRow {
  public:
   /// Makes the row of vertex v. Reads `position` of earlier rows, and of earlier blocks of this row.
-  ShapeRow(const Layout& layout, float quantum_m, const Planes<int32_t>& position, uint32_t v)
-      : layout_(layout), quantum_m_(quantum_m), position_(position), v_(v) {}
+  ShapeRow(const Layout& layout, const Neighbours& beside, float quantum_m, const Planes<int32_t>& position,
+           uint32_t v)
+      : layout_(layout), beside_(beside), quantum_m_(quantum_m), position_(position), v_(v) {}
 
   ShapeFeatures features(size_t place) const;
   Expected expect(size_t place, const ShapeWeights& weights) const;
@@ -100,6 +101,7 @@ class ShapeRow {
 
  private:
   const Layout& layout_;
+  const Neighbours& beside_;
   float quantum_m_;
   const Planes<int32_t>& position_;
   uint32_t v_;
@@ -130,7 +132,7 @@ STRANDCAST_LANES ShapeFeatures ShapeRow::features(size_t place) const {
     value[13] = difference(value[1], turned(value[3], edges.rest(own.data(), v_ - 2), value[2]));
   }
   for (uint32_t which = 0; which < 2; ++which) {
-    const uint32_t* other = layout_.neighbour[which].data() + place;
+    const uint32_t* other = beside_[which].data() + place;
     const LaneVectors now = edges.now(other, v_);
     const LaneVectors rest = edges.rest(other, v_);
     value[4 + 3 * which] = now;

@@ -43,7 +43,7 @@ bool is_zero(const Codes& codes, size_t at) {
 template <class Visit>
 void for_each_block(const SparseContext& context, Visit visit) {
   const Layout& layout = context.layout;
-  SizeRows sizes(layout, context.then, context.now);
+  SizeRows sizes(layout, layout.neighbour, context.then, context.now);
   for (uint32_t v = 0; v < layout.vertex_count; ++v) {
     // What is not visited is 0.
     const size_t begin = v * size_t{layout.stride};

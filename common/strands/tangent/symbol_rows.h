@@ -112,8 +112,9 @@ struct SymbolRow {
 /// Sizes of the preceding frame and of this one.
 class SizeRows {
  public:
-  SizeRows(const Layout& layout, const SymbolSizes& then, SymbolSizes& now)
+  SizeRows(const Layout& layout, const Neighbours& beside, const SymbolSizes& then, SymbolSizes& now)
       : layout_(layout),
+        beside_(beside),
         then_(then),
         now_(now),
         zeros_(layout.stride, 0),
@@ -139,13 +140,12 @@ class SizeRows {
     uint8_t* __restrict length_sum = known_length_.data() + begin;
     for (size_t i = 0; i < count; ++i) length_sum[i] = static_cast<uint8_t>(own_length[i] + parent_length[i]);
     std::memset(length + begin, 0, count);
-    return {
-        known_.data(), known_length_.data(), layout_.neighbour[0].data(), layout_.neighbour[1].data(), across,
-        length};
+    return {known_.data(), known_length_.data(), beside_[0].data(), beside_[1].data(), across, length};
   }
 
  private:
   const Layout& layout_;
+  const Neighbours& beside_;
   const SymbolSizes& then_;
   SymbolSizes& now_;
   std::vector<uint16_t> zeros_;

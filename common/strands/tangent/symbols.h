@@ -46,6 +46,7 @@ struct SymbolWriting {
   SymbolSizes& now;
   Tables& tables;
   ValueWriter& writer;
+  Neighbours Layout::*beside = &Layout::neighbour;
 };
 /// Writes a slice's integers and escapes. A kernel for every instruction set.
 void write_symbols(simd::InstructionSet set, const SymbolWriting& of);
@@ -65,6 +66,7 @@ struct SymbolReading {
   Codes& codes;
   SymbolSizes& now;
   std::span<SliceSymbols> slices;  // one to kMostSlicesAtOnce
+  Neighbours Layout::*beside = &Layout::neighbour;
 };
 /// Inverse of write_symbols() for untrusted bytes. Any bytes give some integers; escapes take bytes, so their
 /// number is bounded. A kernel for every instruction set.
