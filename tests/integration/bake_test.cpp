@@ -345,7 +345,8 @@ TEST_F(Bake, AStopEndsTheServerAndLeavesTheOldFile) {
   ASSERT_TRUE(save_file(path("out.abc"), std::as_bytes(std::span(old))));
   ASSERT_EQ(setenv("TMPDIR", folder_.path().c_str(), 1), 0);  // where the server's folder is
   test::ChildProcess bake(STRANDCAST_CTL_PROGRAM,
-                          words({path("out.abc"), "--motion", "builtin", "--seconds", "3600"}), path("said"));
+                          words({path("out.abc"), "--replace", "--motion", "builtin", "--seconds", "3600"}),
+                          path("said"));
   ASSERT_TRUE(eventually([&] { return entries("out.abc") == 2; }))
       << "the old one, and the new one under another name";
   EXPECT_EQ(entries("strandcast-"), 1u);
@@ -362,7 +363,7 @@ TEST_F(Bake, TheServerEndsWithWhoeverIsKilled) {
   ASSERT_EQ(setenv("TMPDIR", folder_.path().c_str(), 1), 0);
   for (const int signal : {SIGKILL, SIGTERM}) {
     test::ChildProcess bake(STRANDCAST_CTL_PROGRAM,
-                            words({path("out.abc"), "--motion", "builtin", "--seconds", "3600"}),
+                            words({path("out.abc"), "--replace", "--motion", "builtin", "--seconds", "3600"}),
                             path("said"));
     pid_t server = 0;
     ASSERT_TRUE(eventually([&] {
