@@ -69,8 +69,8 @@ bool is_frame_of(const std::filesystem::path& path, const std::filesystem::path&
                                      std::filesystem::absolute(out).parent_path(), failure);
 }
 
-/// No file of a person's is written over: neither one that is read, nor one that stands where the file to
-/// write was left out.
+/// No file of a person's is written over: neither one that is read, nor, unasked, one that stands where the
+/// file to write was left out.
 Status check_paths(const BakeCommand& command) {
   const std::vector<std::string>& paths = command.exported.paths;
   const std::string out = paths.back();
@@ -93,13 +93,16 @@ Status check_paths(const BakeCommand& command) {
     if (std::filesystem::equivalent(path, out, failure) || (!command.exported.at_s && is_frame_of(path, out)))
       return make_error(ErrorCode::BadInput,
                         "{} is read, and would be written over: name another file to write", path);
-  if (names_none && std::filesystem::exists(out, failure))
-    return make_error(
-        ErrorCode::BadInput,
-        "{} is there already, and no file to write stands after it: bake {} OUT.abc bakes its hair "
-        "(remove it, to bake the built-in hair into it)",
-        out, out);
-  return {};
+  if (command.is_replacing || !std::filesystem::exists(out, failure)) return {};
+  return names_none
+             ? make_error(ErrorCode::BadInput,
+                          "{} is there already, and no file to write stands after it: bake {} OUT.abc bakes "
+                          "its hair (--replace bakes the built-in hair into it)",
+                          out, out)
+             : make_error(ErrorCode::BadInput,
+                          "{} is there already: --replace writes over it; hair is what stands before the "
+                          "file to write",
+                          out);
 }
 
 Result<ExportReport> bake(const BakeCommand& command, const std::atomic<bool>& stop) {
@@ -156,8 +159,7 @@ void declare_bake(CLI::App& app, BakeCommand& command) {
   feed.wind = kStillAir;
   app.add_option("paths", command.exported.paths,
                  "HAIR.ply [MORE.ply ..] OUT.abc: hair files as for strandcast-server --groom (without: the "
-                 "scene's hair), and the file to write: .usda, .usdc, .usdz, .abc, .ply or .csv; it is "
-                 "replaced, where hair is named")
+                 "scene's hair), and the file to write: .usda, .usdc, .usdz, .abc, .ply or .csv")
       ->required()
       ->expected(1, static_cast<int>(kMaxGroomFiles) + 1);
   app.add_option(
@@ -175,6 +177,7 @@ void declare_bake(CLI::App& app, BakeCommand& command) {
          "Seconds before the first frame, in which the head gets from rest to the motion's first speed")
       ->check(without_nan(CLI::Range(0.0, kLongestLeadS)))
       ->capture_default_str();
+  app.add_flag("--replace", command.is_replacing, "Write over a file that is there");
   app.add_option("--scene", command.scene, "Scene file (default: the built-in scene in full quality)");
   app.add_option("--set", command.overrides, "path=value: override a field of the scene; repeatable")
       ->expected(1)

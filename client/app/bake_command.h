@@ -26,6 +26,7 @@ struct BakeCommand {
   std::vector<std::string> overrides;  // of the scene
   std::filesystem::path server;        // empty: strandcast-server beside this program
   double lead_s = kUsualLeadS;
+  bool is_replacing = false;  // a file that is there
 };
 
 /// Adds the options of how to read a BVH file; `prefix` begins the names of unit and up axis.

@@ -40,13 +40,26 @@ std::string trouble_of_moment(const std::string& text) {
                      kMostSeconds);
 }
 
+/// From metres with +Y up to the unit and axis of the file.
+glm::dmat4 file_from_metres(const ExportOptions& options) {
+  const glm::dmat3 turn =
+      options.up == ExportUp::Z ? glm::dmat3(1, 0, 0, 0, 0, 1, 0, -1, 0) : glm::dmat3(1.0);
+  return glm::dmat4(turn / options.unit_m);
+}
+
 /// In the unit and axes of the hair's files where the command states neither; then in their place too, in the
-/// head's space and where curves move the head.
+/// head's space and where curves move the head. These have it in any unit.
 void follow_files(const HairOrigin& origin, const ExportCommand& command, ExportOptions& options) {
   if (!command.unit) options.unit_m = origin.unit_m;
   if (!command.up) options.up = origin.is_z_up ? ExportUp::Z : ExportUp::Y;
   if (!command.unit && !command.up && (options.space == ExportSpace::Head || origin.is_world_at_rest))
     options.file_from_space = origin.file_from_head;
+  else if (options.space == ExportSpace::World && origin.is_world_at_rest) {
+    const glm::dmat3 head_from_file = glm::inverse(glm::dmat3(origin.file_from_head));
+    glm::dmat4 placed(1.0);
+    placed[3] = glm::dvec4(head_from_file * glm::dvec3(origin.file_from_head[3]), 1.0);
+    options.file_from_space = file_from_metres(options) * placed;
+  }
 }
 
 struct OpenedSource {

@@ -198,8 +198,6 @@ Result<JoinedParts> load_parts(const GroomFileOptions& options) {
   return JoinedParts{std::move(whole), std::move(apart)};
 }
 
-constexpr std::array kUsualUnitsM = {1.0f, 0.01f, 0.001f, 0.0254f};
-
 std::string unit_text(float unit_m) {
   return unit_m < 0.5f ? fmt::format("{:.4g} mm", unit_m * kMmPerM) : fmt::format("{:.4g} m", unit_m);
 }
@@ -225,7 +223,7 @@ std::string unlikely_unit(float unit_m, const glm::vec3& size) {
   if (is_likely(unit_m) || !(largest > 0.0f)) return {};
   std::string sentence =
       fmt::format("with its unit this hair is {} long, as on no head", unit_text(largest * unit_m));
-  for (const float other_m : kUsualUnitsM)
+  for (const auto& [other_m, name] : kCommonUnits)
     if (is_likely(other_m))
       return sentence +
              fmt::format(": groom.file.unit_m={:g} makes it {}", other_m, unit_text(largest * other_m));
@@ -249,7 +247,7 @@ std::string unlikely_roots(float unit_m, const Groom& groom) {
   if (!(reach * unit_m > kMostRootsM)) return {};
   std::string sentence =
       fmt::format("the roots reach over {} then, as on no head", unit_text(reach * unit_m));
-  for (const float other_m : kUsualUnitsM)
+  for (const auto& [other_m, name] : kCommonUnits)
     if (reach * other_m >= kLeastRootsM && reach * other_m <= kMostRootsM)
       return sentence +
              fmt::format(": groom.file.unit_m={:g} makes it {}", other_m, unit_text(reach * other_m));

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <span>
 
 #include "common/base/quantile.h"
 #include "common/groom/head_fit.h"
+#include "common/groom/placement.h"
 
 namespace strandcast {
 namespace {
@@ -99,13 +99,11 @@ double share_on_head(const FittedSphere& head, const Groom& part, float scale) {
 float scale_onto(const FittedSphere& head, const Groom& part) {
   constexpr double kSome = 0.2, kMost = 0.8;
   constexpr float kLeastReach = 0.3f, kMostReach = 6.0f;  // radii from side to side of what grows on a head
-  constexpr std::array kScales = {0.01f, 100.0f,  0.001f,         1000.0f, 0.1f,
-                                  10.0f, 0.0254f, 1.0f / 0.0254f, 2.54f,   1.0f / 2.54f};
   if (share_on_head(head, part, 1.0f) >= kSome) return 1.0f;
   float best = 0.0f;
   double most = kMost;
   const float reach = extent_of(roots_of(part)) / head.radius_m;
-  for (const float scale : kScales) {
+  for (const float scale : kUnitRatios) {
     if (!(scale * reach >= kLeastReach && scale * reach <= kMostReach)) continue;
     const double share = share_on_head(head, part, scale);
     if (share <= most) continue;

@@ -12,6 +12,7 @@
 #include "common/base/quantile.h"
 #include "common/base/units.h"
 #include "common/groom/head_fit.h"
+#include "common/groom/placement.h"
 #include "common/math/point_tree.h"
 #include "common/math/rigid_fit.h"
 
@@ -163,14 +164,6 @@ std::vector<Named> usual_turns() {
   return turns;
 }
 
-std::vector<Named> usual_scales() {
-  std::vector<Named> scales;
-  for (const float scale :
-       {0.01f, 100.0f, 0.001f, 1000.0f, 0.1f, 10.0f, 0.0254f, 1.0f / 0.0254f, 2.54f, 1.0f / 2.54f})
-    scales.push_back({{scale, glm::mat3(1.0f)}, fmt::format("made {:.4g} times as large", scale)});
-  return scales;
-}
-
 /// "1600 mm", "3.2 mm".
 std::string text_mm(float distance_m) {
   const double mm = static_cast<double>(distance_m) * kMmPerM;
@@ -207,7 +200,8 @@ std::string unfit_mesh(const Mesh& head, const Groom& groom, const glm::vec3& fi
   const bool is_far = half_m > kFarM || most_m > kFarthestM;
   std::vector<Named> others = usual_turns();
   if (is_far)
-    for (Named& scale : usual_scales()) others.push_back(std::move(scale));
+    for (const float scale : kUnitRatios)
+      others.push_back({{scale, glm::mat3(1.0f)}, fmt::format("made {:.4g} times as large", scale)});
   const Named* best = nullptr;
   float least_m = is_far ? kFarM : std::min(kNearM, 0.5f * most_m);
   for (const Named& other : others) {

@@ -17,12 +17,6 @@ namespace {
 
 /// Radii of the sphere through the roots of a human head, child to large adult with a wide hairline.
 constexpr float kSmallestHeadRadiusM = 0.07f, kTypicalHeadRadiusM = 0.1f, kLargestHeadRadiusM = 0.12f;
-struct CommonUnit {
-  float unit_m;
-  const char* name;
-};
-constexpr std::array<CommonUnit, 4> kCommonUnits = {
-    CommonUnit{1.0f, "metres"}, {0.01f, "centimetres"}, {0.001f, "millimetres"}, {0.0254f, "inches"}};
 
 /// Fewer roots say nothing of a head.
 constexpr uint32_t kMinRoots = 64;

@@ -9,6 +9,20 @@
 
 namespace strandcast {
 
+struct CommonUnit {
+  float unit_m;
+  const char* name;
+};
+/// Units of files, in the order in which they are tried. Metres that were taken for centimetres are last.
+inline constexpr CommonUnit kCommonUnits[] = {{1.0f, "metres"},
+                                              {0.01f, "centimetres"},
+                                              {0.001f, "millimetres"},
+                                              {0.0254f, "inches"},
+                                              {100.0f, "units of 100 m"}};
+/// How many times larger one file may be than another, by its unit alone.
+inline constexpr float kUnitRatios[] = {0.01f, 100.0f,  0.001f,         1000.0f, 0.1f,
+                                        10.0f, 0.0254f, 1.0f / 0.0254f, 2.54f,   1.0f / 2.54f};
+
 /// Transformation of a file's points into head space.
 struct GroomPlacement {
   bool is_z_up = false;         // +Z up and -Y forward in the file; turned to +Y up and +Z forward
@@ -57,10 +71,9 @@ const char* setting_of(const UpSide& up);
 /// `groom` is upright (+Y), in any unit.
 Guess<float> guess_yaw_deg(const Groom& groom);
 
-/// Guesses the unit: the first of metre, centimetre, millimetre and inch that gives the sphere through the
-/// roots the size of a human head, or flat roots hair of usual length. Otherwise returns the factor that
-/// does. Fur and beards never get a unit of their own: one in which neither is usual stays a metre. `groom`
-/// is in file units, +Y up.
+/// Guesses the unit: the first of kCommonUnits that gives the sphere through the roots the size of a human
+/// head, or flat roots hair of usual length. Otherwise returns the factor that does. Fur and beards never get
+/// a unit of their own: one in which neither is usual stays a metre. `groom` is in file units, +Y up.
 Guess<float> guess_unit(const Groom& groom);
 
 }  // namespace strandcast

@@ -20,7 +20,6 @@ namespace {
 
 constexpr uint32_t kMaxJointChannels = 6;
 constexpr double kMaxChannelValue = 1e9;
-constexpr uint32_t kNoJoint = UINT32_MAX;
 constexpr glm::dvec3 kAxis[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
 // A first frame is a calibration pose when most of its rotations are almost zero, clearly more than one frame
@@ -52,6 +51,7 @@ struct Skeleton {
   std::vector<Joint> joints;  // parents before children
   std::vector<EndSite> end_sites;
   uint32_t channel_count = 0;
+  uint32_t top = 0;  // of the performer whose head is taken
 };
 
 /// A number within bounds, also with the decimal comma of some programs.
@@ -183,25 +183,6 @@ class HierarchyParser {
   Skeleton skeleton_;
 };
 
-/// True for "Head", "mixamorig:Head", "joint_head", "Bip01 Head", "root.head", "Head1", "head_01", "Head_M"
-/// and "C_head_JNT", not for "Head_End".
-bool is_head_name(std::string_view name) {
-  constexpr std::string_view kDigits = "0123456789";
-  while (!name.empty()) {
-    const size_t separator = name.find_last_of(":_ .-|");
-    std::string_view word = separator == std::string_view::npos ? name : name.substr(separator + 1);
-    word = word.substr(0, word.find_last_not_of(kDigits) + 1);
-    if (equals_ignoring_case(word, "head")) return true;
-    // What may follow it: a number, the middle, what it is.
-    const bool is_passed = word.empty() || equals_ignoring_case(word, "m") ||
-                           equals_ignoring_case(word, "jnt") || equals_ignoring_case(word, "joint") ||
-                           equals_ignoring_case(word, "bone");
-    if (separator == std::string_view::npos || !is_passed) return false;
-    name = name.substr(0, separator);
-  }
-  return false;
-}
-
 /// The name of a joint, "Head#2" for the second of that name: performers may be named alike.
 std::string label_of(const Skeleton& skeleton, uint32_t joint) {
   const std::string& name = skeleton.joints[joint].name;
@@ -226,16 +207,27 @@ Result<uint32_t> find_head(const Skeleton& skeleton, const std::string& wanted) 
                     wanted.empty() ? "Head or head" : shown(wanted), known_joints(skeleton));
 }
 
-uint32_t root_of(const Skeleton& skeleton, uint32_t joint) {
-  while (skeleton.joints[joint].parent != kNoJoint) joint = skeleton.joints[joint].parent;
-  return joint;
+uint32_t find_top(const Skeleton& skeleton, uint32_t head) {
+  std::vector<std::string> names;
+  std::vector<uint32_t> parents;
+  for (const Joint& joint : skeleton.joints) {
+    names.push_back(joint.name);
+    parents.push_back(joint.parent);
+  }
+  return top_of_performer(names, parents, head);
+}
+
+/// Whether a joint is of the performer whose head is taken.
+bool is_own(const Skeleton& skeleton, uint32_t joint) {
+  while (joint != skeleton.top && joint != kNoJoint) joint = skeleton.joints[joint].parent;
+  return joint == skeleton.top;
 }
 
 /// Which joint is taken as the head, and whose, where the file has several performers.
 std::string taken_head(const Skeleton& skeleton, uint32_t head) {
   std::string others;
   for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
-    if (!is_head_name(skeleton.joints[i].name) || root_of(skeleton, i) == root_of(skeleton, head)) continue;
+    if (!is_head_name(skeleton.joints[i].name) || is_own(skeleton, i)) continue;
     others += fmt::format("{}{}", others.empty() ? "" : ", ", shown(label_of(skeleton, i)));
   }
   if (others.empty())
@@ -250,6 +242,13 @@ std::vector<const Joint*> path_to(const Skeleton& skeleton, uint32_t joint_index
   for (; joint_index != kNoJoint; joint_index = skeleton.joints[joint_index].parent)
     path.push_back(&skeleton.joints[joint_index]);
   std::reverse(path.begin(), path.end());
+  return path;
+}
+
+/// Likewise from the performer's topmost joint on.
+std::vector<const Joint*> own_path(const Skeleton& skeleton, uint32_t joint_index) {
+  std::vector<const Joint*> path = path_to(skeleton, joint_index);
+  path.erase(path.begin(), std::find(path.begin(), path.end(), &skeleton.joints[skeleton.top]));
   return path;
 }
 
@@ -315,29 +314,29 @@ double first_bone(const std::vector<const Joint*>& path, std::span<const double>
 
 /// Body height, file units: the bones from the hips down to the lowest point and up to the highest one, as
 /// long as they are; rest poses often spread the legs. Where the hips stand higher over the floor than these
-/// legs reach, that counts. Of the tree of `head` alone.
+/// legs reach, that counts. Of the performer's joints alone.
 BodyHeight body_height(const Skeleton& skeleton, uint32_t head, const FileUp& axes,
                        std::span<const double> first_row) {
   struct Reach {
     double height = 0.0;  // above the root with all rotations zero
     double bones = 0.0;   // length of the bones from the root
   };
-  const uint32_t root = root_of(skeleton, head);
   const auto grown = [&](const Reach& parent, const glm::dvec3& offset) {
     return Reach{parent.height + axes.at_rest.of(offset), parent.bones + glm::length(offset)};
   };
   std::vector<Reach> reach;
   double root_height = 0.0;
+  for (const Joint* const joint : path_to(skeleton, skeleton.top))
+    root_height += axes.in_motion.of(place_of(*joint, first_row));
   for (const Joint& joint : skeleton.joints) {
-    const glm::dvec3 place = place_of(joint, first_row);
-    const bool is_own = root_of(skeleton, static_cast<uint32_t>(reach.size())) == root;
-    if (is_own && joint.parent == kNoJoint) root_height = axes.in_motion.of(place);
-    reach.push_back(joint.parent == kNoJoint || !is_own ? Reach{} : grown(reach[joint.parent], place));
+    const auto index = static_cast<uint32_t>(reach.size());
+    const bool is_grown = index != skeleton.top && is_own(skeleton, index);
+    reach.push_back(is_grown ? grown(reach[joint.parent], place_of(joint, first_row)) : Reach{});
   }
   const size_t joint_count = reach.size();
   for (const EndSite& site : skeleton.end_sites) {
     CHECK(site.parent < joint_count);
-    if (root_of(skeleton, site.parent) == root) reach.push_back(grown(reach[site.parent], site.offset));
+    if (is_own(skeleton, site.parent)) reach.push_back(grown(reach[site.parent], site.offset));
   }
   const auto [lowest, highest] = std::minmax_element(
       reach.begin(), reach.end(), [](const Reach& a, const Reach& b) { return a.height < b.height; });
@@ -348,7 +347,7 @@ BodyHeight body_height(const Skeleton& skeleton, uint32_t head, const FileUp& ax
   // Of a body without legs the hips are as high as these would be long, where it stands. A root from which
   // the first bone is as long as legs stands on the floor.
   const bool is_standing = root_height >= kLowestHips * highest->bones;
-  if (is_standing || first_bone(path_to(skeleton, head), first_row) >= kLongestSpineBone * highest->bones)
+  if (is_standing || first_bone(own_path(skeleton, head), first_row) >= kLongestSpineBone * highest->bones)
     return {std::max(root_height, 0.0) + highest->bones,
             "the height of the root and the bones from there to the crown"};
   constexpr double kBodies = 1.0 / (1.0 - kHipsShare);
@@ -529,6 +528,7 @@ Result<Rows> read_rows(TextCursor& cursor, const Skeleton& skeleton, const Joint
   Rows rows;
   std::vector<double> row(skeleton.channel_count);
   const auto instead = stand_ins(skeleton, head, body);
+  const JointPath to_top = path_to(skeleton, skeleton.top);
   size_t good_count = 0;
   while (const auto line = cursor.next_line()) {
     const size_t frame = rows.is_good.size();
@@ -547,7 +547,7 @@ Result<Rows> read_rows(TextCursor& cursor, const Skeleton& skeleton, const Joint
     ++good_count;
     clip.world_from_head.push_back(evaluate(head, row));
     const Pose& at_frame = clip.world_from_head.back();
-    const glm::dvec3 root = place_of(*head.front(), row);
+    const glm::dvec3 root = evaluate(to_top, row).position_m;
     rows.lift += at_frame.position_m - root;
     rows.root += root;
     rows.root_low = good_count == 1 ? root : glm::min(rows.root_low, root);
@@ -622,17 +622,16 @@ glm::dquat upright_from(const Upward& up) {
   return up.sign > 0.0 ? turn : glm::dquat(0, 0, 0, 1) * turn;
 }
 
-/// Where left and right joints of the head's tree say that a rest pose looks, in quarter turns from +Z
+/// Where left and right joints of the performer say that a rest pose looks, in quarter turns from +Z
 /// towards +X; nothing where they say nothing.
-std::optional<int> facing_at_rest(const Skeleton& skeleton, uint32_t head, const Upward& up,
+std::optional<int> facing_at_rest(const Skeleton& skeleton, const Upward& up,
                                   std::span<const double> first_row) {
   constexpr double kMostOff = 0.35;
   std::vector<glm::dvec3> places;
   std::vector<std::string> names;
   for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
     const Joint& joint = skeleton.joints[i];
-    const bool is_own = root_of(skeleton, i) == root_of(skeleton, head);
-    names.push_back(is_own ? joint.name : std::string());
+    names.push_back(is_own(skeleton, i) ? joint.name : std::string());
     places.push_back(place_of(joint, first_row) +
                      (joint.parent == kNoJoint ? glm::dvec3(0.0) : places[joint.parent]));
   }
@@ -679,14 +678,14 @@ void to_head_space(std::vector<glm::dvec3>& places, double unit_m, const FileUp&
   for (glm::dvec3& place : places) place = upright * (place * unit_m);
 }
 
-/// Paths to the joints of the body that are known, and their names; NotFound for one that was asked for. In
-/// the tree of the head; what is asked for may be in another one.
-Result<std::vector<JointPath>> find_body(const Skeleton& skeleton, uint32_t head, const BvhOptions& options,
+/// Paths to the joints of the body that are known, and their names; NotFound for one that was asked for. Of
+/// the performer; what is asked for may be another's.
+Result<std::vector<JointPath>> find_body(const Skeleton& skeleton, const BvhOptions& options,
                                          std::vector<std::string>& names) {
   std::vector<std::string> in_file, of_head;
   for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
     in_file.push_back(skeleton.joints[i].name);
-    of_head.push_back(root_of(skeleton, i) == root_of(skeleton, head) ? in_file.back() : std::string());
+    of_head.push_back(is_own(skeleton, i) ? in_file.back() : std::string());
   }
   std::vector<JointPath> paths;
   const auto add = [&](const std::string& name, size_t joint) {
@@ -696,8 +695,8 @@ Result<std::vector<JointPath>> find_body(const Skeleton& skeleton, uint32_t head
   if (options.has_body)
     for (const auto& [name, joint] : usual_body(of_head)) add(name, joint);
   for (const std::string& wanted : options.body_joints) {
-    const bool is_own = std::find(of_head.begin(), of_head.end(), wanted) != of_head.end();
-    const std::vector<std::string>& searched = is_own ? of_head : in_file;
+    const bool is_there = std::find(of_head.begin(), of_head.end(), wanted) != of_head.end();
+    const std::vector<std::string>& searched = is_there ? of_head : in_file;
     const auto found = std::find(searched.begin(), searched.end(), wanted);
     if (found == searched.end())
       return make_error(ErrorCode::NotFound, "no joint named {} (--body-joint, known: {})", shown(wanted),
@@ -731,9 +730,10 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
     return make_error(ErrorCode::BadInput, "the length unit is {} m, it must be above 0, or 0 to be guessed",
                       options.unit_m);
   TextCursor cursor(text, place);
-  ASSIGN_OR_RETURN(const Skeleton skeleton, HierarchyParser(cursor).parse());
+  ASSIGN_OR_RETURN(Skeleton skeleton, HierarchyParser(cursor).parse());
   const auto head = find_head(skeleton, options.head_joint);
   if (!head) return at(place, head.error());
+  skeleton.top = find_top(skeleton, *head);
   const auto path = path_to(skeleton, *head);
   ASSIGN_OR_RETURN(const MotionHeader header, parse_motion_header(cursor, options.frame_s));
   if (skeleton.channel_count == 0) return cursor.fail(ErrorCode::BadInput, "the hierarchy has no channels");
@@ -742,7 +742,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   MotionClip clip;
   std::vector<JointPath> body;
   if (options.has_body || !options.body_joints.empty()) {
-    auto found = find_body(skeleton, *head, options, clip.joint_name);
+    auto found = find_body(skeleton, options, clip.joint_name);
     if (!found) return at(place, found.error());
     body = std::move(found).value();
   }
@@ -755,7 +755,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
     leave_out_first_frames(clip, 1);
   clip.head_reason = taken_head(skeleton, *head);
   const Upward stated{options.is_z_up.value_or(false) ? 2 : 1};
-  FileUp up = options.is_z_up ? FileUp{stated, stated} : guess_both(path, rows);
+  FileUp up = options.is_z_up ? FileUp{stated, stated} : guess_both(own_path(skeleton, *head), rows);
   clip.up = up.in_motion.name();
   if (up.at_rest != up.in_motion)
     clip.up_reason = fmt::format(
@@ -764,7 +764,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   else if (up.at_rest != Upward{} && !options.is_z_up)
     clip.up_reason = fmt::format("{} is taken as up: there the head is above the hips in the rest pose",
                                  up.at_rest.name());
-  take_facing(clip, facing_at_rest(skeleton, *head, up.at_rest, rows.first), up);
+  take_facing(clip, facing_at_rest(skeleton, up.at_rest, rows.first), up);
   const BodyHeight height = body_height(skeleton, *head, up, rows.first);
   const bool is_guessed = options.unit_m == 0.0;
   if (is_guessed && !(height.units > 0.0))
@@ -775,7 +775,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   else
     take_unit(clip, height, options.unit_m);
   to_world(clip.world_from_head, clip.file_unit_m, up, options.recentre);
-  if (options.is_z_up) doubt_up(clip, stated, guess_both(path, rows).in_motion);
+  if (options.is_z_up) doubt_up(clip, stated, guess_both(own_path(skeleton, *head), rows).in_motion);
   to_head_space(clip.joint_m, clip.file_unit_m, up);
   return clip;
 }

@@ -1,5 +1,6 @@
 #include "common/motion/bvh_body.h"
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <string_view>
@@ -72,6 +73,52 @@ std::vector<std::pair<size_t, size_t>> sided_pairs(const std::vector<std::string
     if (side == Side::Right && other != left.end()) pairs.emplace_back(other->second, i);
   }
   return pairs;
+}
+
+bool is_head_name(std::string_view name) {
+  constexpr std::string_view kDigits = "0123456789";
+  while (!name.empty()) {
+    const size_t separator = name.find_last_of(":_ .-|");
+    std::string_view word = separator == std::string_view::npos ? name : name.substr(separator + 1);
+    word = word.substr(0, word.find_last_not_of(kDigits) + 1);
+    if (equals_ignoring_case(word, "head")) return true;
+    // What may follow it: a number, the middle, what it is.
+    const bool is_passed = word.empty() || equals_ignoring_case(word, "m") ||
+                           equals_ignoring_case(word, "jnt") || equals_ignoring_case(word, "joint") ||
+                           equals_ignoring_case(word, "bone");
+    if (separator == std::string_view::npos || !is_passed) return false;
+    name = name.substr(0, separator);
+  }
+  return false;
+}
+
+uint32_t top_of_performer(const std::vector<std::string>& joint_names, const std::vector<uint32_t>& parents,
+                          uint32_t head) {
+  const auto way_to = [&](uint32_t joint) {
+    std::vector<uint32_t> way;
+    for (; joint != kNoJoint; joint = parents[joint]) way.insert(way.begin(), joint);
+    return way;
+  };
+  // A hammer's head is in a hand: no arm has a left and a right one.
+  const auto has_sides = [&](uint32_t branch) {
+    std::vector<std::string> names(joint_names.size());
+    std::vector<uint8_t> is_below(joint_names.size());
+    for (uint32_t i = branch; i < parents.size(); ++i) {
+      is_below[i] = i == branch || (parents[i] != kNoJoint && is_below[parents[i]] != 0) ? 1 : 0;
+      if (is_below[i] != 0) names[i] = joint_names[i];
+    }
+    return !sided_pairs(names).empty();
+  };
+  const std::vector<uint32_t> way = way_to(head);
+  size_t top = 0;
+  for (uint32_t i = 0; i < joint_names.size(); ++i) {
+    if (!is_head_name(joint_names[i])) continue;
+    const std::vector<uint32_t> other = way_to(i);
+    const auto [mine, theirs] = std::mismatch(way.begin(), way.end(), other.begin(), other.end());
+    if (mine == way.end() || theirs == other.end() || !has_sides(*mine) || !has_sides(*theirs)) continue;
+    top = std::max(top, static_cast<size_t>(mine - way.begin()));
+  }
+  return way[top];
 }
 
 std::vector<std::pair<std::string, size_t>> usual_body(const std::vector<std::string>& joint_names) {

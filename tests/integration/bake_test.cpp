@@ -212,6 +212,19 @@ TEST_F(Bake, CurvesThatMoveAsOneAreTheMotion) {
   }
   EXPECT_THAT(said(), AllOf(HasSubstr("roots of 1 curves object do, which move as one"),
                             HasSubstr("one unit is taken as 0.0254 m and +Z as up, as of the hair")));
+  // In another unit the hair is in the same place of the world, upright.
+  ASSERT_EQ(run({"--motion", path("moving.abc"), "--fps", "4", "--space", "world", "--units", "m", "--up",
+                 "y", path("world.abc")}),
+            0)
+      << said();
+  const auto in_world = BakedFile(path("world.abc")).reader->read(3, kMaxStrandCount, 1 << 20);
+  ASSERT_TRUE(in_world);
+  for (size_t strand = 0; strand < kTufts; ++strand) {
+    const glm::dvec3 moved = 0.0254 * (pose_of(0.5) * point_of(static_cast<int>(strand), 0));
+    EXPECT_LT(glm::distance(glm::dvec3(in_world->points[6 * strand]), {moved.x, moved.z, -moved.y}),
+              2.0 * kBoundM)
+        << strand;
+  }
   // What was written moves hair as it was moved, from its first frame on, which is behind the rest shape.
   ASSERT_EQ(run({"--motion", path("out.abc"), "--fps", "4", path("again.abc")}), 0) << said();
   EXPECT_THAT(said(), HasSubstr("its first sample is the rest shape, and the motion begins with the next"));
@@ -345,7 +358,8 @@ TEST_F(Bake, AStopEndsTheServerAndLeavesTheOldFile) {
   ASSERT_TRUE(save_file(path("out.abc"), std::as_bytes(std::span(old))));
   ASSERT_EQ(setenv("TMPDIR", folder_.path().c_str(), 1), 0);  // where the server's folder is
   test::ChildProcess bake(STRANDCAST_CTL_PROGRAM,
-                          words({path("out.abc"), "--motion", "builtin", "--seconds", "3600"}), path("said"));
+                          words({path("out.abc"), "--replace", "--motion", "builtin", "--seconds", "3600"}),
+                          path("said"));
   ASSERT_TRUE(eventually([&] { return entries("out.abc") == 2; }))
       << "the old one, and the new one under another name";
   EXPECT_EQ(entries("strandcast-"), 1u);
@@ -362,7 +376,7 @@ TEST_F(Bake, TheServerEndsWithWhoeverIsKilled) {
   ASSERT_EQ(setenv("TMPDIR", folder_.path().c_str(), 1), 0);
   for (const int signal : {SIGKILL, SIGTERM}) {
     test::ChildProcess bake(STRANDCAST_CTL_PROGRAM,
-                            words({path("out.abc"), "--motion", "builtin", "--seconds", "3600"}),
+                            words({path("out.abc"), "--replace", "--motion", "builtin", "--seconds", "3600"}),
                             path("said"));
     pid_t server = 0;
     ASSERT_TRUE(eventually([&] {

@@ -101,8 +101,10 @@ TEST(BakeServer, GetsTheHairAndWhatThePersonSaysLast) {
 TEST(BakePaths, WhatIsReadAndWhatIsThereIsNotWrittenOver) {
   const TemporaryFolder folder;
   const std::string hair = folder.write("hair.ply", "hair").string(), same = hair.substr(0, hair.size() - 8);
-  const auto said = [](std::vector<std::string> paths, const std::string& motion = "none") {
+  bool is_replacing = false;
+  const auto said = [&](std::vector<std::string> paths, const std::string& motion = "none") {
     BakeCommand command;
+    command.is_replacing = is_replacing;
     command.exported.paths = std::move(paths);
     command.feed.motion = motion;
     command.feed.wind = "none";
@@ -113,8 +115,15 @@ TEST(BakePaths, WhatIsReadAndWhatIsThereIsNotWrittenOver) {
   EXPECT_THAT(said({hair}), testing::HasSubstr("hair.ply is there already"));
   EXPECT_THAT(said({hair, same + "./hair.ply"}), testing::HasSubstr("hair.ply is read, and would"));
   EXPECT_THAT(said({"new.ply", hair}, hair), testing::HasSubstr("hair.ply is read, and would"));
+  const std::string other = folder.write("other.usda", "other hair").string();
+  EXPECT_THAT(said({hair, other}), testing::HasSubstr("other.usda is there already: --replace"));
   EXPECT_THAT(said({"walk.bvh", "out.abc"}), testing::HasSubstr("--motion walk.bvh"));
   EXPECT_THAT(said({(folder.path() / "new.abc").string()}), testing::HasSubstr("this motion has no end"));
+  // Who asks for it gets it, but for what is read.
+  is_replacing = true;
+  for (const auto& paths : {std::vector{other}, std::vector{hair, other}})
+    EXPECT_THAT(said(paths), testing::HasSubstr("this motion has no end"));
+  EXPECT_THAT(said({hair, hair}), testing::HasSubstr("hair.ply is read, and would"));
 }
 
 }  // namespace

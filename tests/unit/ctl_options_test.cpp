@@ -28,7 +28,7 @@ inline void tell(FieldTexts& told, const std::string& where, const SceneRecordin
   OPTION_FIELDS(all, scene, overrides, motion, wind, seconds, server);
 }
 inline void tell(FieldTexts& told, const std::string& where, const BakeCommand& all) {
-  OPTION_FIELDS(all, exported, feed, scene, overrides, server, lead_s);
+  OPTION_FIELDS(all, exported, feed, scene, overrides, server, lead_s, is_replacing);
 }
 inline void tell(FieldTexts& told, const std::string& where, const BundleCommand& all) {
   OPTION_FIELDS(all, paths, seconds, scene, has_all_solvers);
@@ -150,6 +150,7 @@ const OptionRow kCommandRows[] = {
     {"--filter-glitches", {}, {{"bake.feed.motion_file.is_filtering_glitches", "true"}}, kOut, "bake"},
     {"--keep-first-frames", {}, {{"bake.feed.motion_file.is_keeping_first_frames", "true"}}, kOut, "bake"},
     {"--lead", {"2"}, {{"bake.lead_s", "2"}}, kOut, "bake"},
+    {"--replace", {}, {{"bake.is_replacing", "true"}}, kOut, "bake"},
     {"--scene", {"s"}, {{"bake.scene", "s"}}, kOut, "bake"},
     {"--set", {"a=1"}, {{"bake.overrides", "a=1"}}, kOut, "bake"},
     {"--server", {"s"}, {{"bake.server", "s"}}, kOut, "bake"},

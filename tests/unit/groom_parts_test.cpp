@@ -194,6 +194,18 @@ TEST(GroomParts, AFileInAnotherUnitIsFoundByWhereItsRootsLie) {
   }
 }
 
+// A head of 88 mm that metres taken for centimetres have made small has that size again.
+TEST(GroomParts, MetresThatWereTakenForCentimetresAreFound) {
+  const TemporaryFolder folder;
+  constexpr float kOtherHead = 0.88f;
+  std::vector<Strand> strands = hair(is_of_scalp);
+  for (Strand& strand : strands)
+    for (glm::vec3& point : strand) point *= kOtherHead;
+  const PlacedGroom found = placed({write(folder, "small.ply", strands, 100.0f)});
+  EXPECT_EQ(found.placement.unit_m, 100.0f);
+  EXPECT_THAT(found.notes, Contains(HasSubstr("in units of 100 m the head has the size of a person's")));
+}
+
 TEST(GroomParts, UnitsThatFilesStateAreBroughtTogether) {
   const TemporaryFolder folder;
   const auto m = write(folder, "m.ply", hair(is_of_scalp), 1.0f, "comment unit_m 1\n");

@@ -480,6 +480,39 @@ TEST(UpAxis, IsNotWhereSomebodyCrawlsTo) {
   EXPECT_THAT(crawl_over(0.1).up_reason, StartsWith("+Z is taken as up")) << "who stays there stands";
 }
 
+// Two that hang from one root are two. A hammer's head in a hand is nobody's.
+TEST(Performers, ThatShareARootAreMeasuredEachAlone) {
+  const auto joint = [](const std::string& name, double x, double y, const std::string& below) {
+    return fmt::format("JOINT {}\n{{\nOFFSET {} {} 0\nCHANNELS 0\n{}}}\n", name, x, y,
+                       below.empty() ? "End Site\n{\nOFFSET 0 0 0\n}\n" : below);
+  };
+  const auto body = [&](double size, const std::string& in_hand) {
+    return joint("Head", 0, 80 * size, "") + joint("LeftHand", 60 * size, 40 * size, in_hand) +
+           joint("RightHand", -60 * size, 40 * size, "") + joint("LeftFoot", 10 * size, -90 * size, "") +
+           joint("RightFoot", -10 * size, -90 * size, "");
+  };
+  const auto clip_of = [](const std::string& joints, const std::string& head_joint) {
+    BvhOptions options;
+    options.head_joint = head_joint;
+    options.recentre = false;
+    return parse_bvh("HIERARCHY\nROOT Scene\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n" +
+                         joints + "}\nMOTION\nFrames: 2\nFrame Time: .01\n0 90 0\n5 90 0\n",
+                     "x.bvh", options)
+        .value();
+  };
+  const std::string two = joint("Hips", 300, 0, body(1.0, "")) + joint("Hips", -3000, 810, body(10.0, ""));
+  const MotionClip first = clip_of(two, ""), second = clip_of(two, "Head#2");
+  EXPECT_EQ(first.file_unit_m, 0.01) << "by its own bones";
+  EXPECT_EQ(second.file_unit_m, 0.001);
+  EXPECT_EQ(first.up, "+Y");
+  EXPECT_THAT(first.head_reason, testing::HasSubstr("the one with Head is taken, others have Head#2"));
+  EXPECT_THAT(second.head_reason, testing::HasSubstr("the one with Head#2 is taken, others have Head "));
+  EXPECT_LT(glm::distance(first.world_from_head[1].position_m, glm::dvec3(3.05, 1.7, 0.0)), 1e-9);
+  const MotionClip smith = clip_of(body(1.0, joint("hammer.head", 0, -30, "")), "");
+  EXPECT_EQ(smith.file_unit_m, 0.01);
+  EXPECT_THAT(smith.head_reason, testing::HasSubstr("the head is Head "));
+}
+
 TEST(MotionFileAxes, MayHaveYDown) {
   constexpr std::string_view kHead =
       "CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\nJOINT Head\n{\n";
