@@ -1,12 +1,14 @@
 #include "common/math/point_tree.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace strandcast {
 namespace {
 
 constexpr uint32_t kLeafSize = 8;
+constexpr float kBoxRounding = 1.0f - 1e-6f;
 
 uint8_t widest_axis(std::span<const glm::vec3> points, std::span<const uint32_t> order) {
   glm::vec3 low = points[order.front()], high = low;
@@ -25,10 +27,12 @@ uint8_t widest_axis(std::span<const glm::vec3> points, std::span<const uint32_t>
 struct PointTree::Search {
   glm::vec3 center;
   uint32_t count;
+  glm::vec3 away_m;  // from the box of the points that are looked at, by axis
   std::vector<Neighbour> heap;
 
-  bool wants(float distance_squared) const {
-    return heap.size() < count || distance_squared < heap.front().distance_squared;
+  /// Whether that box may hold a better one, rounding aside. Points that are as near count by their index.
+  bool wants_box() const {
+    return heap.size() < count || kBoxRounding * glm::dot(away_m, away_m) <= heap.front().distance_squared;
   }
   void offer(const Neighbour& candidate) {
     if (heap.size() == count) {
@@ -43,9 +47,17 @@ struct PointTree::Search {
 };
 
 PointTree::PointTree(std::span<const glm::vec3> points)
-    : points_(points), order_(points.size()), split_axis_(points.size(), 0) {
+    : points_(points),
+      order_(points.size()),
+      split_axis_(points.size(), 0),
+      low_m_(points.empty() ? glm::vec3(0.0f) : points.front()),
+      high_m_(low_m_) {
   std::iota(order_.begin(), order_.end(), 0u);
   build(0, static_cast<uint32_t>(points.size()));
+  for (const glm::vec3& point : points) {
+    low_m_ = glm::min(low_m_, point);
+    high_m_ = glm::max(high_m_, point);
+  }
 }
 
 void PointTree::build(uint32_t begin, uint32_t end) {
@@ -77,14 +89,16 @@ void PointTree::visit(uint32_t begin, uint32_t end, Search& search) const {
   const bool is_low_first = offset < 0.0f;
   visit(is_low_first ? begin : middle + 1, is_low_first ? middle : end, search);
   offer(middle);
-  if (search.wants(offset * offset)) {
-    visit(is_low_first ? middle + 1 : begin, is_low_first ? end : middle, search);
-  }
+  const float before_m = search.away_m[axis];
+  search.away_m[axis] = std::max(before_m, std::abs(offset));
+  if (search.wants_box()) visit(is_low_first ? middle + 1 : begin, is_low_first ? end : middle, search);
+  search.away_m[axis] = before_m;
 }
 
 std::vector<PointTree::Neighbour> PointTree::nearest(const glm::vec3& center, uint32_t count) const {
-  Search search{center, count, {}};
   if (count == 0) return {};
+  Search search{center, count, center - glm::clamp(center, low_m_, high_m_), {}};
+  search.away_m = glm::abs(search.away_m);
   search.heap.reserve(count);
   visit(0, static_cast<uint32_t>(order_.size()), search);
   std::sort_heap(search.heap.begin(), search.heap.end());

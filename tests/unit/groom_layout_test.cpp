@@ -155,17 +155,25 @@ TEST(PointTree, FindsWhatAFullSearchFinds) {
     points.push_back({random_unit(3 * i), random_unit(3 * i + 1), 0.1f * random_unit(3 * i + 2)});
     if (i % 5 == 0) points.push_back(points.back());  // coincident
   }
+  for (int x = 0; x < 8; ++x)
+    for (int y = 0; y < 8; ++y) points.emplace_back(0.1f * x, 0.1f * y, 0.5f);  // many are as far away
   const PointTree tree(points);
-  for (uint32_t i = 0; i < points.size(); i += 7) {
-    std::vector<float> expected;
-    for (const auto& point : points) {
-      const glm::vec3 offset = point - points[i];
-      expected.push_back(glm::dot(offset, offset));
+  std::vector<glm::vec3> centers;
+  for (uint32_t i = 0; i < points.size(); i += 7) centers.push_back(points[i]);
+  for (const glm::vec3& center : std::vector(centers)) centers.push_back(100.0f * (center - 0.5f));
+  for (const glm::vec3& center : centers) {
+    std::vector<PointTree::Neighbour> expected;
+    for (uint32_t i = 0; i < points.size(); ++i) {
+      const glm::vec3 offset = points[i] - center;
+      expected.push_back({glm::dot(offset, offset), i});
     }
     std::sort(expected.begin(), expected.end());
-    const auto found = tree.nearest(points[i], 12);
+    const auto found = tree.nearest(center, 12);
     ASSERT_EQ(found.size(), 12u);
-    for (size_t k = 0; k < 12; ++k) ASSERT_EQ(found[k].distance_squared, expected[k]);
+    for (size_t k = 0; k < 12; ++k) {
+      ASSERT_EQ(found[k].distance_squared, expected[k].distance_squared);
+      ASSERT_EQ(found[k].index, expected[k].index) << "of equal ones the first";
+    }
   }
   EXPECT_EQ(tree.nearest(points[0], 5000).size(), points.size());
   EXPECT_TRUE(PointTree({}).nearest(glm::vec3(0), 3).empty());
