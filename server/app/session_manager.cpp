@@ -110,22 +110,23 @@ Result<Admission> SessionManager::on_hello(const Visitor& visitor, const Hello& 
   Admission admission;
   admission.welcome = make_welcome(*place, codec);
   if (visitor.subscription.gets(StreamMode::Strands)) admission.asset = asset();
-  if (!is_relay && hello.codec_wish.empty()) admission.preview = preview(codec);
+  if (!is_relay) admission.preview = preview(codec, !hello.codec_wish.empty());
   if (const auto pictures = viewers_.pictures(visitor.session))
     tell_quality(visitor.session, *pictures, "to begin with");
   return admission;
 }
 
-/// The fewest strands by the codec that the predicting one falls back to.
-std::optional<Admission::Preview> SessionManager::preview(const ViewerCodec& codec) const {
-  const size_t fallback = codec.codec + 1;
-  if (!parts_.codecs[codec.codec].predicts || fallback >= parts_.codecs.size()) return std::nullopt;
+/// The fewest strands, by the codec that a predicting one falls back to unless that one is wished.
+std::optional<Admission::Preview> SessionManager::preview(const ViewerCodec& codec, bool is_wish) const {
+  const bool predicts = parts_.codecs[codec.codec].predicts;
+  const size_t simple = predicts ? codec.codec + 1 : codec.codec;
+  if (predicts && (is_wish || simple >= parts_.codecs.size())) return std::nullopt;
   const std::vector<StrandClass> classes = parts_.hub.strand_classes();
   const auto fewest = std::min_element(classes.begin(), classes.end(), [](const auto& a, const auto& b) {
     return a.strand_share < b.strand_share;
   });
-  return Admission::Preview{{fallback, static_cast<size_t>(fewest - classes.begin())},
-                            parts_.codecs[fallback].name};
+  return Admission::Preview{{simple, static_cast<size_t>(fewest - classes.begin())},
+                            parts_.codecs[simple].name};
 }
 
 Welcome SessionManager::make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const {

@@ -137,7 +137,7 @@ class SessionManager : public NetHandler, private StreamReader {
   void move_camera(SessionId session, const CameraChange& camera);
   void follow_window(SessionId session, const WindowChange& window);
   Welcome make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const;
-  std::optional<Admission::Preview> preview(const ViewerCodec& codec) const;
+  std::optional<Admission::Preview> preview(const ViewerCodec& codec, bool is_wish) const;
   bool may_control(SessionId session, std::string_view what);
   Status may_change(const std::string& assignment) const;
   EncodedFramePtr follow_shape(const SceneAsset& asset);

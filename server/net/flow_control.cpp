@@ -35,6 +35,14 @@ void FlowControl::on_asset_left(size_t bytes, int64_t time_ns) {
   if (link_.capacity_bytes_per_s(time_ns) > 0.0) gate_.pass_asset();
 }
 
+bool FlowControl::pass_late_asset(int64_t late_ns, int64_t time_ns) {
+  const AckedFrame* const asset = awaits_asset() ? gate_.asset_alone() : nullptr;
+  if (asset == nullptr || link_.base_ns() == 0 || time_ns - asset->sent_ns - link_.base_ns() < late_ns)
+    return false;
+  gate_.pass_asset();
+  return true;
+}
+
 /// Blames the link only while the client is heard: a silent one may be away, and a slow link shows when it is
 /// back.
 void FlowControl::on_chain_loss(int64_t time_ns) {

@@ -43,6 +43,9 @@ class FlowControl {
   /// Notes how many bytes of the asset are still on their way, by TCP's own acknowledgements. When half of it
   /// has come slowly, the link is known, and others may follow without a gap.
   void on_asset_left(size_t bytes, int64_t time_ns);
+  /// Lets one small frame follow an asset that is later than this, although its acknowledgement still has to
+  /// tell what the link carries. Returns whether it does.
+  bool pass_late_asset(int64_t late_ns, int64_t time_ns);
   /// Acknowledges this frame and all before it; numbers that are not in flight are ignored.
   void on_ack(uint16_t stream_id, uint32_t sequence, int64_t time_ns, const ClientTimes& client = {});
   /// Adds the round trip time of a small message.

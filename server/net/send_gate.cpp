@@ -91,7 +91,8 @@ bool SendGate::may_send(Delay delay, int64_t time_ns) const {
   const Frame& oldest = in_flight_.front();
   // What the link can do shows when the asset or the first picture arrives; all else waits for that.
   const bool is_unknown = link_.last_ack_ns() == 0 && link_.capacity_bytes_per_s(time_ns) <= 0.0;
-  if (oldest.is_asset || (is_unknown && in_flight_bytes_ >= kFirstBytes)) return false;
+  if (oldest.is_asset) return false;
+  if (is_unknown && in_flight_bytes_ >= kFirstBytes) return is_asset_passed_ && in_flight_.size() == 1;
   // Acknowledgements may get lost with a client's queue: it is asked again, slowly, and never given up here.
   if (time_ns - in_flight_.back().sent.sent_ns >= kAskAgainNs) return true;
   const int64_t allowance_ns = keyframe_allowance_ns(time_ns);

@@ -46,8 +46,11 @@ class SendGate {
   std::optional<AckedFrame> take_acked(uint16_t stream_id, uint32_t sequence);
   /// Returns the asset where all else waits for it, and the link has nothing else to do.
   const AckedFrame* asset_alone() const;
-  /// Lets other frames follow the asset before it is acknowledged.
-  void pass_asset() { in_flight_.front().is_asset = false; }
+  /// Lets other frames follow the asset before it is acknowledged; while the link is unknown, a single one.
+  void pass_asset() {
+    in_flight_.front().is_asset = false;
+    is_asset_passed_ = true;
+  }
   /// Forgets the frames in flight, which will not be acknowledged.
   void forget();
 
@@ -74,6 +77,7 @@ class SendGate {
   const LinkEstimate& link_;
   std::deque<Frame> in_flight_;  // oldest first
   size_t in_flight_bytes_ = 0;
+  bool is_asset_passed_ = false;
   int64_t written_ns_ = 0;         // the link took a part of what was the oldest frame then
   std::optional<Frame> keyframe_;  // the newest one sent
 };

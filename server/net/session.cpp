@@ -258,7 +258,10 @@ void Session::on_written(const beast::error_code& error, size_t byte_count) {
     const bool is_keyframe = std::exchange(media_, nullptr)->header.opcode == Opcode::StrandKeyframe;
     queue_.written();
     context_.count(&NetCounters::frames_sent);
-    if (is_keyframe && after_preview_) end_preview();
+    if (is_keyframe && after_preview_) {
+      is_preview_written_ = true;
+      if (flow_.capacity_bytes_per_s(now_ns()) > 0.0) end_preview();
+    }
   }
   ask_for_keyframe(now_ns());
   if (is_reading_held_) read_on();
@@ -309,8 +312,7 @@ void Session::check_deadlines(int64_t time_ns) {
   if (token_expires_unix_s_ != 0 && unix_time_s() >= token_expires_unix_s_) return check_stay();
   guarded([&] {
     probe(time_ns);
-    if (flow_.awaits_asset())
-      flow_.on_asset_left(socket_.next_layer().untaken_bytes() + unwritten_.size(), time_ns);
+    watch_asset(time_ns);
     adapt(time_ns);
     report_link(time_ns);
     ask_for_keyframe(time_ns);

@@ -148,6 +148,7 @@ void Session::ask_for_keyframe(int64_t time_ns) {
 
 void Session::on_ack(const FrameAck& ack, int64_t time_ns) {
   flow_.on_ack(ack.stream_id, ack.sequence, time_ns, {ack.receive_time_ns, int64_t{ack.decode_us} * kUsInNs});
+  if (after_preview_ && is_preview_written_) end_preview();
   adapt(time_ns);
   ask_for_keyframe(time_ns);
   pump();
@@ -207,11 +208,20 @@ void Session::change_strand_class(size_t chosen) {
   head().handler.on_change(id_, SubscriptionChange::Strands);
 }
 
+/// An asset that a proxy has taken shows nothing of the link until it is acknowledged. When that is late, a
+/// few strands follow it all the same.
+void Session::watch_asset(int64_t time_ns) {
+  if (!flow_.awaits_asset()) return;
+  flow_.on_asset_left(socket_.next_layer().untaken_bytes() + unwritten_.size(), time_ns);
+  if (preview_) is_asset_late_ = flow_.pass_late_asset(kThinAssetNs, time_ns);
+}
+
 /// Over a thin link a few strands make the first picture: the keyframe of all is larger by twenty times.
 void Session::begin_strands(int64_t time_ns) {
   const std::optional<Admission::Preview> preview = std::exchange(preview_, std::nullopt);
-  if (!preview || flow_.transfer_ns(asset_bytes_, time_ns) < kThinAssetNs) return;
-  after_preview_ = {subscription_.strands.codec, codec_, "all strands, after the first picture of a few"};
+  if (!preview || !(is_asset_late_ || flow_.transfer_ns(asset_bytes_, time_ns) >= kThinAssetNs)) return;
+  after_preview_ = {subscription_.strands.codec, codec_, {}};
+  context_.count(&NetCounters::class_changes);
   subscription_.strands = preview->stream;
   codec_ = preview->codec;
   head().handler.on_change(id_, SubscriptionChange::Strands);
@@ -220,13 +230,14 @@ void Session::begin_strands(int64_t time_ns) {
 
 void Session::end_preview() {
   keyframe_asked_ns_ = 0;
-  change_codec(*std::exchange(after_preview_, std::nullopt));
+  change_codec(CodecAnswer(*after_preview_));
 }
 
 /// Strands go on by another codec, beginning with a keyframe.
 void Session::change_codec(const CodecAnswer& answer) {
   if (state_ != State::Joined) return;
-  after_preview_.reset();
+  const bool had_preview = std::exchange(after_preview_, std::nullopt).has_value();
+  const StrandStream before = subscription_.strands;
   subscription_.strands.codec = answer.codec;
   codec_ = answer.name;
   context_.count(&NetCounters::codec_changes);
@@ -234,14 +245,21 @@ void Session::change_codec(const CodecAnswer& answer) {
   const int64_t time_ns = now_ns();
   // Codecs differ in cost by far more than neighbouring classes do.
   const std::vector<double> costs = head().strands.bytes_per_s(answer.codec);
-  if (!is_relay() && (answer.codec == 0 || !costs.empty()))
+  if (!is_relay() && (had_preview || answer.codec == 0 || !costs.empty()))
     subscription_.strands.strand_class =
         flow_.begin_codec({subscription_.strands.strand_class, costs,
                            context_.config.limits.viewer_bytes_per_s, head().strands.classes()},
                           time_ns);
+  const StrandClass& chosen = head().strands.classes()[subscription_.strands.strand_class];
+  const std::string reason = had_preview && answer.reason.empty()
+                                 ? fmt::format("after a first picture of few strands: {}; {}",
+                                               to_string(chosen), describe_link(time_ns))
+                                 : answer.reason;
+  // A link that carries no more than a preview goes on with that.
+  if (stream_id_of(subscription_.strands) == stream_id_of(before)) return announce_quality(reason);
   if (has_strands) queue_.restart_strands();
   head().handler.on_change(id_, SubscriptionChange::Strands);
-  announce_quality(answer.reason);
+  announce_quality(reason);
   if (has_strands) ask_for_keyframe(time_ns);
 }
 

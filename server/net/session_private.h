@@ -92,6 +92,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void adapt(int64_t time_ns);
   void change_strand_class(size_t chosen);
   void change_codec(const CodecAnswer& answer);
+  void watch_asset(int64_t time_ns);
   void begin_strands(int64_t time_ns);
   void end_preview();
   void announce_quality(const std::string& reason);
@@ -129,7 +130,9 @@ class Session : public std::enable_shared_from_this<Session> {
   bool has_asset_ = false;                     // sent, or next in line
   size_t asset_bytes_ = 0;                     // of the first one
   std::optional<Admission::Preview> preview_;  // until the first strands are asked for
-  std::optional<CodecAnswer> after_preview_;   // while its keyframe is on its way to the socket
+  std::optional<CodecAnswer> after_preview_;   // until its keyframe is written, and the link is known
+  bool is_asset_late_ = false;                 // a thin link, whatever it carries
+  bool is_preview_written_ = false;
   bool has_joined_ = false;
 
   beast::flat_buffer read_buffer_{kMaxSessionReadBytes};

@@ -580,6 +580,56 @@ TEST_F(ServerNet, AViewerThatCostsMoreThanTheCapGetsAClassThatFits) {
   }
 }
 
+// As behind a proxy, which takes the asset at once: what the link carries is unknown until it is
+// acknowledged.
+TEST_F(ServerNet, AFewStrandsFollowAnAssetThatIsLate) {
+  for (const bool carries_all : {true, false}) {
+    const StrandStream few{0, 1};
+    const uint16_t few_id = stream_id_of(few), last_id = carries_all ? stream_id_of({0, 0}) : few_id;
+    app_.asset_bytes = 100'000;
+    app_.preview = {few, "tangent"};
+    NetConfig config;
+    if (!carries_all) config.limits.viewer_bytes_per_s = 0.5 * 256 * StrandClass{}.frame_rate_hz;
+    StrandClass fewer;
+    fewer.strand_share = 0.25f;
+    NetHead head;
+    head.strand_classes = {StrandClass{}, fewer};
+    start(config, head);
+    Hello viewer = hello();
+    viewer.acknowledges = true;
+    auto client = join(viewer);
+    std::optional<FrameHeader> asset;
+    std::vector<FrameHeader> before, after;  // its acknowledgement
+    EXPECT_TRUE(eventually([&] {
+      if (before.empty() || last_id == few_id || !after.empty())
+        app_.publish_next(before.empty() ? few_id : last_id);
+      const test::Received received = client->read();
+      if (received.is_end) return true;
+      if (received.opcode() == Opcode::Control) return false;
+      const FrameHeader header = *unpack_frame_header(received.bytes);
+      if (header.opcode == Opcode::Asset) {
+        asset = header;
+      } else if (before.empty()) {
+        before.push_back(header);
+        client->send(FrameAck{asset->sequence, 1, 0, asset->stream_id});
+      } else {
+        after.push_back(header);
+        client->send(FrameAck{header.sequence, 1, 0, header.stream_id});
+      }
+      return after.size() > 5;
+    }));
+    ASSERT_FALSE(before.empty());
+    EXPECT_EQ(before.front().opcode, Opcode::StrandKeyframe);
+    EXPECT_EQ(before.front().stream_id, few_id);
+    ASSERT_GT(after.size(), 5u);
+    EXPECT_EQ(after.back().stream_id, last_id);
+    const auto keyframes = std::ranges::count(after, Opcode::StrandKeyframe, &FrameHeader::opcode);
+    EXPECT_EQ(keyframes, carries_all ? 1 : 0) << "who goes on with the few needs no other keyframe";
+    client->close();
+    server_->stop();
+  }
+}
+
 TEST_F(ServerNet, AViewerGetsFramesOfItsCodecOnly) {
   NetHead head;
   head.strand_codecs.resize(2);

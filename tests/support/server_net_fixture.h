@@ -60,6 +60,7 @@ class FakeApp : public NetHandler {
     admission.welcome.vertex_count = 16;
     admission.welcome.bound_m = 1e-4f;
     admission.asset = media(Opcode::Asset, 1, 0, asset_bytes);
+    admission.preview = preview;
     return admission;
   }
   void on_message(SessionId session, const ClientMessage& message, int64_t) override {
@@ -111,6 +112,7 @@ class FakeApp : public NetHandler {
   size_t frame_bytes = 256;
   size_t asset_bytes = 1'000;
   size_t strand_codec = 0;  // of who joins
+  std::optional<Admission::Preview> preview;
   std::atomic<uint64_t> motion{0}, wind{0}, commands{0}, parameters{0}, cameras{0}, keyframe_requests{0},
       shut_downs{0};
   std::atomic<bool> left_twice{false}, is_stepping{true};

@@ -521,4 +521,35 @@ check('a tape is slow motion for who decodes more slowly than it plays, and says
   assert.ok(Math.abs(pace - 0.5) < 0.05, `frames 10 ms apart, decoded in 20 ms: ${pace}`);
 });
 
+// ---- a session, over sockets of the test's own
+
+const asked = { url: 'ws://nowhere', token: '', mode: page.Mode.strands, role: page.Role.viewer, codec: '', head: '', pictures: '', width: 64, height: 64, drawsStrands: true };
+const sockets = [];
+const states = [];
+const net = new page.Net({
+  post: (message) => message.kind === 'state' && states.push(message.state), states: { onmessage: null, postMessage: () => {} }, loadCore: () => Promise.reject(new Error('none')),
+  openSocket() {
+    const socket = { isOpen: false, sent: 0, send: () => ++socket.sent, drop: () => (socket.isOpen = false) };
+    sockets.push(socket);
+    return socket;
+  },
+});
+const open = async (socket) => {
+  socket.isOpen = true;
+  socket.onopen();
+  await new Promise((done) => setTimeout(done));
+};
+net.start({ asked, stepCore: '', wholeCore: '' });
+check('a socket opens while the module still comes', () => assert.equal(sockets.length, 1));
+await open(sockets[0]);
+check('a Hello waits for the module', () => assert.equal(sockets[0].sent, 0));
+sockets[0].isOpen = false;
+sockets[0].onclose(1008, 'No Hello within 5000 ms.');
+check('a server that did not wait so long is asked again with the module', () => assert.deepEqual([sockets.length, states], [1, ['connecting']]));
+net.withoutCore('this is a test');
+await new Promise((done) => setTimeout(done));
+await open(sockets.at(-1));
+check('and then says what it wants', () => assert.deepEqual([sockets.length, sockets.at(-1).sent], [2, 1]));
+net.end();
+
 console.log(`${checks} checks of the page passed`);

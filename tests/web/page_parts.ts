@@ -9,6 +9,7 @@ export * from '../../client/web/page/reconnect';
 export * from '../../client/web/page/scene_text';
 export { rgbaOfTile } from '../../client/web/page/tile_planes';
 export { orbit, pan, zoom } from '../../client/web/page/ui/orbit';
+export { Net } from '../../client/web/page/session';
 export * from '../../client/web/page/wire';
 export * from '../../client/web/page/socket';
 export { Tape } from '../../client/web/page/tape';

@@ -68,7 +68,7 @@ export function openNear(plan: SessionPlan, Socket: typeof WebSocket, load = com
   let isEnded = false;
   const fail = (error: Error): void => plan.tell({ kind: 'state', state: 'ended', reason: error.message, retryMs: 0 });
   load(plan.step).then((module) => (isEnded ? undefined : net.setCore(module))).catch(fail);
-  net.start({ asked: plan.asked, stepCore: '', wholeCore: plan.whole }).then(() => isEnded && net.end(), fail);
+  net.start({ asked: plan.asked, stepCore: '', wholeCore: plan.whole });
   return {
     send: (message) => net.command(message),
     ask: () => (states.onmessage as (() => void) | null)?.(),

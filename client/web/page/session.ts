@@ -62,6 +62,9 @@ export class Net {
   stepNs = 0; // of one vertex in a solver's step here; 0 until something here takes steps
   private asked!: Asked;
   private pictureCodecs!: Promise<number>;
+  private prepared!: Promise<void>;
+  private isPrepared = false;
+  private waitsForModule = false; // the server's patience ended before it came
   private line?: Line;
   private beside?: Line; // tried while the other one is silent
   private besideMs = 0; // none before
@@ -80,7 +83,7 @@ export class Net {
   post(message: FromNet, transfer: Transferable[] = []): void {
     this.around.post(message, transfer);
   }
-  async start(message: Pick<Extract<ToNet, { kind: 'start' }>, 'asked' | 'stepCore' | 'wholeCore'>): Promise<void> {
+  start(message: Pick<Extract<ToNet, { kind: 'start' }>, 'asked' | 'stepCore' | 'wholeCore'>): void {
     this.asked = message.asked;
     this.around.states.onmessage = () => {
       this.wantsState = true;
@@ -89,11 +92,16 @@ export class Net {
     this.stepCore = message.stepCore;
     this.wholeCore = message.wholeCore;
     this.pictureCodecs = decodablePictures();
-    // Whoever wants pictures waits for nothing else.
-    if (this.asked.drawsStrands && this.asked.mode !== Mode.frames) await this.coreAnswer;
-    if (this.asked.codec && this.asked.codec !== 'tangent') await this.learnSteps();
+    this.prepared = this.prepare();
     this.connect();
     this.reports = setInterval(() => this.look(), 500);
+  }
+  /** What a Hello says depends on the module. A socket opens meanwhile, so that no round trip waits for another. */
+  private async prepare(): Promise<void> {
+    if (this.asked.drawsStrands && this.asked.mode !== Mode.frames) await this.coreAnswer;
+    if (this.asked.codec && this.asked.codec !== 'tangent') await this.learnSteps();
+    this.isPrepared = true;
+    if (this.waitsForModule) this.connect();
   }
   end(): void {
     clearInterval(this.reports);
@@ -173,6 +181,7 @@ export class Net {
   private leave(): void {
     clearTimeout(this.retry);
     this.retry = 0;
+    this.waitsForModule = false;
     this.leaveBeside();
     if (this.line) this.hangUp(this.line);
     this.line = undefined; // whoever asks its connection for a state meanwhile gets none
@@ -198,13 +207,22 @@ export class Net {
   private dial(): Line {
     const socket = this.around.openSocket(this.asked.url, PROTOCOL);
     const line: Line = { socket, openedMs: 0, patience: 0 };
-    line.patience = setTimeout(() => {
-      if (!line.connection?.hasWelcome) socket.drop(GIVEN_UP_CODE, 'the server does not answer');
-    }, WELCOME_MS);
+    const wait = (): void => {
+      line.patience = setTimeout(() => {
+        if (!line.connection?.hasWelcome) socket.drop(GIVEN_UP_CODE, 'the server does not answer');
+      }, WELCOME_MS);
+    };
+    wait();
     socket.onopen = () => {
       line.openedMs = performance.now();
-      const connection = (line.connection = new Connection(this, socket, this.asked, this.core));
-      void this.pictureCodecs.then((codecs) => connection.hello(codecs));
+      if (!this.isPrepared) clearTimeout(line.patience);
+      void Promise.all([this.pictureCodecs, this.prepared]).then(([codecs]) => {
+        if (!socket.isOpen) return;
+        clearTimeout(line.patience);
+        wait();
+        line.connection = new Connection(this, socket, this.asked, this.core);
+        line.connection.hello(codecs);
+      });
     };
     socket.onmessage = (data, receivedNs) => {
       if (line === this.line) this.leaveBeside(); // it speaks again
@@ -231,6 +249,7 @@ export class Net {
   private lose({ connection, openedMs }: Line, code: number, said: string): void {
     this.leaveBeside();
     this.line = undefined;
+    if (!this.isPrepared && openedMs > 0) return void (this.waitsForModule = true);
     const reason = connection?.goodbye || said || wordsFor(code, openedMs > 0);
     const hadWelcome = connection?.hasWelcome ?? false;
     this.wasIn ||= hadWelcome;
@@ -728,8 +747,7 @@ export function runNet(): void {
         post, states: message.states, openSocket: (url, protocol) => new DistantSocket(message.sockets, url, protocol),
         loadCore: (file) => compileCore(new URL(file, self.location.href).href),
       });
-      net.start(message).catch((error: Error) =>
-        net.post({ kind: 'state', state: 'ended', reason: error.message, retryMs: 0 }));
+      net.start(message);
     } else if (message.kind === 'core') {
       net.setCore(message.core).catch((error: Error) => net.withoutCore(error.message));
     } else if (message.kind === 'noCore') net.withoutCore(message.reason);
