@@ -334,10 +334,10 @@ TEST(WindCsv, ReadsSemicolonsAndDecimalCommas) {
   EXPECT_EQ(series.velocity_mps[0], glm::vec3(1.5f, 0.25f, 2.0f));
   EXPECT_EQ(series.velocity_mps[1], glm::vec3(1.0f, 0.5f, 2.5f));
   EXPECT_THAT(series.repairs,
-              ElementsAre("values are separated by semicolons", "6 numbers with a decimal comma"));
+              ElementsAre("values are separated by semicolons", "6 numbers have a decimal comma"));
   const WindSeries quoted = repaired("t_s,u,v,w\n\"0,0\",\"1,5\",\"-2\",0\n\"0,5\",1,2,3\n");
   EXPECT_EQ(quoted.velocity_mps[0], glm::vec3(1.5f, 0.0f, 2.0f));
-  EXPECT_THAT(quoted.repairs, ElementsAre("3 numbers with a decimal comma"));
+  EXPECT_THAT(quoted.repairs, ElementsAre("3 numbers have a decimal comma"));
   EXPECT_THAT(repaired("t_s\tu\tv\tw\n0\t1\t2\t3\n").repairs, ElementsAre("values are separated by tabs"));
 }
 
@@ -552,7 +552,7 @@ TEST(CaseFiles, MotionComesInAsItShould) {
   };
   const std::filesystem::path folder = std::filesystem::path(STRANDCAST_SHARED_DATA) / "cases";
   REQUIRE_SHARED(folder);
-  for (const Case& item : {Case{"comma_decimals.bvh", 0.0, 24, ""},
+  for (const Case& item : {Case{"comma_decimals.bvh", 0.0, 24, "numbers have a decimal comma"},
                            {"frame_time_zero.bvh", 0.0, 24, ""},
                            {"frames_more_than_rows.bvh", 0.0, 24, "30 frames are announced, 24 are there"},
                            {"joint_spaces.bvh", 0.0, 24, "the head is Bip01 Head"},
