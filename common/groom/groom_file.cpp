@@ -18,6 +18,7 @@
 #include "common/groom/ply_loader.h"
 #include "common/groom/resample.h"
 #include "common/groom/tfx_loader.h"
+#include "common/groom/tip_first.h"
 #include "common/groom/usable_strands.h"
 #include "common/groom/usd_loader.h"
 

@@ -15,6 +15,8 @@
 #include "common/groom/groom_file.h"
 #include "common/groom/head_fit.h"
 #include "common/groom/mesh_fit.h"
+#include "common/groom/procedural.h"
+#include "common/groom/tip_first.h"
 #include "tests/support/groom_files.h"
 #include "tests/support/temporary_folder.h"
 
@@ -227,7 +229,7 @@ TEST(GroomParts, RootsOnNoneOfTheOthersHeadFailTheCheck) {
               AllOf(HasSubstr("the roots of"), HasSubstr("there.ply are not on the head of")));
 }
 
-TEST(GroomParts, StrandsThatRunFromTipToRootAreTurnedRound) {
+TEST(TipFirst, StrandsThatRunFromTipToRootAreTurnedRound) {
   const TemporaryFolder folder;
   std::vector<Strand> strands = hair(is_of_scalp);
   const PlacedGroom right = placed({write(folder, "right.ply", strands, 1.0f)});
@@ -251,7 +253,88 @@ TEST(GroomParts, StrandsThatRunFromTipToRootAreTurnedRound) {
   EXPECT_EQ(turned_bob.groom.rest_position_m, short_hair.groom.rest_position_m);
 }
 
-TEST(GroomParts, NoRealGroomIsTurnedRoundAndHeadsAreFoundWhenTheyAre) {
+/// A groom of these strands in metres, as a file gives it.
+Groom groom_of(const std::vector<Strand>& strands) {
+  const TemporaryFolder folder;
+  return placed({write(folder, "hair.ply", strands, 1.0f)}).groom;
+}
+
+void turn(Groom& groom, uint32_t strand) {
+  std::reverse(groom.rest_position_m.begin() + groom.offset[strand],
+               groom.rest_position_m.begin() + groom.offset[strand + 1]);
+}
+
+TEST(TipFirst, StrandsAgainstTheOthersBesideThemAreTurnedRound) {
+  std::vector<Strand> afro = hair(is_of_scalp);
+  std::vector<Strand> slicked = hair([](const glm::vec3& out) { return is_of_scalp(out) && out.z > -0.4f; });
+  for (Strand& strand : slicked) {
+    // Over the head, along it.
+    glm::vec3 out = glm::normalize(strand[0]);
+    for (glm::vec3& point : strand) {
+      point = kHeadM * out;
+      out = glm::normalize(out + glm::vec3(0.0f, -0.1f, -0.22f));
+    }
+  }
+  for (Strand& strand : afro)
+    for (size_t k = 1; k < strand.size(); ++k) strand[k] = (1.0f + 0.35f * static_cast<float>(k)) * strand[0];
+  struct Case {
+    const char* what;
+    Groom groom;
+    bool is_told;  // which end is the root
+  };
+  std::vector<Case> cases;
+  cases.push_back({"long", groom_of(hair(is_of_scalp)), true});
+  cases.push_back({"slicked", groom_of(slicked), false});
+  cases.push_back({"afro", groom_of(afro), false});
+  for (const Case& item : cases) {
+    const uint32_t all = item.groom.strand_count();
+    struct Mixed {
+      const char* what;
+      std::function<bool(uint32_t)> is_turned;
+      bool are_few;
+    };
+    for (const Mixed& mixed : {Mixed{"one in ten", [](uint32_t i) { return i % 10 == 3; }, true},
+                               Mixed{"every other one", [](uint32_t i) { return i % 2 == 0; }, false},
+                               Mixed{"most", [](uint32_t i) { return i % 4 != 0; }, false},
+                               Mixed{"one half", [&](uint32_t i) { return i > all / 2; }, false}}) {
+      Groom groom = item.groom;
+      uint32_t count = 0;
+      for (uint32_t i = 0; i < all; ++i) {
+        if (!mixed.is_turned(i)) continue;
+        ++count;
+        turn(groom, i);
+      }
+      const std::vector<glm::vec3> before = groom.rest_position_m;
+      StrandLabels labels;
+      const std::string said = turn_tips_first(groom, labels);
+      if (item.is_told || mixed.are_few) {
+        EXPECT_THAT(said, HasSubstr(fmt::format("{} of its {} strands run from tip to root", count, all)))
+            << item.what << " " << mixed.what;
+        EXPECT_TRUE(groom.rest_position_m == item.groom.rest_position_m) << item.what << " " << mixed.what;
+      } else {
+        EXPECT_EQ(said, "") << item.what << " " << mixed.what;
+        EXPECT_TRUE(groom.rest_position_m == before) << item.what << " " << mixed.what;
+      }
+    }
+  }
+}
+
+TEST(TipFirst, HairThatIsGrownIsRight) {
+  for (const float length_m : {0.01f, 0.03f, 0.1f, 0.28f, 0.9f}) {
+    for (const float curl_m : {0.0f, 0.02f}) {
+      ProceduralGroomOptions options;
+      options.length_m = length_m;
+      options.curl_radius_m = curl_m;
+      Groom groom = grow_groom(make_scalp_cap(glm::vec3(0.0f), kHeadM, 2000), options).value();
+      const std::vector<glm::vec3> points = groom.rest_position_m;
+      StrandLabels labels;
+      EXPECT_EQ(turn_tips_first(groom, labels), "") << length_m << " m, curls of " << curl_m;
+      EXPECT_EQ(groom.rest_position_m, points);
+    }
+  }
+}
+
+TEST(TipFirst, NoRealGroomIsTurnedRoundAndHeadsAreFoundWhenTheyAre) {
   REQUIRE_SHARED_DATA();
   for (const char* const name : {"sintel_11400x16.tfx", "Ratboy_mohawk.tfx", "TestHair1.tfx",
                                  "ponytail_front_top.tfx", "ponytail_side.tfx"}) {
@@ -304,7 +387,7 @@ TEST(GroomParts, StrandsOfMorePointsThanAreSimulatedSaySo) {
 }
 
 // As a simple program makes it, with all strands of one length: nothing says which end is which.
-TEST(GroomParts, HairThatFallsStraightDownIsLeftAsItIs) {
+TEST(TipFirst, HairThatFallsStraightDownIsLeftAsItIs) {
   const TemporaryFolder folder;
   std::vector<Strand> strands = hair([](const glm::vec3& out) { return out.y > 0.1f; });
   for (Strand& strand : strands)
