@@ -34,11 +34,11 @@ using Strand = std::vector<glm::vec3>;
 /// Strands of six points that leave a ball where `grows` says so and fall from there, by their own lengths;
 /// `middle_m` is the ball's.
 std::vector<Strand> hair(const std::function<bool(const glm::vec3& out)>& grows, float length_m = 0.25f,
-                         const glm::vec3& middle_m = {}) {
-  constexpr int kRoots = 700;
+                         const glm::vec3& middle_m = {}, int root_count = 700) {
   std::vector<Strand> strands;
-  for (int i = 0; i < kRoots; ++i) {
-    const double y = 1.0 - (2.0 * i + 1.0) / kRoots, around = 2.399963 * i, across = std::sqrt(1.0 - y * y);
+  for (int i = 0; i < root_count; ++i) {
+    const double y = 1.0 - (2.0 * i + 1.0) / root_count, around = 2.399963 * i,
+                 across = std::sqrt(1.0 - y * y);
     const glm::vec3 out(glm::dvec3(across * std::sin(around), y, across * std::cos(around)));
     if (!grows(out)) continue;
     Strand& strand = strands.emplace_back();
@@ -96,12 +96,61 @@ TEST(FurAndBeards, ABeardIsNoHairOfAHeadAndKeepsTheUnitThatIsStated) {
     EXPECT_FALSE(found.is_of_head);
     EXPECT_EQ(found.unlikely, "");
     EXPECT_EQ(found.placement.yaw_deg, 0.0f) << "the face is where it grows";
+    EXPECT_THAT(found.notes, Contains(HasSubstr("it is taken as a beard")));
   }
   EXPECT_EQ(placed({write(folder, "cm.ply", beard, 0.01f)}).placement.unit_m, 0.01f) << "a face of a person";
   EXPECT_TRUE(placed({write(folder, "hair.ply", hair(is_of_scalp), 1.0f)}).is_of_head);
   const auto wreath =
       hair([](const glm::vec3& out) { return out.z < 0.3f && out.y < 0.25f && out.y > -0.5f; });
   EXPECT_TRUE(placed({write(folder, "wreath.ply", wreath, 1.0f)}).is_of_head) << "about a bald top";
+}
+
+bool is_under_hairline(const glm::vec3& out) {
+  return out.y > (out.z > 0.4f ? 0.55f : 0.55f - 1.1f * std::min(1.0f, (0.4f - out.z) / 0.8f));
+}
+bool is_of_brows(const glm::vec3& out) {
+  return std::abs(out.y - 0.27f) < 0.05f && std::abs(std::abs(out.x) - 0.35f) < 0.2f && out.z > 0.0f;
+}
+
+TEST(FurAndBeards, AHeadIsTheSameWithABeardAndBrows) {
+  const TemporaryFolder folder;
+  const auto is_of_cheeks = [](const glm::vec3& out) {
+    return out.y > -0.85f && out.y < -0.15f - 0.1f * out.z && out.z > 0.1f;
+  };
+  const glm::vec3 middle_m(0.0f, 1.6f, 0.0f);
+  const auto whole = write(folder, "hair.ply", hair(is_under_hairline, 0.25f, middle_m), 1.0f);
+  const auto beard = write(folder, "beard.ply", hair(is_of_cheeks, 0.06f, middle_m), 1.0f);
+  const auto brows = write(folder, "brows.ply", hair(is_of_brows, 0.01f, middle_m, 9000), 1.0f);
+  const auto crown = write(folder, "crown.ply",
+                           hair([](const glm::vec3& out) { return out.y > 0.75f; }, 0.05f, middle_m), 1.0f);
+  for (const std::vector<std::filesystem::path>& paths :
+       {std::vector{whole, beard}, std::vector{beard, brows, whole}, std::vector{crown, beard, brows}}) {
+    const PlacedGroom found = placed(paths);
+    EXPECT_TRUE(found.is_of_head) << paths.front();
+    EXPECT_EQ(found.placement.yaw_deg, 0.0f) << paths.front();
+    EXPECT_EQ(found.placement.unit_m, 1.0f);
+    const FittedSphere head = fit_head(found.groom);
+    EXPECT_LT(glm::distance(head.center_m, middle_m), 1e-3f);
+    EXPECT_NEAR(head.radius_m, kHeadM, 1e-3f);
+  }
+}
+
+// Few places on one side of a head do not say that this side is up, or that the face is at the other one.
+TEST(FurAndBeards, BrowsAndAMoustacheStayWhereTheyAre) {
+  const TemporaryFolder folder;
+  const auto moustache = [](const glm::vec3& out) { return out.y < -0.2f && out.y > -0.4f && out.z > 0.85f; };
+  const auto both = [&](const glm::vec3& out) { return is_of_brows(out) || is_of_jaw(out); };
+  for (const auto& [what, strands] : {std::pair("brows", hair(is_of_brows, 0.01f, {}, 9000)),
+                                      {"a moustache", hair(moustache, 0.02f, {}, 9000)},
+                                      {"brows and a beard", hair(both, 0.03f, {}, 9000)}}) {
+    for (const float unit_m : {1.0f, 0.01f}) {
+      const PlacedGroom found = placed({write(folder, "piece.ply", strands, unit_m)});
+      EXPECT_EQ(found.placement.yaw_deg, 0.0f) << what;
+      EXPECT_FALSE(found.placement.is_z_up || found.placement.is_upside_down) << what;
+      EXPECT_EQ(found.placement.unit_m, unit_m) << what;
+      EXPECT_THAT(found.notes, Contains(HasSubstr("it is taken as brows or a part of hair"))) << what;
+    }
+  }
 }
 
 TEST(FurAndBeards, FurOfABodyNeverGetsAHeadsUnit) {
