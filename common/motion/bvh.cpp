@@ -510,14 +510,16 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
                       options.unit_m);
   TextCursor cursor(text, place);
   ASSIGN_OR_RETURN(BvhSkeleton skeleton, parse_bvh_skeleton(cursor));
-  const auto head = find_head(skeleton, options.head_joint);
+  Result<uint32_t> head = find_head(skeleton, options.head_joint);
   if (!head) return at(place, head.error());
-  skeleton.top = find_top(skeleton, *head);
-  const auto path = path_to(skeleton, *head);
   ASSIGN_OR_RETURN(const MotionHeader header, parse_motion_header(cursor, options.frame_s));
   if (skeleton.channel_count == 0) return cursor.fail(ErrorCode::BadInput, "the hierarchy has no channels");
 
   static_cast<void>(cursor.rest_of_line());
+  const uint32_t named_head = *head;
+  if (options.head_joint.empty()) head = find_moving_head(cursor, skeleton, named_head);
+  skeleton.top = find_top(skeleton, *head);
+  const auto path = path_to(skeleton, *head);
   MotionClip clip;
   std::vector<BvhPath> body;
   if (options.has_body || !options.body_joints.empty()) {
@@ -533,6 +535,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
       begins_with_t_pose(clip.world_from_head, rows.rest_share[0], rows.rest_share[1]))
     leave_out_first_frames(clip, 1);
   clip.head_reason = taken_head(skeleton, *head);
+  if (*head != named_head) clip.head_reason += ": the first joint of such a name does not move";
   const Upward stated{options.is_z_up.value_or(false) ? 2 : 1};
   FileUp up = options.is_z_up ? FileUp{stated, stated} : guess_both(own_path(skeleton, *head), rows);
   clip.up = up.in_motion.name();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/motion/bvh.h"
 
@@ -167,6 +168,42 @@ Result<uint32_t> find_head(const BvhSkeleton& skeleton, const std::string& wante
   }
   return make_error(ErrorCode::NotFound, "no joint named {} (--joint NAME takes another, known: {})",
                     wanted.empty() ? "Head or head" : shown(wanted), known_joints(skeleton));
+}
+
+uint32_t find_moving_head(TextCursor rows, const BvhSkeleton& skeleton, uint32_t head) {
+  constexpr size_t kMostRows = 2'000;
+  constexpr double kStill = 1e-3;  // degrees, or units of the file
+  const BvhPath way = path_to(skeleton, head);
+  std::vector<BvhPath> others;
+  std::vector<uint32_t> other_heads;
+  for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
+    const BvhPath other = path_to(skeleton, i);
+    const auto [mine, theirs] = std::mismatch(way.begin(), way.end(), other.begin(), other.end());
+    if (!is_head_name(skeleton.joints[i].name) || mine == way.end() || theirs == other.end()) continue;
+    others.emplace_back(theirs, other.end());
+    other_heads.push_back(i);
+  }
+  if (others.empty()) return head;
+  std::vector<double> low(skeleton.channel_count, std::numeric_limits<double>::max());
+  std::vector<double> high(skeleton.channel_count, std::numeric_limits<double>::lowest());
+  for (size_t row = 0; row < kMostRows; ++row) {
+    auto line = rows.next_line();
+    if (!line) break;
+    for (size_t i = 0; i < low.size(); ++i) {
+      const auto value = bvh_number(take_token(*line));
+      low[i] = std::min(low[i], value.value_or(low[i]));
+      high[i] = std::max(high[i], value.value_or(high[i]));
+    }
+  }
+  const auto moves = [&](const BvhJoint* joint) {
+    for (size_t i = joint->first_channel; i < joint->first_channel + joint->channels.size(); ++i)
+      if (high[i] - low[i] > kStill) return true;
+    return false;
+  };
+  if (std::any_of(way.begin(), way.end(), moves)) return head;
+  for (size_t i = 0; i < others.size(); ++i)
+    if (std::any_of(others[i].begin(), others[i].end(), moves)) return other_heads[i];
+  return head;
 }
 
 uint32_t find_top(const BvhSkeleton& skeleton, uint32_t head) {

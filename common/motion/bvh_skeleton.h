@@ -54,6 +54,10 @@ std::string known_joints(const BvhSkeleton& skeleton);
 /// Returns the joint of that name, or the first that is named like a head; NotFound lists the joints.
 Result<uint32_t> find_head(const BvhSkeleton& skeleton, const std::string& wanted);
 
+/// Returns that head, or the first one beside it that moves, where it does not: of a reference pose that was
+/// exported with the character, say. `rows` is before the first frame.
+uint32_t find_moving_head(TextCursor rows, const BvhSkeleton& skeleton, uint32_t head);
+
 /// Returns the topmost joint of the performer with that head.
 uint32_t find_top(const BvhSkeleton& skeleton, uint32_t head);
 

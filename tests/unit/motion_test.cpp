@@ -16,7 +16,9 @@
 namespace strandcast::motion_test {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 using testing::StartsWith;
 
 TEST(MotionClip, InterpolatesAndClamps) {
@@ -478,6 +480,38 @@ TEST(UpAxis, IsNotWhereSomebodyCrawlsTo) {
   EXPECT_EQ(crawl.up_reason, "");
   for (const Pose& pose : crawl.world_from_head) EXPECT_NEAR(pose.position_m.y, 0.4, 1e-9);
   EXPECT_THAT(crawl_over(0.1).up_reason, StartsWith("+Z is taken as up")) << "who stays there stands";
+}
+
+// As a character that is exported beside its own reference pose.
+TEST(Performers, TheHeadOfATreeThatMovesIsTaken) {
+  const auto tree = [](const char* root) {
+    return fmt::format(
+        "ROOT {}\n{{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\nJOINT Head\n{{\nOFFSET 0 80 0\n"
+        "CHANNELS 3 Zrotation Xrotation Yrotation\nEnd Site\n{{\nOFFSET 0 9 0\n}}\n}}\n}}\n",
+        root);
+  };
+  const auto clip_of = [&](const std::string& rows, const std::string& head_joint) {
+    BvhOptions options;
+    options.unit_m = 0.01;
+    options.recentre = false;
+    options.head_joint = head_joint;
+    return parse_bvh(
+               "HIERARCHY\n" + tree("Bind") + tree("Hips") + "MOTION\nFrames: 2\nFrame Time: .01\n" + rows,
+               "x.bvh", options)
+        .value();
+  };
+  const std::string second_moves = "0 90 0 0 0 0 7 90 0 0 0 0\n0 90 0 0 0 0 7 90 0 0 20 0\n";
+  const MotionClip clip = clip_of(second_moves, "");
+  EXPECT_EQ(clip.world_from_head[0].position_m.x, 0.07);
+  EXPECT_THAT(clip.head_reason, AllOf(HasSubstr("the one with Head#2 is taken, others have Head "),
+                                      HasSubstr("the first joint of such a name does not move")));
+  EXPECT_EQ(clip_of(second_moves, "Head").world_from_head[0].position_m.x, 0.0) << "as asked";
+  EXPECT_EQ(
+      clip_of("0 90 0 0 0 0 7 90 0 0 0 0\n0 90 0 0 9 0 7 90 0 0 20 0\n", "").world_from_head[0].position_m.x,
+      0.0)
+      << "both move";
+  EXPECT_THAT(clip_of("0 90 0 0 0 0 7 90 0 0 0 0\n0 90 0 0 0 0 7 90 0 0 0 0\n", "").head_reason,
+              Not(HasSubstr("does not move")));
 }
 
 // Two that hang from one root are two. A hammer's head in a hand is nobody's.
