@@ -153,7 +153,8 @@ int check_command(const ServerOptions& options, const ServerConfig& config) {
                            "without it (--check FILE), or a scene of that head alone",
                            config.scene.heads.size() + 1));
   const auto text = check_groom(config.scene, options.check_folder,
-                                {config.sim_device, config.gl_device, config.renderer, config.shader_folder});
+                                {config.sim_device, config.gl_device, config.renderer, config.shader_folder},
+                                [](const std::string& sentence) { tell(sentence); });
   if (!text) return fail(text.error());
   fmt::print("{}", *text);
   return 0;

@@ -18,6 +18,7 @@
 #include "common/groom/ply_loader.h"
 #include "common/groom/resample.h"
 #include "common/groom/tfx_loader.h"
+#include "common/groom/tip_first.h"
 #include "common/groom/usable_strands.h"
 #include "common/groom/usd_loader.h"
 
@@ -460,7 +461,12 @@ PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
     judge_unit(guess.value);
   }
   placed.material = usable_material(stated.material.scaled(placement.unit_m), placed.notes);
-  placed.is_of_head = is_hair_of_head(groom);
+  const HairPlace hair = hair_place(groom);
+  placed.is_of_head = hair == HairPlace::Head;
+  if (hair == HairPlace::Jaw)
+    placed.notes.emplace_back("it is taken as a beard: its roots lie below the middle of a face");
+  else if (hair == HairPlace::Head && is_piece(groom))
+    placed.notes.emplace_back("it is taken as brows or a part of hair: its roots lie on one side of a head");
   placement.origin = options.origin ? *options.origin : find_origin(groom, placed);
   GroomPlacement rest = placement;  // upright by now
   rest.is_z_up = rest.is_upside_down = false;

@@ -3,86 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <span>
 
-#include "common/base/quantile.h"
 #include "common/groom/head_fit.h"
 #include "common/groom/placement.h"
 
 namespace strandcast {
 namespace {
-
-/// Fewer strands say nothing of a head.
-constexpr uint32_t kMinStrands = 64;
-
-/// What the points at one end of all strands are like.
-struct StrandEnd {
-  double off = 1.0;  // how far most are from the sphere through them, in radii; 1 where they lie in a plane
-  double outwards = 0.0;  // mean cosine between the way on along the strand and that out of the sphere
-};
-
-enum class End { First, Last };
-
-/// The sphere through points. Through what lies in a plane there are many: in place of one far away that with
-/// its middle in the plane.
-FittedSphere sphere_through(const std::vector<glm::vec3>& points) {
-  FittedSphere sphere = fit_sphere(points);
-  if (sphere.radius_m < 2.0f * extent_of(points)) return sphere;
-  glm::dvec3 middle(0.0);
-  for (const glm::vec3& point : points) middle += glm::dvec3(point) / static_cast<double>(points.size());
-  glm::dmat3 spread(0.0);
-  for (const glm::vec3& point : points)
-    spread += glm::outerProduct(glm::dvec3(point) - middle, glm::dvec3(point) - middle);
-  // Its square, and that one's, tend to the plane's normal.
-  glm::dmat3 power = glm::dmat3(spread[0][0] + spread[1][1] + spread[2][2]) - spread;
-  for (int i = 0; i < 8; ++i) {
-    const double scale = std::abs(power[0][0]) + std::abs(power[1][1]) + std::abs(power[2][2]);
-    if (!(scale > 0.0)) return sphere;
-    power = (power * (1.0 / scale)) * (power * (1.0 / scale));
-  }
-  glm::dvec3 normal = power[0];
-  for (int column = 1; column < 3; ++column)
-    if (glm::length(power[column]) > glm::length(normal)) normal = power[column];
-  normal = glm::normalize(normal);
-  const glm::dvec3 center(sphere.center_m);
-  sphere.center_m = glm::vec3(center - glm::dot(center - middle, normal) * normal);
-  return sphere;
-}
-
-StrandEnd look_at(const Groom& groom, End end) {
-  constexpr double kMost = 0.8;
-  const auto index = [&](uint32_t strand, uint32_t inwards) {
-    return end == End::First ? groom.offset[strand] + inwards : groom.offset[strand + 1] - 1 - inwards;
-  };
-  std::vector<glm::vec3> points;
-  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand)
-    points.push_back(groom.rest_position_m[index(strand, 0)]);
-  const FittedSphere sphere = sphere_through(points);
-  StrandEnd result;
-  std::vector<double> off;
-  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
-    const glm::dvec3 point(points[strand]), out = point - glm::dvec3(sphere.center_m);
-    const glm::dvec3 on = glm::dvec3(groom.rest_position_m[index(strand, 1)]) - point;
-    const double own_off = std::abs(glm::length(out) / static_cast<double>(sphere.radius_m) - 1.0);
-    if (!std::isfinite(own_off)) return {};
-    off.push_back(own_off);
-    const double lengths = glm::length(out) * glm::length(on);
-    if (lengths > 0.0) result.outwards += glm::dot(out, on) / lengths / static_cast<double>(points.size());
-  }
-  if (!are_flat(points)) result.off = quantile(off, kMost);
-  return result;
-}
-
-/// Whether the last points are the roots: hair leaves its skin outwards, and roots lie on a head more nearly
-/// than tips. Of real heads roots have 0.1 to 0.7 more outwards than tips, and are 1.6 to 6 times nearer to
-/// their sphere. Hair that falls straight down through its head has neither nearer, whatever its ends do.
-bool are_tips_first(const StrandEnd& first, const StrandEnd& last) {
-  constexpr double kMore = 0.05, kClearlyMore = 0.3, kNearer = 1.25, kClearlyNearer = 1.5;
-  const double more = last.outwards - first.outwards;
-  return (more > kClearlyMore && kNearer * last.off < first.off) ||
-         (more > kMore && kClearlyNearer * last.off < first.off);
-}
 
 /// Share of a part's roots that lie on a head when the part is made so many times as large.
 double share_on_head(const FittedSphere& head, const Groom& part, float scale) {
@@ -120,21 +46,6 @@ void scale_part(StatedGroom& part, float scale) {
 }
 
 }  // namespace
-
-std::string turn_tips_first(Groom& groom, StrandLabels& labels) {
-  if (groom.strand_count() < kMinStrands) return {};
-  const StrandEnd first = look_at(groom, End::First), last = look_at(groom, End::Last);
-  if (!are_tips_first(first, last)) return {};
-  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
-    const size_t count = groom.vertex_count(strand);
-    const auto points = std::span(groom.rest_position_m).subspan(groom.offset[strand], count);
-    std::reverse(points.begin(), points.end());
-    if (labels.width.empty()) continue;
-    const auto widths = std::span(labels.width).subspan(groom.offset[strand], count);
-    std::reverse(widths.begin(), widths.end());
-  }
-  return "its strands run from tip to root and are turned round: they leave a head at their last points";
-}
 
 std::string unify_units(std::vector<GroomPart>& parts) {
   // Those that state a unit get the first one's.

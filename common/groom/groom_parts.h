@@ -1,5 +1,5 @@
 // GroomParts: judges the files of one head of hair by where their roots lie. Finds a file in another unit
-// than the others, and strands whose points run from tip to root. Any thread.
+// than the others. Any thread.
 #pragma once
 
 #include <filesystem>
@@ -10,10 +10,6 @@
 #include "common/groom/stated_groom.h"
 
 namespace strandcast {
-
-/// Turns strands round that leave a head at their last points. Pins stay at the first points. Returns what to
-/// say of it; empty where nothing was done.
-std::string turn_tips_first(Groom& groom, StrandLabels& labels);
 
 /// One file of a head of hair.
 struct GroomPart {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "common/base/quantile.h"
 
@@ -36,21 +37,25 @@ glm::dvec3 growth_direction(const Groom& groom) {
   return count > 0.0 ? sum / count : sum;
 }
 
-/// Whether all around the sphere no place is further than this from a root: hair leaves 55 degrees and more
-/// about face or neck, fur of a ball 6.
+/// Whether roots stand all around the sphere. Hair leaves 55 degrees and more about face or neck, beside a
+/// beard 15 of the face; fur of a ball no more than its roots are apart.
 bool is_covered(const FittedSphere& sphere, const std::vector<glm::vec3>& roots) {
-  const double kNear = std::cos(glm::radians(35.0));
-  constexpr int kPlaces = 128;
-  constexpr double kGoldenAngleRad = 2.399963;
+  constexpr double kSpacings = 1.5, kGoldenAngleRad = 2.399963;
+  constexpr int kPlaces = 128, kMostBare = 1;
+  const double spacing_rad = std::sqrt(4.0 * std::numbers::pi / static_cast<double>(roots.size()));
+  const double near_cos =
+      std::cos(std::clamp(kSpacings * spacing_rad, glm::radians(4.0), glm::radians(35.0)));
+  int bare_count = 0;
   for (int i = 0; i < kPlaces; ++i) {
     const double up = 1.0 - (2.0 * i + 1.0) / kPlaces, level = std::sqrt(1.0 - up * up);
     const double around = kGoldenAngleRad * i;
     const glm::vec3 place(glm::dvec3(level * std::sin(around), up, level * std::cos(around)));
     const bool has_root = std::any_of(roots.begin(), roots.end(), [&](const glm::vec3& root) {
       const glm::vec3 out = root - sphere.center_m;
-      return static_cast<double>(glm::dot(place, out)) > kNear * static_cast<double>(glm::length(out));
+      return static_cast<double>(glm::dot(place, out)) > near_cos * static_cast<double>(glm::length(out));
     });
-    if (!has_root) return false;
+    bare_count += has_root ? 0 : 1;
+    if (bare_count > kMostBare) return false;
   }
   return true;
 }
@@ -149,6 +154,24 @@ HairPlace hair_place(const Groom& groom) {
 
 bool is_hair_of_head(const Groom& groom) {
   return hair_place(groom) == HairPlace::Head;
+}
+
+bool is_piece(const Groom& groom) {
+  constexpr double kMost = 0.98;
+  constexpr float kTop = 0.55f;  // of the way up to the crown
+  const std::vector<glm::vec3> roots = roots_of(groom);
+  if (roots.size() < kMinFittedRoots) return false;
+  const FittedSphere fitted = fit_sphere(roots);
+  std::vector<glm::vec3> out;
+  glm::vec3 middle(0.0f);
+  for (const glm::vec3& root : roots) {
+    out.push_back(glm::normalize(root - fitted.center_m));
+    middle += glm::vec3(out.back().x, 0.0f, out.back().z);
+  }
+  const auto count = std::count_if(out.begin(), out.end(), [&](const glm::vec3& direction) {
+    return glm::dot(direction, middle) > 0.0f && direction.y < kTop;
+  });
+  return static_cast<double>(count) >= kMost * static_cast<double>(roots.size());
 }
 
 float covered_head_radius(const Groom& groom) {

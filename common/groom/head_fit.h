@@ -34,6 +34,10 @@ HairPlace hair_place(const Groom& groom);
 /// Returns whether hair is neither fur nor a beard.
 bool is_hair_of_head(const Groom& groom);
 
+/// Returns whether roots lie on one side of a head and none on its top, as brows, lashes, a moustache and
+/// parts of hair do: they say little of which side is up and where the face is. +Y is up.
+bool is_piece(const Groom& groom);
+
 /// Returns the radius of the head under the roots, in the groom's units; 0 where these are few, on a disc,
 /// fur, or on too little of a head to say it.
 float covered_head_radius(const Groom& groom);

@@ -1,6 +1,7 @@
 // Wavefront OBJ reader.
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <string_view>
 
@@ -24,15 +25,20 @@ struct ObjData {
   std::vector<glm::vec3> normal;         // as listed in the file
   std::vector<glm::vec3> corner_normal;  // (position count) sum over the corners that name a normal
   std::vector<glm::uvec3> triangle;
+  uint64_t decimal_commas = 0;
 };
+
+/// Whether commas part the numbers of a vector: there are no blanks for it.
+bool is_parted_by_commas(std::string_view rest) {
+  return std::count(rest.begin(), rest.end(), ' ') + std::count(rest.begin(), rest.end(), '\t') < 2;
+}
 
 /// Numbers of a vector. A comma within a number is a decimal point, one behind it parts it from the next.
 std::array<std::string, 3> vector_words(std::string_view rest) {
   std::array<std::string, 3> words;
   TextScan commas(rest);
   static_cast<void>(commas.next_line());
-  const bool is_parted =
-      std::count(rest.begin(), rest.end(), ' ') + std::count(rest.begin(), rest.end(), '\t') < 2;
+  const bool is_parted = is_parted_by_commas(rest);
   size_t begin = 0;
   for (std::string& word : words) {
     if (is_parted) {
@@ -115,6 +121,13 @@ Status read_face(TextScan& scan, ObjData& data) {
   return {};
 }
 
+/// Whether a number of a vector has a decimal comma.
+bool has_decimal_comma(std::string_view rest) {
+  const size_t comma = rest.find(',');
+  return comma != std::string_view::npos && comma + 1 < rest.size() && !is_parted_by_commas(rest) &&
+         std::isdigit(static_cast<unsigned char>(rest[comma + 1])) != 0;
+}
+
 /// A vertex that cannot be read keeps its number.
 Status read_vertex(const TextScan& scan, float unit_m, ObjData& data) {
   if (data.position.size() >= kMaxMeshVertices)
@@ -127,6 +140,7 @@ Status read_vertex(const TextScan& scan, float unit_m, ObjData& data) {
   data.is_good.push_back(is_good ? 1 : 0);
   data.corner_normal.emplace_back(0.0f);
   if (!vertex) return vertex.error();
+  data.decimal_commas += has_decimal_comma(scan.rest()) ? 1 : 0;
   if (is_good) return {};
   return make_error(ErrorCode::BadInput, "a coordinate of {} m, allowed is +-{} m: check the unit", largest,
                     kMostReadM);
@@ -191,6 +205,9 @@ Result<ObjMesh> parse_obj(std::string_view text, const std::string& place, float
   }
   ObjMesh mesh;
   RETURN_IF_ERROR(bad.settle(lines, "lines of the mesh", "and are left out", mesh.notes));
+  if (data.decimal_commas > 0)
+    mesh.notes.push_back(
+        counted(data.decimal_commas, "vertex has decimal commas", "vertices have decimal commas"));
   if (data.triangle.empty()) return at(place, make_error(ErrorCode::BadInput, "the mesh has no faces"));
   mesh.normal = compute_normals(data.position, data.triangle);
   for (size_t i = 0; i < mesh.normal.size(); ++i) {

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <complex>
+#include <functional>
 #include <numbers>
 #include <vector>
 
@@ -23,6 +24,8 @@ constexpr uint32_t kMinRoots = 64;
 /// Another side is up only when it is better than +Y by this much: -1 to 1 for how far the roots cover that
 /// side, and as much for how far the hair hangs from it.
 constexpr double kClearlyBetter = 0.5;
+/// Hair on one side alone, which may be brows, turns that side up where it hangs from it.
+constexpr double kFallOfPiece = 0.1;
 /// Roots that lie on that side of the head, and how far from the middle roots of a head are, in radii.
 constexpr double kOnTop = 0.1, kNearestPlacedRoot = 0.7, kFurthestPlacedRoot = 1.35;
 enum class RootReach { Head, Everywhere };
@@ -193,11 +196,13 @@ glm::vec3 GroomPlacement::yawed(const glm::vec3& v) const {
 Guess<UpSide> guess_up(const Groom& groom, const UpSide& assumed) {
   if (groom.strand_count() < kMinRoots) return {assumed, {}};
   Guess<UpSide> best{assumed, {}};
+  const bool is_little = is_piece(upright_by(groom, assumed));
   double best_score = score_of(uprightness(upright_by(groom, assumed))) + kClearlyBetter;
   for (const UpSide& side : {UpSide{}, {true, false}, {false, true}, {true, true}}) {
     if (side == assumed) continue;
     const Uprightness up = uprightness(upright_by(groom, side));
     if (!(up.top > kOnTop && score_of(up) > best_score)) continue;
+    if (is_little && !(up.fall > kFallOfPiece)) continue;
     best = {side, "the hair covers that side and hangs from it"};
     best_score = score_of(up);
   }
@@ -226,6 +231,20 @@ const char* setting_of(const UpSide& up) {
 
 namespace {
 
+/// The lowest of heights, but for stray ones; 1 where there are none. Many that are far below the others, as
+/// those of a beard are below a forehead, are no hairline; a few may be a nape's.
+double hairline_of(std::vector<double> heights) {
+  constexpr double kLeastGap = 0.2, kSpacings = 15.0, kMany = 0.4;
+  if (heights.empty()) return 1.0;
+  std::sort(heights.begin(), heights.end(), std::greater<>());
+  const auto count = static_cast<double>(heights.size());
+  const double gap = std::max(kLeastGap, kSpacings / count);
+  const auto below = std::adjacent_find(heights.begin(), heights.end(),
+                                        [&](double above, double next) { return above - next > gap; });
+  if (static_cast<double>(heights.end() - below) > kMany * count) heights.erase(below + 1, heights.end());
+  return quantile(std::move(heights), kHairlineShare);
+}
+
 /// Where around +Y the lowest roots are highest: the first harmonic of the hairline's height.
 glm::dvec3 hairline_rise(const std::vector<glm::dvec3>& directions) {
   std::array<std::vector<double>, kSectors> heights;
@@ -236,8 +255,7 @@ glm::dvec3 hairline_rise(const std::vector<glm::dvec3>& directions) {
   glm::dvec3 rise(0.0);
   // A sector without roots is bare up to the crown.
   for (size_t sector = 0; sector < kSectors; ++sector) {
-    const double height =
-        heights[sector].empty() ? 1.0 : quantile(std::move(heights[sector]), kHairlineShare);
+    const double height = hairline_of(std::move(heights[sector]));
     const double angle = 2.0 * std::numbers::pi * static_cast<double>(sector) / kSectors;
     rise += 2.0 / kSectors * height * glm::dvec3(std::sin(angle), 0.0, std::cos(angle));
   }
@@ -257,7 +275,7 @@ glm::dvec3 middle_around(const std::vector<glm::dvec3>& directions) {
 Guess<float> guess_yaw_deg(const Groom& groom) {
   if (groom.strand_count() < kMinRoots) return {};
   const HairPlace place = hair_place(groom);
-  if (place == HairPlace::Body) return {};
+  if (place == HairPlace::Body || (place == HairPlace::Head && is_piece(groom))) return {};
   const std::vector<glm::dvec3> directions = root_directions(groom, RootReach::Everywhere);
   const bool is_beard = place == HairPlace::Jaw;
   const char* const why = is_beard ? "the beard grows" : "the hairline is highest";
@@ -317,6 +335,17 @@ Guess<float> unit_of_fur(const Groom& groom) {
   return {1.0f, {}};
 }
 
+/// The first common unit in which roots reach as far as on a side of a head; no reason where there is none.
+Guess<float> unit_of_piece(const Groom& groom) {
+  constexpr float kLeastM = 0.03f, kMostM = 0.25f;
+  const float reach = extent_of(roots_of(groom));
+  for (const CommonUnit& unit : kCommonUnits)
+    if (reach * unit.unit_m >= kLeastM && reach * unit.unit_m <= kMostM)
+      return {unit.unit_m, fmt::format("in {} its roots reach over {:.2g} m of one side of a head", unit.name,
+                                       reach * unit.unit_m)};
+  return {};
+}
+
 /// The first common unit in which hair is as long as on a head; no reason where there is none.
 Guess<float> unit_by_length(const Groom& groom, const char* why) {
   constexpr double kShortestM = 0.03, kLongestM = 1.2;
@@ -336,6 +365,7 @@ Guess<float> guess_unit(const Groom& groom) {
   if (place == HairPlace::Body) return unit_of_fur(groom);
   if (const char* const why = unlike_a_head(groom)) {
     if (Guess<float> by_length = unit_by_length(groom, why); !by_length.reason.empty()) return by_length;
+    if (Guess<float> of_piece = unit_of_piece(groom); !of_piece.reason.empty()) return of_piece;
   }
   const float radius = fit_head_sphere(groom).radius_m;
   if (!std::isfinite(radius) || radius <= 0.0f) return {1.0f, {}};
@@ -345,6 +375,8 @@ Guess<float> guess_unit(const Groom& groom) {
                                      place == HairPlace::Jaw ? "face behind this beard" : "head")};
   }
   if (place == HairPlace::Jaw) return {1.0f, {}};
+  if (is_piece(groom))
+    if (Guess<float> of_piece = unit_of_piece(groom); !of_piece.reason.empty()) return of_piece;
   return {kTypicalHeadRadiusM / radius, "that gives the head the size of a person's"};
 }
 

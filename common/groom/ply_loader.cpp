@@ -140,7 +140,8 @@ Result<PlyRowsRead> read_rows(std::string_view file, const PlyHeader& header) {
     }
   }
   if (rows.decimal_commas() > 0)
-    read.notes.push_back(fmt::format("{} numbers have a decimal comma", rows.decimal_commas()));
+    read.notes.push_back(
+        counted(rows.decimal_commas(), "number has a decimal comma", "numbers have a decimal comma"));
   if (const size_t left = rows.left_bytes(); left > 0) {
     BadItems beyond;
     beyond.add(make_error(ErrorCode::BadInput, "{} bytes are left after the last row", left), left);

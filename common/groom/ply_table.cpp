@@ -141,7 +141,9 @@ std::optional<size_t> PlyElement::find(std::initializer_list<std::string_view> n
 }
 
 Result<PlyHeader> read_ply_header(std::string_view file) {
-  if (!file.starts_with("ply\n") && !file.starts_with("ply\r"))
+  TextScan begin(file.substr(0, kMaxPlyHeaderBytes));
+  if (!file.starts_with("ply") || !begin.next_line() || begin.next_word() != "ply" ||
+      !begin.next_word().empty())
     return make_error(ErrorCode::BadInput, "does not begin with the line 'ply': not a .ply file");
   PlyHeader header;
   header.body_at = header_bytes(file);

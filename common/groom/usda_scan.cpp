@@ -18,6 +18,30 @@ bool is_word_char(char c) {
          std::string_view("_:.+-!").find(c) != std::string_view::npos;
 }
 
+/// The number of a word with a decimal comma.
+std::optional<double> with_decimal_point(std::string_view word) {
+  std::string pointed(word);
+  std::replace(pointed.begin(), pointed.end(), ',', '.');
+  return parse_number<double>(pointed);
+}
+
+/// The point of "1,5, 2,5, 3,5"; empty where it is none.
+std::optional<glm::vec3> point_of_decimal_commas(std::string_view text) {
+  glm::vec3 point{0.0f};
+  for (int axis = 0; axis < 3; ++axis) {
+    text.remove_prefix(std::min(text.find_first_not_of(" \t"), text.size()));
+    const size_t end = std::min(text.find_first_of(" \t"), text.size());
+    std::string_view word = text.substr(0, end);
+    text.remove_prefix(end);
+    if (axis < 2 && !word.ends_with(',')) return std::nullopt;
+    if (axis < 2) word.remove_suffix(1);
+    const auto value = with_decimal_point(word);
+    if (!value) return std::nullopt;
+    point[axis] = static_cast<float>(*value);
+  }
+  return text.find_first_not_of(" \t\r\n") == std::string_view::npos ? std::optional(point) : std::nullopt;
+}
+
 char closing_of(char opening) {
   return opening == '(' ? ')' : opening == '[' ? ']' : '}';
 }
@@ -61,8 +85,11 @@ std::string UsdaScan::found() {
 }
 
 size_t UsdaScan::line() const {
-  const std::string_view before = text_.substr(0, at_);
-  return 1 + static_cast<size_t>(std::count(before.begin(), before.end(), '\n'));
+  TextScan lines(text_.substr(0, at_));
+  while (lines.next_line()) {
+  }
+  const bool is_at_begin = at_ == 0 || text_[at_ - 1] == '\n' || text_[at_ - 1] == '\r';
+  return lines.line() + (is_at_begin ? 1 : 0);
 }
 
 std::string_view UsdaScan::word() {
@@ -99,6 +126,20 @@ Result<double> UsdaScan::number() {
   if (value) return *value;
   at_ = begin;
   return error(ErrorCode::BadInput, "{} is no number", found());
+}
+
+Result<double> UsdaScan::scalar() {
+  const size_t begin = (skip_space(), at_);
+  ASSIGN_OR_RETURN(const double value, number());
+  const bool has_comma = text_.substr(at_).starts_with(',') && at_ + 1 < text_.size() &&
+                         std::isdigit(static_cast<unsigned char>(text_[at_ + 1])) != 0;
+  if (!has_comma) return value;
+  ++at_;
+  word();
+  const auto pointed = with_decimal_point(text_.substr(begin, at_ - begin));
+  if (!pointed) return error(ErrorCode::BadInput, "'{}' is no number", text_.substr(begin, at_ - begin));
+  ++decimal_commas_;
+  return *pointed;
 }
 
 Result<double> UsdaScan::number_or_nan() {
@@ -180,14 +221,25 @@ Result<std::vector<glm::vec3>> UsdaScan::points(size_t limit) {
   return array<glm::vec3>(limit, [this]() -> Result<glm::vec3> {
     glm::vec3 point{0.0f};
     RETURN_IF_ERROR(expect('('));
+    const size_t begin = at_;
     for (int axis = 0; axis < 3; ++axis) {
-      if (axis > 0) RETURN_IF_ERROR(expect(','));
-      ASSIGN_OR_RETURN(const double value, number_or_nan());
-      point[axis] = static_cast<float>(value);
+      if (axis > 0 && !take(',')) return odd_point(begin);
+      const auto value = number_or_nan();
+      if (!value) return odd_point(begin);
+      point[axis] = static_cast<float>(*value);
     }
-    RETURN_IF_ERROR(expect(')'));
-    return point;
+    return take(')') ? Result<glm::vec3>(point) : odd_point(begin);
   });
+}
+
+Result<glm::vec3> UsdaScan::odd_point(size_t begin) {
+  at_ = std::min(text_.find_first_of("()[]{}", begin), text_.size());
+  if (is_at_end() || text_[at_] != ')')
+    return error(ErrorCode::BadInput, "{} found where ')' is needed", found());
+  const auto point = point_of_decimal_commas(text_.substr(begin, at_ - begin));
+  ++at_;
+  decimal_commas_ += point ? 1 : 0;
+  return point.value_or(glm::vec3(std::numeric_limits<float>::quiet_NaN()));
 }
 
 Result<std::vector<float>> UsdaScan::floats(size_t limit) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/base/mercy.h"
 #include "common/groom/groom.h"
 #include "common/groom/text_scan.h"
 #include "common/groom/usd_loader.h"
@@ -19,6 +20,9 @@ class StageReader {
   /// Of a file that is cut off, what stands before that.
   Result<UsdStage> read() {
     const Status read = read_layer();
+    if (scan_.decimal_commas() > 0)
+      stage_.notes.push_back(counted(scan_.decimal_commas(), "number or point has decimal commas",
+                                     "numbers and points have decimal commas"));
     if (read) return std::move(stage_);
     const bool has_strands = std::any_of(stage_.prim.begin(), stage_.prim.end(), [](const UsdPrim& prim) {
       return prim.curves && !prim.curves->points.empty();
@@ -88,12 +92,12 @@ class StageReader {
         return {};
       }
       if (key == "metersPerUnit") {
-        ASSIGN_OR_RETURN(const double value, scan_.number());
+        ASSIGN_OR_RETURN(const double value, scan_.scalar());
         set_meters_per_unit(stage_, value);
         return {};
       }
       if (key == "kilogramsPerUnit") {
-        ASSIGN_OR_RETURN(stage_.kilograms_per_unit, scan_.number());
+        ASSIGN_OR_RETURN(stage_.kilograms_per_unit, scan_.scalar());
         return {};
       }
       if (key == "subLayers") ++stage_.reference_count;
@@ -201,7 +205,7 @@ class StageReader {
       return {};
     }
     if (std::optional<double>* const number = find_material_number(prim, name)) {
-      ASSIGN_OR_RETURN(*number, scan_.number());
+      ASSIGN_OR_RETURN(*number, scan_.scalar());
       return {};
     }
     if (name.starts_with("xformOp:")) return take_op(name, prim, time.has_value());

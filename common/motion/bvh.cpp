@@ -12,14 +12,13 @@
 #include "common/base/mercy.h"
 #include "common/base/quantile.h"
 #include "common/motion/bvh_body.h"
+#include "common/motion/bvh_skeleton.h"
 #include "common/motion/motion_glitches.h"
 #include "common/motion/text_cursor.h"
 
 namespace strandcast {
 namespace {
 
-constexpr uint32_t kMaxJointChannels = 6;
-constexpr double kMaxChannelValue = 1e9;
 constexpr glm::dvec3 kAxis[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
 // A first frame is a calibration pose when most of its rotations are almost zero, clearly more than one frame
@@ -28,229 +27,6 @@ constexpr double kTPoseAngleDeg = 1.0;
 constexpr double kTPoseRestShare = 0.6;
 constexpr double kTPoseRestDrop = 0.2;
 constexpr double kTPoseStepRatio = 10.0;
-
-struct Channel {
-  bool is_rotation = false;
-  uint8_t axis = 0;
-};
-
-struct Joint {
-  std::string name;
-  uint32_t parent = kNoJoint;
-  glm::dvec3 offset{0.0};
-  std::vector<Channel> channels;
-  uint32_t first_channel = 0;
-};
-
-struct EndSite {
-  uint32_t parent = kNoJoint;
-  glm::dvec3 offset{0.0};
-};
-
-struct Skeleton {
-  std::vector<Joint> joints;  // parents before children
-  std::vector<EndSite> end_sites;
-  uint32_t channel_count = 0;
-  uint32_t top = 0;  // of the performer whose head is taken
-};
-
-/// A number within bounds, also with the decimal comma of some programs.
-std::optional<double> channel_value(std::string_view word) {
-  std::optional<double> value = parse_number(word);
-  if (!value && std::count(word.begin(), word.end(), ',') == 1) {
-    std::string pointed(word);
-    pointed[pointed.find(',')] = '.';
-    value = parse_number(pointed);
-  }
-  return value && std::abs(*value) <= kMaxChannelValue ? value : std::nullopt;
-}
-
-class HierarchyParser {
- public:
-  explicit HierarchyParser(TextCursor& cursor) : cursor_(cursor) {}
-
-  /// Reads from HIERARCHY up to and including the word MOTION.
-  Result<Skeleton> parse() {
-    if (!equals_ignoring_case(cursor_.next_token(), "HIERARCHY"))
-      return cursor_.fail(ErrorCode::BadInput, "a BVH file begins with HIERARCHY");
-    for (;;) {
-      const auto word = cursor_.next_token();
-      if (equals_ignoring_case(word, "MOTION")) break;
-      if (!equals_ignoring_case(word, "ROOT")) return unexpected(word, "ROOT or MOTION");
-      RETURN_IF_ERROR(parse_joint_head(kNoJoint));
-      RETURN_IF_ERROR(parse_tree());
-    }
-    if (skeleton_.joints.empty()) return cursor_.fail(ErrorCode::BadInput, "the hierarchy has no ROOT");
-    return std::move(skeleton_);
-  }
-
- private:
-  Error unexpected(std::string_view word, const char* expected) const {
-    if (word.empty())
-      return cursor_.fail(ErrorCode::BadInput, "the file ends where {} is expected", expected);
-    return cursor_.fail(ErrorCode::BadInput, "found \"{}\" where {} is expected", shown(word), expected);
-  }
-
-  /// Name and opening brace. The name is the rest of the line: it may hold blanks.
-  Status parse_joint_head(uint32_t parent) {
-    std::string_view name = cursor_.rest_of_line();
-    const bool has_brace = name.ends_with('{');
-    if (has_brace) name = trim(name.substr(0, name.size() - 1));
-    if (skeleton_.joints.size() >= kMaxBvhJoints)
-      return cursor_.fail(ErrorCode::LimitExceeded, "more than {} joints", kMaxBvhJoints);
-    Joint joint;
-    joint.name = std::string(name);
-    joint.parent = parent;
-    joint.first_channel = skeleton_.channel_count;
-    skeleton_.joints.push_back(std::move(joint));
-    return has_brace ? Status{} : expect_brace();
-  }
-
-  Status expect_brace() {
-    const auto word = cursor_.next_token();
-    return word == "{" ? Status{} : Status(unexpected(word, "{"));
-  }
-
-  /// Body of a root and everything under it, up to its closing brace. A loop, so that depth costs no stack.
-  Status parse_tree() {
-    std::vector<uint32_t> open{static_cast<uint32_t>(skeleton_.joints.size() - 1)};  // kNoJoint = an end site
-    while (!open.empty()) {
-      const auto word = cursor_.next_token();
-      const bool is_end_site = open.back() == kNoJoint;
-      if (word == "}") {
-        open.pop_back();
-      } else if (equals_ignoring_case(word, "OFFSET")) {
-        ASSIGN_OR_RETURN(const glm::dvec3 offset, parse_offset());
-        if (is_end_site)
-          skeleton_.end_sites.push_back({open[open.size() - 2], offset});
-        else
-          skeleton_.joints[open.back()].offset = offset;
-      } else if (equals_ignoring_case(word, "CHANNELS") && !is_end_site) {
-        RETURN_IF_ERROR(parse_channels(open.back()));
-      } else if (equals_ignoring_case(word, "JOINT") && !is_end_site) {
-        if (open.size() >= kMaxBvhDepth)
-          return cursor_.fail(ErrorCode::LimitExceeded, "joints nest deeper than {}", kMaxBvhDepth);
-        RETURN_IF_ERROR(parse_joint_head(open.back()));
-        open.push_back(static_cast<uint32_t>(skeleton_.joints.size() - 1));
-      } else if (equals_ignoring_case(word, "End") && !is_end_site) {
-        const auto site = cursor_.next_token();
-        if (!equals_ignoring_case(site, "Site")) return unexpected(site, "Site");
-        RETURN_IF_ERROR(expect_brace());
-        open.push_back(kNoJoint);
-      } else {
-        return unexpected(word, "OFFSET, CHANNELS, JOINT, End Site or }");
-      }
-    }
-    return {};
-  }
-
-  Result<glm::dvec3> parse_offset() {
-    glm::dvec3 offset{0.0};
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto word = cursor_.next_token();
-      const auto value = channel_value(word);
-      if (!value) return unexpected(word, "a number (OFFSET takes three)");
-      offset[axis] = *value;
-    }
-    return offset;
-  }
-
-  Status parse_channels(uint32_t joint_index) {
-    Joint& joint = skeleton_.joints[joint_index];
-    if (!joint.channels.empty())
-      return cursor_.fail(ErrorCode::BadInput, "a second CHANNELS for joint {}", shown(joint.name));
-    const auto word = cursor_.next_token();
-    const auto count = parse_number(word);
-    if (!count || *count < 0 || *count > kMaxJointChannels || *count != std::floor(*count))
-      return unexpected(word, "a channel count within 0 .. 6");
-    joint.first_channel = skeleton_.channel_count;
-    for (int i = 0; i < static_cast<int>(*count); ++i) {
-      const auto name = cursor_.next_token();
-      Channel channel;
-      channel.is_rotation = name.size() > 1 && equals_ignoring_case(name.substr(1), "rotation");
-      const bool is_position = name.size() > 1 && equals_ignoring_case(name.substr(1), "position");
-      const size_t axis = name.empty() ? std::string::npos : std::string_view("XYZxyz").find(name[0]);
-      if (axis == std::string::npos || !(channel.is_rotation || is_position))
-        return unexpected(name, "a channel name (Xposition .. Zrotation)");
-      channel.axis = static_cast<uint8_t>(axis % 3);
-      joint.channels.push_back(channel);
-    }
-    skeleton_.channel_count += static_cast<uint32_t>(joint.channels.size());
-    return {};
-  }
-
-  TextCursor& cursor_;
-  Skeleton skeleton_;
-};
-
-/// The name of a joint, "Head#2" for the second of that name: performers may be named alike.
-std::string label_of(const Skeleton& skeleton, uint32_t joint) {
-  const std::string& name = skeleton.joints[joint].name;
-  const auto before = std::count_if(skeleton.joints.begin(), skeleton.joints.begin() + joint,
-                                    [&](const Joint& other) { return other.name == name; });
-  return before == 0 ? name : fmt::format("{}#{}", name, before + 1);
-}
-
-std::string known_joints(const Skeleton& skeleton) {
-  std::string known;
-  for (uint32_t i = 0; i < skeleton.joints.size(); ++i)
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", shown(label_of(skeleton, i)));
-  return known;
-}
-
-Result<uint32_t> find_head(const Skeleton& skeleton, const std::string& wanted) {
-  for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
-    const std::string& name = skeleton.joints[i].name;
-    if (wanted.empty() ? is_head_name(name) : name == wanted || label_of(skeleton, i) == wanted) return i;
-  }
-  return make_error(ErrorCode::NotFound, "no joint named {} (--joint NAME takes another, known: {})",
-                    wanted.empty() ? "Head or head" : shown(wanted), known_joints(skeleton));
-}
-
-uint32_t find_top(const Skeleton& skeleton, uint32_t head) {
-  std::vector<std::string> names;
-  std::vector<uint32_t> parents;
-  for (const Joint& joint : skeleton.joints) {
-    names.push_back(joint.name);
-    parents.push_back(joint.parent);
-  }
-  return top_of_performer(names, parents, head);
-}
-
-/// Whether a joint is of the performer whose head is taken.
-bool is_own(const Skeleton& skeleton, uint32_t joint) {
-  while (joint != skeleton.top && joint != kNoJoint) joint = skeleton.joints[joint].parent;
-  return joint == skeleton.top;
-}
-
-/// Which joint is taken as the head, and whose, where the file has several performers.
-std::string taken_head(const Skeleton& skeleton, uint32_t head) {
-  std::string others;
-  for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
-    if (!is_head_name(skeleton.joints[i].name) || is_own(skeleton, i)) continue;
-    others += fmt::format("{}{}", others.empty() ? "" : ", ", shown(label_of(skeleton, i)));
-  }
-  if (others.empty())
-    return fmt::format("the head is {} (--joint takes another)", shown(label_of(skeleton, head)));
-  return fmt::format("of several performers the one with {} is taken, others have {} (--joint takes another)",
-                     shown(label_of(skeleton, head)), others);
-}
-
-/// Joints from the root down to the head.
-std::vector<const Joint*> path_to(const Skeleton& skeleton, uint32_t joint_index) {
-  std::vector<const Joint*> path;
-  for (; joint_index != kNoJoint; joint_index = skeleton.joints[joint_index].parent)
-    path.push_back(&skeleton.joints[joint_index]);
-  std::reverse(path.begin(), path.end());
-  return path;
-}
-
-/// Likewise from the performer's topmost joint on.
-std::vector<const Joint*> own_path(const Skeleton& skeleton, uint32_t joint_index) {
-  std::vector<const Joint*> path = path_to(skeleton, joint_index);
-  path.erase(path.begin(), std::find(path.begin(), path.end(), &skeleton.joints[skeleton.top]));
-  return path;
-}
 
 /// The axis of a file that is up, or down.
 struct Upward {
@@ -268,7 +44,7 @@ struct Upward {
 constexpr std::array<Upward, 6> kUpwards = {{{1, 1.0}, {2, 1.0}, {1, -1.0}, {2, -1.0}, {0, 1.0}, {0, -1.0}}};
 
 /// Where the head is from the hips with all rotations zero. What is not clear counts as +Y up.
-Upward guess_up(const std::vector<const Joint*>& path) {
+Upward guess_up(const BvhPath& path) {
   glm::dvec3 head(0.0);
   for (size_t i = 1; i < path.size(); ++i) head += path[i]->offset;
   for (const Upward& up : kUpwards)
@@ -298,7 +74,7 @@ struct BodyHeight {
 };
 
 /// Where a joint lies from the one above it: its positions in a row go before its OFFSET.
-glm::dvec3 place_of(const Joint& joint, std::span<const double> row) {
+glm::dvec3 place_of(const BvhJoint& joint, std::span<const double> row) {
   glm::dvec3 place = joint.offset;
   for (size_t i = 0; i < joint.channels.size(); ++i)
     if (!joint.channels[i].is_rotation) place[joint.channels[i].axis] = row[joint.first_channel + i];
@@ -306,7 +82,7 @@ glm::dvec3 place_of(const Joint& joint, std::span<const double> row) {
 }
 
 /// Length of the first bone above the root that has one, 0 for none.
-double first_bone(const std::vector<const Joint*>& path, std::span<const double> row) {
+double first_bone(const BvhPath& path, std::span<const double> row) {
   for (size_t i = 1; i < path.size(); ++i)
     if (const double length = glm::length(place_of(*path[i], row)); length > 0.0) return length;
   return 0.0;
@@ -315,7 +91,7 @@ double first_bone(const std::vector<const Joint*>& path, std::span<const double>
 /// Body height, file units: the bones from the hips down to the lowest point and up to the highest one, as
 /// long as they are; rest poses often spread the legs. Where the hips stand higher over the floor than these
 /// legs reach, that counts. Of the performer's joints alone.
-BodyHeight body_height(const Skeleton& skeleton, uint32_t head, const FileUp& axes,
+BodyHeight body_height(const BvhSkeleton& skeleton, uint32_t head, const FileUp& axes,
                        std::span<const double> first_row) {
   struct Reach {
     double height = 0.0;  // above the root with all rotations zero
@@ -326,15 +102,15 @@ BodyHeight body_height(const Skeleton& skeleton, uint32_t head, const FileUp& ax
   };
   std::vector<Reach> reach;
   double root_height = 0.0;
-  for (const Joint* const joint : path_to(skeleton, skeleton.top))
+  for (const BvhJoint* const joint : path_to(skeleton, skeleton.top))
     root_height += axes.in_motion.of(place_of(*joint, first_row));
-  for (const Joint& joint : skeleton.joints) {
+  for (const BvhJoint& joint : skeleton.joints) {
     const auto index = static_cast<uint32_t>(reach.size());
     const bool is_grown = index != skeleton.top && is_own(skeleton, index);
     reach.push_back(is_grown ? grown(reach[joint.parent], place_of(joint, first_row)) : Reach{});
   }
   const size_t joint_count = reach.size();
-  for (const EndSite& site : skeleton.end_sites) {
+  for (const BvhEndSite& site : skeleton.end_sites) {
     CHECK(site.parent < joint_count);
     if (is_own(skeleton, site.parent)) reach.push_back(grown(reach[site.parent], site.offset));
   }
@@ -406,12 +182,12 @@ void doubt_up(MotionClip& clip, const Upward& stated, const Upward& guessed) {
 }
 
 /// Pose of the last joint of the path in the file's axes and units.
-Pose evaluate(const std::vector<const Joint*>& path, std::span<const double> row) {
+Pose evaluate(const BvhPath& path, std::span<const double> row) {
   Pose pose;
-  for (const Joint* joint : path) {
+  for (const BvhJoint* joint : path) {
     Pose local{joint->offset, {1, 0, 0, 0}};
     for (size_t i = 0; i < joint->channels.size(); ++i) {
-      const Channel& channel = joint->channels[i];
+      const BvhChannel& channel = joint->channels[i];
       const double value = row[joint->first_channel + i];
       if (channel.is_rotation)
         local.rotation = local.rotation * glm::angleAxis(glm::radians(value), kAxis[channel.axis]);
@@ -424,9 +200,9 @@ Pose evaluate(const std::vector<const Joint*>& path, std::span<const double> row
 }
 
 /// Share of the rotation channels within kTPoseAngleDeg of zero.
-double share_at_rest(const Skeleton& skeleton, std::span<const double> row) {
+double share_at_rest(const BvhSkeleton& skeleton, std::span<const double> row) {
   uint32_t at_rest = 0, rotations = 0;
-  for (const Joint& joint : skeleton.joints) {
+  for (const BvhJoint& joint : skeleton.joints) {
     for (size_t i = 0; i < joint.channels.size(); ++i) {
       if (!joint.channels[i].is_rotation) continue;
       ++rotations;
@@ -456,7 +232,7 @@ Result<MotionHeader> parse_motion_header(TextCursor& cursor, double stated_s) {
       !equals_ignoring_case(cursor.next_token(), "Time:"))
     return cursor.fail(ErrorCode::BadInput, "expected \"Frame Time:\" after Frames");
   const auto word = cursor.next_token();
-  const auto frame_s = channel_value(word);
+  const auto frame_s = bvh_number(word);
   const bool is_fit = frame_s && *frame_s >= kMinFrameTimeS && *frame_s <= kMaxFrameTimeS;
   if (!is_fit && stated_s == 0.0)
     return cursor.fail(
@@ -476,7 +252,7 @@ Status parse_row(const TextCursor& cursor, std::string_view rest, size_t frame,
     if (word.empty())
       return cursor.fail(ErrorCode::BadInput, "frame {} has {} values, the hierarchy has {} channels", frame,
                          i, row.size());
-    const auto value = channel_value(word);
+    const auto value = bvh_number(word);
     if (!value) {
       Error problem =
           cursor.fail(ErrorCode::BadInput, "value {} of frame {} is \"{}\", not a number within 1e9", i,
@@ -501,34 +277,33 @@ struct Rows {
   glm::dvec3 root{0.0}, root_low{0.0}, root_high{0.0};
   BadItems bad;
   BadItems idle;  // values in channels that nobody uses
+  uint64_t decimal_commas = 0;
 };
-
-using JointPath = std::vector<const Joint*>;  // from the root
 
 /// Of each channel what stands in for a value that is no number: the rest pose's, nothing where a joint needs
 /// it.
-std::vector<std::optional<double>> stand_ins(const Skeleton& skeleton, const JointPath& head,
-                                             const std::vector<JointPath>& body) {
+std::vector<std::optional<double>> stand_ins(const BvhSkeleton& skeleton, const BvhPath& head,
+                                             const std::vector<BvhPath>& body) {
   std::vector<std::optional<double>> values;
-  for (const Joint& joint : skeleton.joints)
-    for (const Channel& channel : joint.channels)
+  for (const BvhJoint& joint : skeleton.joints)
+    for (const BvhChannel& channel : joint.channels)
       values.emplace_back(channel.is_rotation ? 0.0 : joint.offset[channel.axis]);
-  const auto need = [&](const JointPath& path) {
-    for (const Joint* const joint : path)
+  const auto need = [&](const BvhPath& path) {
+    for (const BvhJoint* const joint : path)
       std::fill_n(values.begin() + joint->first_channel, joint->channels.size(), std::nullopt);
   };
   need(head);
-  for (const JointPath& path : body) need(path);
+  for (const BvhPath& path : body) need(path);
   return values;
 }
 
 /// Reads rows up to the end of the text, each one of `clip`.
-Result<Rows> read_rows(TextCursor& cursor, const Skeleton& skeleton, const JointPath& head,
-                       const std::vector<JointPath>& body, MotionClip& clip) {
+Result<Rows> read_rows(TextCursor& cursor, const BvhSkeleton& skeleton, const BvhPath& head,
+                       const std::vector<BvhPath>& body, MotionClip& clip) {
   Rows rows;
   std::vector<double> row(skeleton.channel_count);
   const auto instead = stand_ins(skeleton, head, body);
-  const JointPath to_top = path_to(skeleton, skeleton.top);
+  const BvhPath to_top = path_to(skeleton, skeleton.top);
   size_t good_count = 0;
   while (const auto line = cursor.next_line()) {
     const size_t frame = rows.is_good.size();
@@ -542,6 +317,7 @@ Result<Rows> read_rows(TextCursor& cursor, const Skeleton& skeleton, const Joint
       clip.joint_m.resize(clip.joint_m.size() + body.size());
       continue;
     }
+    rows.decimal_commas += static_cast<uint64_t>(std::count(line->begin(), line->end(), ','));
     if (good_count == 0) rows.first = row;
     if (good_count < rows.rest_share.size()) rows.rest_share[good_count] = share_at_rest(skeleton, row);
     ++good_count;
@@ -552,7 +328,7 @@ Result<Rows> read_rows(TextCursor& cursor, const Skeleton& skeleton, const Joint
     rows.root += root;
     rows.root_low = good_count == 1 ? root : glm::min(rows.root_low, root);
     rows.root_high = good_count == 1 ? root : glm::max(rows.root_high, root);
-    for (const JointPath& joint : body)
+    for (const BvhPath& joint : body)
       clip.joint_m.push_back(glm::conjugate(at_frame.rotation) *
                              (evaluate(joint, row).position_m - at_frame.position_m));
   }
@@ -609,7 +385,7 @@ Upward guess_up_in_motion(const Rows& rows, const Upward& at_rest) {
   return at_rest;
 }
 
-FileUp guess_both(const std::vector<const Joint*>& path, const Rows& rows) {
+FileUp guess_both(const BvhPath& path, const Rows& rows) {
   const Upward at_rest = guess_up(path);
   return {at_rest, guess_up_in_motion(rows, at_rest)};
 }
@@ -624,13 +400,13 @@ glm::dquat upright_from(const Upward& up) {
 
 /// Where left and right joints of the performer say that a rest pose looks, in quarter turns from +Z
 /// towards +X; nothing where they say nothing.
-std::optional<int> facing_at_rest(const Skeleton& skeleton, const Upward& up,
+std::optional<int> facing_at_rest(const BvhSkeleton& skeleton, const Upward& up,
                                   std::span<const double> first_row) {
   constexpr double kMostOff = 0.35;
   std::vector<glm::dvec3> places;
   std::vector<std::string> names;
   for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
-    const Joint& joint = skeleton.joints[i];
+    const BvhJoint& joint = skeleton.joints[i];
     names.push_back(is_own(skeleton, i) ? joint.name : std::string());
     places.push_back(place_of(joint, first_row) +
                      (joint.parent == kNoJoint ? glm::dvec3(0.0) : places[joint.parent]));
@@ -680,14 +456,14 @@ void to_head_space(std::vector<glm::dvec3>& places, double unit_m, const FileUp&
 
 /// Paths to the joints of the body that are known, and their names; NotFound for one that was asked for. Of
 /// the performer; what is asked for may be another's.
-Result<std::vector<JointPath>> find_body(const Skeleton& skeleton, const BvhOptions& options,
-                                         std::vector<std::string>& names) {
+Result<std::vector<BvhPath>> find_body(const BvhSkeleton& skeleton, const BvhOptions& options,
+                                       std::vector<std::string>& names) {
   std::vector<std::string> in_file, of_head;
   for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
     in_file.push_back(skeleton.joints[i].name);
     of_head.push_back(is_own(skeleton, i) ? in_file.back() : std::string());
   }
-  std::vector<JointPath> paths;
+  std::vector<BvhPath> paths;
   const auto add = [&](const std::string& name, size_t joint) {
     names.push_back(name);
     paths.push_back(path_to(skeleton, static_cast<uint32_t>(joint)));
@@ -717,6 +493,9 @@ std::vector<std::string> repairs_of(const Rows& rows, const MotionHeader& header
   if (rows.idle.count() > 0)
     repairs.push_back(fmt::format("{} values are no numbers, in joints that nobody needs; the first: {}",
                                   rows.idle.count(), rows.idle.first().to_string()));
+  if (rows.decimal_commas > 0)
+    repairs.push_back(
+        counted(rows.decimal_commas, "number has a decimal comma", "numbers have a decimal comma"));
   if (rows.is_good.size() != header.frame_count)
     repairs.push_back(
         fmt::format("{} frames are announced, {} are there", header.frame_count, rows.is_good.size()));
@@ -730,17 +509,19 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
     return make_error(ErrorCode::BadInput, "the length unit is {} m, it must be above 0, or 0 to be guessed",
                       options.unit_m);
   TextCursor cursor(text, place);
-  ASSIGN_OR_RETURN(Skeleton skeleton, HierarchyParser(cursor).parse());
-  const auto head = find_head(skeleton, options.head_joint);
+  ASSIGN_OR_RETURN(BvhSkeleton skeleton, parse_bvh_skeleton(cursor));
+  Result<uint32_t> head = find_head(skeleton, options.head_joint);
   if (!head) return at(place, head.error());
-  skeleton.top = find_top(skeleton, *head);
-  const auto path = path_to(skeleton, *head);
   ASSIGN_OR_RETURN(const MotionHeader header, parse_motion_header(cursor, options.frame_s));
   if (skeleton.channel_count == 0) return cursor.fail(ErrorCode::BadInput, "the hierarchy has no channels");
 
   static_cast<void>(cursor.rest_of_line());
+  const uint32_t named_head = *head;
+  if (options.head_joint.empty()) head = find_moving_head(cursor, skeleton, named_head);
+  skeleton.top = find_top(skeleton, *head);
+  const auto path = path_to(skeleton, *head);
   MotionClip clip;
-  std::vector<JointPath> body;
+  std::vector<BvhPath> body;
   if (options.has_body || !options.body_joints.empty()) {
     auto found = find_body(skeleton, options, clip.joint_name);
     if (!found) return at(place, found.error());
@@ -754,6 +535,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
       begins_with_t_pose(clip.world_from_head, rows.rest_share[0], rows.rest_share[1]))
     leave_out_first_frames(clip, 1);
   clip.head_reason = taken_head(skeleton, *head);
+  if (*head != named_head) clip.head_reason += ": the first joint of such a name does not move";
   const Upward stated{options.is_z_up.value_or(false) ? 2 : 1};
   FileUp up = options.is_z_up ? FileUp{stated, stated} : guess_both(own_path(skeleton, *head), rows);
   clip.up = up.in_motion.name();

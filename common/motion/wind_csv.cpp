@@ -218,7 +218,9 @@ std::vector<std::string> repairs_of(const Readings& readings, const Dialect& dia
   if (dialect.separator != ',')
     repairs.push_back(
         fmt::format("values are separated by {}", dialect.separator == ';' ? "semicolons" : "tabs"));
-  say(readings.decimal_commas, "numbers with a decimal comma");
+  if (readings.decimal_commas > 0)
+    repairs.push_back(
+        counted(readings.decimal_commas, "number has a decimal comma", "numbers have a decimal comma"));
   if (readings.bad.count() > 0)
     repairs.push_back(readings.bad.sentence(
         readings.row_count, "rows",

@@ -7,6 +7,8 @@
 #include <system_error>
 
 #include "common/base/file.h"
+#include "common/base/profile.h"
+#include "common/base/units.h"
 #include "common/gl/egl_context.h"
 #include "common/groom/groom_asset.h"
 #include "common/groom/head_measure.h"
@@ -123,6 +125,26 @@ std::vector<SphereCollider> balls_along(const std::vector<BodyCapsule>& capsules
 
 namespace {
 
+/// Says what is done of a check, after how long, and how long the rest takes where that is known.
+class CheckProgress {
+ public:
+  explicit CheckProgress(const std::function<void(const std::string&)>& tell) : tell_(tell) {}
+  void say(const std::string& sentence) const {
+    if (tell_) tell_(fmt::format("after {:.1f} s: {}", passed_s(begin_ns_), sentence));
+  }
+  /// `from_ns`: when the first of `count` parts began, which take equally long.
+  void say_part(size_t done, size_t count, int64_t from_ns, const char* what) const {
+    const double left_s = passed_s(from_ns) * static_cast<double>(count - done) / static_cast<double>(done);
+    say(fmt::format("{} of {} {}{}", done, count, what,
+                    done == count ? "" : fmt::format(", about {:.0f} s are left for the others", left_s)));
+  }
+
+ private:
+  static double passed_s(int64_t from_ns) { return static_cast<double>(now_ns() - from_ns) / kNsPerS; }
+  const std::function<void(const std::string&)>& tell_;
+  int64_t begin_ns_ = now_ns();
+};
+
 /// Makes the solver and takes steps with it, as a server would. Returns a sentence, and what the solver says
 /// of the hair.
 Result<std::string> step_groom(SceneDesc scene, const SceneContent& content, const MeasureConfig& config) {
@@ -140,7 +162,8 @@ Result<std::string> step_groom(SceneDesc scene, const SceneContent& content, con
 
 /// Draws hair alone, hair on its head, hair on what collides, and saves the picture. Returns a sentence.
 Result<std::string> draw_groom(const SceneDesc& scene, const SceneContent& content, const BodyShapes& body,
-                               const std::filesystem::path& picture, const MeasureConfig& config) {
+                               const std::filesystem::path& picture, const MeasureConfig& config,
+                               const CheckProgress& progress) {
   ASSIGN_OR_RETURN(const auto device,
                    RenderDevice::open({config.renderer, config.gl_device, config.shader_folder}));
   const bool is_field = content.head_field != nullptr && content.colliders.empty();
@@ -152,8 +175,11 @@ Result<std::string> draw_groom(const SceneDesc& scene, const SceneContent& conte
               kPictureSide * static_cast<uint32_t>(heads.size()),
               {}};
   sheet.rgba.resize(4 * size_t{sheet.width} * sheet.height);
-  for (uint32_t row = 0; row < heads.size(); ++row)
+  const int64_t begin_ns = now_ns();
+  for (uint32_t row = 0; row < heads.size(); ++row) {
     RETURN_IF_ERROR(draw_row(*device, make_scene_asset(content.groom, heads[row]), scene, box, row, sheet));
+    progress.say_part(row + 1, heads.size(), begin_ns, "rows of pictures are drawn");
+  }
   RETURN_IF_ERROR(save_png(picture, sheet));
   const std::string last = is_field ? "on the head once more, which collides itself"
                                     : fmt::format("on the {} spheres that collide", content.colliders.size());
@@ -165,15 +191,21 @@ Result<std::string> draw_groom(const SceneDesc& scene, const SceneContent& conte
 }  // namespace
 
 Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::path& folder,
-                                const MeasureConfig& config) {
+                                const MeasureConfig& config,
+                                const std::function<void(const std::string&)>& on_progress) {
+  const CheckProgress progress(on_progress);
+  progress.say("the hair is read, and a head fitted");
   ASSIGN_OR_RETURN(const SceneContent content, load_scene_content(scene));
+  progress.say(fmt::format("{} strands x {} vertices are read, and drawn now", content.groom.strand_count(),
+                           content.groom.uniform_vertex_count()));
   std::error_code failure;
   std::filesystem::create_directories(folder, failure);
   if (failure)
     return make_error(ErrorCode::Unavailable, "cannot make the folder {}: {}", folder.string(),
                       failure.message());
   const BodyShapes body = shapes_of(scene.body, {});  // as far as it needs no stream
-  ASSIGN_OR_RETURN(const std::string drawn, draw_groom(scene, content, body, folder / "groom.png", config));
+  ASSIGN_OR_RETURN(const std::string drawn,
+                   draw_groom(scene, content, body, folder / "groom.png", config, progress));
   std::string text;
   for (const std::string& note : content.notes) text += note + "\n";
   if (!content.unlikely.empty()) text += content.unlikely + "\n";
@@ -184,6 +216,7 @@ Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::p
   }
   for (const std::string& sentence : body.missing) text += sentence + ": drawn without\n";
   text += drawn;
+  progress.say(fmt::format("{} steps are taken with {}", kMeasuredSteps, scene.solver.name));
   const Result<std::string> stepped = step_groom(scene, content, config);
   if (stepped) text += *stepped;
   RETURN_IF_ERROR(save_file(folder / "groom.txt", std::as_bytes(std::span(text))));

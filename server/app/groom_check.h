@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -21,8 +22,9 @@ std::vector<SphereCollider> balls_along(const std::vector<BodyCapsule>& capsules
 /// colliders. Creates the folder and writes groom.png and groom.txt to it. Returns the text: guesses with
 /// reasons, how well head, colliders and hair agree, and what the solver says. Needs a GL device. Errors name
 /// the file or folder, and why a server would not start; BadInput also for a unit in which no head has this
-/// hair.
+/// hair. `on_progress` gets a sentence for each stage: large hair takes most of a minute.
 Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::path& folder,
-                                const MeasureConfig& config);
+                                const MeasureConfig& config,
+                                const std::function<void(const std::string&)>& on_progress = {});
 
 }  // namespace strandcast

@@ -6,8 +6,8 @@
 #include "common/base/check.h"
 #include "common/groom/groom.h"
 #include "common/groom/groom_file.h"
-#include "common/groom/groom_parts.h"
 #include "common/groom/resample.h"
+#include "common/groom/tip_first.h"
 #include "common/groom/usable_strands.h"
 
 namespace strandcast {

@@ -45,8 +45,14 @@ size_t drawn_pixels(const Image& sheet, uint32_t column, uint32_t row) {
 
 TEST(GroomCheck, LeavesPicturesFromFourSidesAndTakesSteps) {
   const TemporaryFolder folder;
-  const auto text = check_groom(small_scene(), folder.path() / "new", {});
+  std::vector<std::string> told;
+  const auto text = check_groom(small_scene(), folder.path() / "new", {},
+                                [&](const std::string& sentence) { told.push_back(sentence); });
   ASSERT_TRUE(text) << text.error().to_string();
+  EXPECT_THAT(told, testing::ElementsAre(
+                        HasSubstr("the hair is read"), HasSubstr("vertices are read, and drawn now"),
+                        HasSubstr("1 of 3 rows of pictures are drawn, about "), HasSubstr("2 of 3 rows"),
+                        HasSubstr("3 of 3 rows"), HasSubstr("13 steps are taken")));
   EXPECT_THAT(*text, HasSubstr("groom.png: from the front, from its left side, from behind and from above"));
   EXPECT_THAT(*text, HasSubstr("13 steps are taken with " + small_scene().solver.name + " on "));
   EXPECT_EQ(load_text(folder.path() / "new/groom.txt", 1 << 20).value(), *text);

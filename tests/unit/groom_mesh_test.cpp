@@ -96,9 +96,7 @@ TEST(Obj, NormalsThatAreNotThereAreComputed) {
   EXPECT_EQ(mesh->normal.front(), load(kSquare + "f 1 2 3\n")->normal.front());
 }
 
-TEST(Obj, DecimalCommasAreRead) {
-  EXPECT_EQ(load("v 0,125 1,5 -0,25\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")->position_m.front(),
-            glm::vec3(0.125f, 1.5f, -0.25f));
+TEST(Obj, CommasMayPartNumbers) {
   EXPECT_EQ(load("v 1,2,3\nv 1, 0, 0\nv 0 1 0\nf 1 2 3\n")->position_m.front(), glm::vec3(1, 2, 3));
 }
 

@@ -15,6 +15,8 @@
 #include "common/groom/groom_file.h"
 #include "common/groom/head_fit.h"
 #include "common/groom/mesh_fit.h"
+#include "common/groom/procedural.h"
+#include "common/groom/tip_first.h"
 #include "tests/support/groom_files.h"
 #include "tests/support/temporary_folder.h"
 
@@ -32,11 +34,11 @@ using Strand = std::vector<glm::vec3>;
 /// Strands of six points that leave a ball where `grows` says so and fall from there, by their own lengths;
 /// `middle_m` is the ball's.
 std::vector<Strand> hair(const std::function<bool(const glm::vec3& out)>& grows, float length_m = 0.25f,
-                         const glm::vec3& middle_m = {}) {
-  constexpr int kRoots = 700;
+                         const glm::vec3& middle_m = {}, int root_count = 700) {
   std::vector<Strand> strands;
-  for (int i = 0; i < kRoots; ++i) {
-    const double y = 1.0 - (2.0 * i + 1.0) / kRoots, around = 2.399963 * i, across = std::sqrt(1.0 - y * y);
+  for (int i = 0; i < root_count; ++i) {
+    const double y = 1.0 - (2.0 * i + 1.0) / root_count, around = 2.399963 * i,
+                 across = std::sqrt(1.0 - y * y);
     const glm::vec3 out(glm::dvec3(across * std::sin(around), y, across * std::cos(around)));
     if (!grows(out)) continue;
     Strand& strand = strands.emplace_back();
@@ -94,12 +96,61 @@ TEST(FurAndBeards, ABeardIsNoHairOfAHeadAndKeepsTheUnitThatIsStated) {
     EXPECT_FALSE(found.is_of_head);
     EXPECT_EQ(found.unlikely, "");
     EXPECT_EQ(found.placement.yaw_deg, 0.0f) << "the face is where it grows";
+    EXPECT_THAT(found.notes, Contains(HasSubstr("it is taken as a beard")));
   }
   EXPECT_EQ(placed({write(folder, "cm.ply", beard, 0.01f)}).placement.unit_m, 0.01f) << "a face of a person";
   EXPECT_TRUE(placed({write(folder, "hair.ply", hair(is_of_scalp), 1.0f)}).is_of_head);
   const auto wreath =
       hair([](const glm::vec3& out) { return out.z < 0.3f && out.y < 0.25f && out.y > -0.5f; });
   EXPECT_TRUE(placed({write(folder, "wreath.ply", wreath, 1.0f)}).is_of_head) << "about a bald top";
+}
+
+bool is_under_hairline(const glm::vec3& out) {
+  return out.y > (out.z > 0.4f ? 0.55f : 0.55f - 1.1f * std::min(1.0f, (0.4f - out.z) / 0.8f));
+}
+bool is_of_brows(const glm::vec3& out) {
+  return std::abs(out.y - 0.27f) < 0.05f && std::abs(std::abs(out.x) - 0.35f) < 0.2f && out.z > 0.0f;
+}
+
+TEST(FurAndBeards, AHeadIsTheSameWithABeardAndBrows) {
+  const TemporaryFolder folder;
+  const auto is_of_cheeks = [](const glm::vec3& out) {
+    return out.y > -0.85f && out.y < -0.15f - 0.1f * out.z && out.z > 0.1f;
+  };
+  const glm::vec3 middle_m(0.0f, 1.6f, 0.0f);
+  const auto whole = write(folder, "hair.ply", hair(is_under_hairline, 0.25f, middle_m), 1.0f);
+  const auto beard = write(folder, "beard.ply", hair(is_of_cheeks, 0.06f, middle_m), 1.0f);
+  const auto brows = write(folder, "brows.ply", hair(is_of_brows, 0.01f, middle_m, 9000), 1.0f);
+  const auto crown = write(folder, "crown.ply",
+                           hair([](const glm::vec3& out) { return out.y > 0.75f; }, 0.05f, middle_m), 1.0f);
+  for (const std::vector<std::filesystem::path>& paths :
+       {std::vector{whole, beard}, std::vector{beard, brows, whole}, std::vector{crown, beard, brows}}) {
+    const PlacedGroom found = placed(paths);
+    EXPECT_TRUE(found.is_of_head) << paths.front();
+    EXPECT_EQ(found.placement.yaw_deg, 0.0f) << paths.front();
+    EXPECT_EQ(found.placement.unit_m, 1.0f);
+    const FittedSphere head = fit_head(found.groom);
+    EXPECT_LT(glm::distance(head.center_m, middle_m), 1e-3f);
+    EXPECT_NEAR(head.radius_m, kHeadM, 1e-3f);
+  }
+}
+
+// Few places on one side of a head do not say that this side is up, or that the face is at the other one.
+TEST(FurAndBeards, BrowsAndAMoustacheStayWhereTheyAre) {
+  const TemporaryFolder folder;
+  const auto moustache = [](const glm::vec3& out) { return out.y < -0.2f && out.y > -0.4f && out.z > 0.85f; };
+  const auto both = [&](const glm::vec3& out) { return is_of_brows(out) || is_of_jaw(out); };
+  for (const auto& [what, strands] : {std::pair("brows", hair(is_of_brows, 0.01f, {}, 9000)),
+                                      {"a moustache", hair(moustache, 0.02f, {}, 9000)},
+                                      {"brows and a beard", hair(both, 0.03f, {}, 9000)}}) {
+    for (const float unit_m : {1.0f, 0.01f}) {
+      const PlacedGroom found = placed({write(folder, "piece.ply", strands, unit_m)});
+      EXPECT_EQ(found.placement.yaw_deg, 0.0f) << what;
+      EXPECT_FALSE(found.placement.is_z_up || found.placement.is_upside_down) << what;
+      EXPECT_EQ(found.placement.unit_m, unit_m) << what;
+      EXPECT_THAT(found.notes, Contains(HasSubstr("it is taken as brows or a part of hair"))) << what;
+    }
+  }
 }
 
 TEST(FurAndBeards, FurOfABodyNeverGetsAHeadsUnit) {
@@ -227,7 +278,7 @@ TEST(GroomParts, RootsOnNoneOfTheOthersHeadFailTheCheck) {
               AllOf(HasSubstr("the roots of"), HasSubstr("there.ply are not on the head of")));
 }
 
-TEST(GroomParts, StrandsThatRunFromTipToRootAreTurnedRound) {
+TEST(TipFirst, StrandsThatRunFromTipToRootAreTurnedRound) {
   const TemporaryFolder folder;
   std::vector<Strand> strands = hair(is_of_scalp);
   const PlacedGroom right = placed({write(folder, "right.ply", strands, 1.0f)});
@@ -251,7 +302,88 @@ TEST(GroomParts, StrandsThatRunFromTipToRootAreTurnedRound) {
   EXPECT_EQ(turned_bob.groom.rest_position_m, short_hair.groom.rest_position_m);
 }
 
-TEST(GroomParts, NoRealGroomIsTurnedRoundAndHeadsAreFoundWhenTheyAre) {
+/// A groom of these strands in metres, as a file gives it.
+Groom groom_of(const std::vector<Strand>& strands) {
+  const TemporaryFolder folder;
+  return placed({write(folder, "hair.ply", strands, 1.0f)}).groom;
+}
+
+void turn(Groom& groom, uint32_t strand) {
+  std::reverse(groom.rest_position_m.begin() + groom.offset[strand],
+               groom.rest_position_m.begin() + groom.offset[strand + 1]);
+}
+
+TEST(TipFirst, StrandsAgainstTheOthersBesideThemAreTurnedRound) {
+  std::vector<Strand> afro = hair(is_of_scalp);
+  std::vector<Strand> slicked = hair([](const glm::vec3& out) { return is_of_scalp(out) && out.z > -0.4f; });
+  for (Strand& strand : slicked) {
+    // Over the head, along it.
+    glm::vec3 out = glm::normalize(strand[0]);
+    for (glm::vec3& point : strand) {
+      point = kHeadM * out;
+      out = glm::normalize(out + glm::vec3(0.0f, -0.1f, -0.22f));
+    }
+  }
+  for (Strand& strand : afro)
+    for (size_t k = 1; k < strand.size(); ++k) strand[k] = (1.0f + 0.35f * static_cast<float>(k)) * strand[0];
+  struct Case {
+    const char* what;
+    Groom groom;
+    bool is_told;  // which end is the root
+  };
+  std::vector<Case> cases;
+  cases.push_back({"long", groom_of(hair(is_of_scalp)), true});
+  cases.push_back({"slicked", groom_of(slicked), false});
+  cases.push_back({"afro", groom_of(afro), false});
+  for (const Case& item : cases) {
+    const uint32_t all = item.groom.strand_count();
+    struct Mixed {
+      const char* what;
+      std::function<bool(uint32_t)> is_turned;
+      bool are_few;
+    };
+    for (const Mixed& mixed : {Mixed{"one in ten", [](uint32_t i) { return i % 10 == 3; }, true},
+                               Mixed{"every other one", [](uint32_t i) { return i % 2 == 0; }, false},
+                               Mixed{"most", [](uint32_t i) { return i % 4 != 0; }, false},
+                               Mixed{"one half", [&](uint32_t i) { return i > all / 2; }, false}}) {
+      Groom groom = item.groom;
+      uint32_t count = 0;
+      for (uint32_t i = 0; i < all; ++i) {
+        if (!mixed.is_turned(i)) continue;
+        ++count;
+        turn(groom, i);
+      }
+      const std::vector<glm::vec3> before = groom.rest_position_m;
+      StrandLabels labels;
+      const std::string said = turn_tips_first(groom, labels);
+      if (item.is_told || mixed.are_few) {
+        EXPECT_THAT(said, HasSubstr(fmt::format("{} of its {} strands run from tip to root", count, all)))
+            << item.what << " " << mixed.what;
+        EXPECT_TRUE(groom.rest_position_m == item.groom.rest_position_m) << item.what << " " << mixed.what;
+      } else {
+        EXPECT_EQ(said, "") << item.what << " " << mixed.what;
+        EXPECT_TRUE(groom.rest_position_m == before) << item.what << " " << mixed.what;
+      }
+    }
+  }
+}
+
+TEST(TipFirst, HairThatIsGrownIsRight) {
+  for (const float length_m : {0.01f, 0.03f, 0.1f, 0.28f, 0.9f}) {
+    for (const float curl_m : {0.0f, 0.02f}) {
+      ProceduralGroomOptions options;
+      options.length_m = length_m;
+      options.curl_radius_m = curl_m;
+      Groom groom = grow_groom(make_scalp_cap(glm::vec3(0.0f), kHeadM, 2000), options).value();
+      const std::vector<glm::vec3> points = groom.rest_position_m;
+      StrandLabels labels;
+      EXPECT_EQ(turn_tips_first(groom, labels), "") << length_m << " m, curls of " << curl_m;
+      EXPECT_EQ(groom.rest_position_m, points);
+    }
+  }
+}
+
+TEST(TipFirst, NoRealGroomIsTurnedRoundAndHeadsAreFoundWhenTheyAre) {
   REQUIRE_SHARED_DATA();
   for (const char* const name : {"sintel_11400x16.tfx", "Ratboy_mohawk.tfx", "TestHair1.tfx",
                                  "ponytail_front_top.tfx", "ponytail_side.tfx"}) {
@@ -304,7 +436,7 @@ TEST(GroomParts, StrandsOfMorePointsThanAreSimulatedSaySo) {
 }
 
 // As a simple program makes it, with all strands of one length: nothing says which end is which.
-TEST(GroomParts, HairThatFallsStraightDownIsLeftAsItIs) {
+TEST(TipFirst, HairThatFallsStraightDownIsLeftAsItIs) {
   const TemporaryFolder folder;
   std::vector<Strand> strands = hair([](const glm::vec3& out) { return out.y > 0.1f; });
   for (Strand& strand : strands)

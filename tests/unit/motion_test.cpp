@@ -16,7 +16,9 @@
 namespace strandcast::motion_test {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 using testing::StartsWith;
 
 TEST(MotionClip, InterpolatesAndClamps) {
@@ -334,10 +336,10 @@ TEST(WindCsv, ReadsSemicolonsAndDecimalCommas) {
   EXPECT_EQ(series.velocity_mps[0], glm::vec3(1.5f, 0.25f, 2.0f));
   EXPECT_EQ(series.velocity_mps[1], glm::vec3(1.0f, 0.5f, 2.5f));
   EXPECT_THAT(series.repairs,
-              ElementsAre("values are separated by semicolons", "6 numbers with a decimal comma"));
+              ElementsAre("values are separated by semicolons", "6 numbers have a decimal comma"));
   const WindSeries quoted = repaired("t_s,u,v,w\n\"0,0\",\"1,5\",\"-2\",0\n\"0,5\",1,2,3\n");
   EXPECT_EQ(quoted.velocity_mps[0], glm::vec3(1.5f, 0.0f, 2.0f));
-  EXPECT_THAT(quoted.repairs, ElementsAre("3 numbers with a decimal comma"));
+  EXPECT_THAT(quoted.repairs, ElementsAre("3 numbers have a decimal comma"));
   EXPECT_THAT(repaired("t_s\tu\tv\tw\n0\t1\t2\t3\n").repairs, ElementsAre("values are separated by tabs"));
 }
 
@@ -480,6 +482,38 @@ TEST(UpAxis, IsNotWhereSomebodyCrawlsTo) {
   EXPECT_THAT(crawl_over(0.1).up_reason, StartsWith("+Z is taken as up")) << "who stays there stands";
 }
 
+// As a character that is exported beside its own reference pose.
+TEST(Performers, TheHeadOfATreeThatMovesIsTaken) {
+  const auto tree = [](const char* root) {
+    return fmt::format(
+        "ROOT {}\n{{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\nJOINT Head\n{{\nOFFSET 0 80 0\n"
+        "CHANNELS 3 Zrotation Xrotation Yrotation\nEnd Site\n{{\nOFFSET 0 9 0\n}}\n}}\n}}\n",
+        root);
+  };
+  const auto clip_of = [&](const std::string& rows, const std::string& head_joint) {
+    BvhOptions options;
+    options.unit_m = 0.01;
+    options.recentre = false;
+    options.head_joint = head_joint;
+    return parse_bvh(
+               "HIERARCHY\n" + tree("Bind") + tree("Hips") + "MOTION\nFrames: 2\nFrame Time: .01\n" + rows,
+               "x.bvh", options)
+        .value();
+  };
+  const std::string second_moves = "0 90 0 0 0 0 7 90 0 0 0 0\n0 90 0 0 0 0 7 90 0 0 20 0\n";
+  const MotionClip clip = clip_of(second_moves, "");
+  EXPECT_EQ(clip.world_from_head[0].position_m.x, 0.07);
+  EXPECT_THAT(clip.head_reason, AllOf(HasSubstr("the one with Head#2 is taken, others have Head "),
+                                      HasSubstr("the first joint of such a name does not move")));
+  EXPECT_EQ(clip_of(second_moves, "Head").world_from_head[0].position_m.x, 0.0) << "as asked";
+  EXPECT_EQ(
+      clip_of("0 90 0 0 0 0 7 90 0 0 0 0\n0 90 0 0 9 0 7 90 0 0 20 0\n", "").world_from_head[0].position_m.x,
+      0.0)
+      << "both move";
+  EXPECT_THAT(clip_of("0 90 0 0 0 0 7 90 0 0 0 0\n0 90 0 0 0 0 7 90 0 0 0 0\n", "").head_reason,
+              Not(HasSubstr("does not move")));
+}
+
 // Two that hang from one root are two. A hammer's head in a hand is nobody's.
 TEST(Performers, ThatShareARootAreMeasuredEachAlone) {
   const auto joint = [](const std::string& name, double x, double y, const std::string& below) {
@@ -552,7 +586,7 @@ TEST(CaseFiles, MotionComesInAsItShould) {
   };
   const std::filesystem::path folder = std::filesystem::path(STRANDCAST_SHARED_DATA) / "cases";
   REQUIRE_SHARED(folder);
-  for (const Case& item : {Case{"comma_decimals.bvh", 0.0, 24, ""},
+  for (const Case& item : {Case{"comma_decimals.bvh", 0.0, 24, "numbers have a decimal comma"},
                            {"frame_time_zero.bvh", 0.0, 24, ""},
                            {"frames_more_than_rows.bvh", 0.0, 24, "30 frames are announced, 24 are there"},
                            {"joint_spaces.bvh", 0.0, 24, "the head is Bip01 Head"},
