@@ -25,6 +25,8 @@ class Component {
     NumberTables tables;
     size_t first = 0;                  // place of the first strand, which follows zeros
     std::vector<int32_t> values = {};  // from these zeros on
+    bool is_fine = false;              // tables are chosen by sizes beside, not by the last ones
+    std::vector<uint32_t> sizes = {};  // as values, of what they are beside what is expected
   };
 
   /// Slices in turn share what is kept; neighbours may then be of any of them.
@@ -38,11 +40,20 @@ class Component {
         kept_(kept) {
     if (kept.values.empty()) kept.first = begin_;
     kept.values.resize((begin_ + layout.strands_in[slice] + 1 - kept.first) * vertex_count);
+    if (kept.is_fine) kept.sizes.resize(kept.values.size());
   }
 
   /// One strand; value_at(v) gives what it has there.
   template <class ValueAt>
   void put_strand(size_t place, ValueWriter& writer, ValueAt value_at) {
+    if (kept_.is_fine)
+      return visit(place, [&](uint32_t v, int32_t expected) {
+        const int32_t value = value_at(v);
+        const int32_t apart = wrapping_difference(value, expected);
+        tables_.put_beside(apart, size_beside(place, v), writer);
+        keep_size(place, v, apart);
+        return value;
+      });
     SymbolStep* next = writer.begin_run(vertex_count_);
     visit(place, [&](uint32_t v, int32_t expected) {
       const int32_t value = value_at(v);
@@ -53,6 +64,14 @@ class Component {
   }
   template <class Give>
   void take_strand(size_t place, ValueReader& reader, Give give) {
+    if (kept_.is_fine)
+      return visit(place, [&](uint32_t v, int32_t expected) {
+        const int32_t apart = tables_.take_beside(size_beside(place, v), reader);
+        const int32_t value = wrapping_sum(expected, apart);
+        keep_size(place, v, apart);
+        give(v, value);
+        return value;
+      });
     SymbolCursor cursor = reader.begin_run(vertex_count_);
     visit(place, [&](uint32_t v, int32_t expected) {
       const int32_t value = wrapping_sum(expected, tables_.take(reader, cursor));
@@ -63,18 +82,27 @@ class Component {
   }
 
  private:
-  const int32_t* strand_at(size_t place) const {
-    return kept_.values.data() + (place + 1 - kept_.first) * vertex_count_;
+  size_t row_of(size_t place) const { return (place + 1 - kept_.first) * vertex_count_; }
+  /// Where a neighbour's values begin; without one, those of the strand before.
+  size_t row_beside(size_t i, size_t place) const {
+    const size_t near = beside_[i][place];
+    if (near != layout_.no_neighbour()) return row_of(near);
+    return place == begin_ ? 0 : row_of(place - 1);
+  }
+  uint32_t size_beside(size_t place, uint32_t v) const {
+    const uint32_t* const own = kept_.sizes.data() + row_of(place);
+    uint32_t sum = kept_.sizes[row_beside(0, place) + v] + kept_.sizes[row_beside(1, place) + v];
+    if (v >= 1) sum += 2 * own[v - 1];
+    return v >= 2 ? sum + own[v - 2] : sum;
+  }
+  void keep_size(size_t place, uint32_t v, int32_t apart) {
+    kept_.sizes[row_of(place) + v] = fold_sign(apart);
   }
   template <class Code>
   void visit(size_t place, Code code) {
     std::array<const int32_t*, 2> beside;
-    for (size_t i = 0; i < beside.size(); ++i) {
-      const size_t near = beside_[i][place];
-      const int32_t* const before = place == begin_ ? kept_.values.data() : strand_at(place - 1);
-      beside[i] = near == layout_.no_neighbour() ? before : strand_at(near);
-    }
-    int32_t* const own = kept_.values.data() + (place + 1 - kept_.first) * vertex_count_;
+    for (size_t i = 0; i < beside.size(); ++i) beside[i] = kept_.values.data() + row_beside(i, place);
+    int32_t* const own = kept_.values.data() + row_of(place);
     for (uint32_t v = 0; v < vertex_count_; ++v) {
       int64_t way = int64_t{beside[0][v]} + beside[1][v];
       if (v > 0) way -= int64_t{beside[0][v - 1]} + beside[1][v - 1];

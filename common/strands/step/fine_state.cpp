@@ -71,7 +71,7 @@ struct EdgeFrame {
 template <class Work>
 void for_slices(const PredictorGround& ground, Rounding rounding, const Work& work) {
   const uint32_t count = ground.layout.slice_count();
-  if (rounding != Rounding::Fine)
+  if (rounding < Rounding::ThirdFine)
     return tangent::for_each_part(tangent::encode_terms(ground.layout, ground.workers), count, work);
   for (uint32_t slice = 0; slice < count; ++slice) work(slice);
 }
@@ -122,6 +122,7 @@ std::array<int32_t, 3> steps_of(const glm::vec3& apart_mps, const FineRule& rule
 /// Visits the velocities of a slice beside what is expected from the vertices before and the neighbours:
 /// across an edge how they go on there, along it how fast theirs grow, which is next to nothing.
 /// steps(first, apart_mps) gives three whole numbers; `changes`: those of slices before, to be gone on with.
+/// Not of Rounding::Fine.
 template <class Steps>
 void Predictor::visit_velocities(uint32_t slice, std::vector<glm::vec4>& changes, Steps steps) {
   const tangent::Layout& layout = ground_.layout;
@@ -178,19 +179,33 @@ void Predictor::forget_history() {
       std::fill_n(velocity.row(block, v, 3), kBlockStrands, 0.0f);
 }
 
-void Predictor::settle_finely(const tangent::Planes<int32_t>& decoded, float quantum_m, Rounding rounding) {
+GuessedVelocities Predictor::guessed_velocities() const {
+  return GuessedVelocities({ground_.layout, beside(), *moving(PlaneRole::Position),
+                            glm::mat3(state_.head.turn_per_s), model_.vertex_count, model_.pinned_root_count,
+                            ground_.set});
+}
+
+void Predictor::settle_finely(const tangent::Planes<int32_t>& decoded, float quantum_m, Rounding rounding,
+                              const VelocityGuess* told) {
   rounding_ = rounding;
   forget_history();
   put_positions(decoded, quantum_m);
   velocity_steps_.resize(3 * size_t{places_} * model_.vertex_count);
-  std::vector<glm::vec4> changes = no_changes(ground_.layout);
-  for_slices(ground_, rounding_, [&](uint32_t slice) {
-    visit_velocities(slice, changes, [&](size_t first, const glm::vec3& apart_mps) {
-      const std::array<int32_t, 3> found = steps_of(apart_mps, rule_of(rounding_));
-      std::copy(found.begin(), found.end(), &velocity_steps_[first]);
-      return found;
+  if (rounding_ == Rounding::Fine) {
+    StrandBlocks& velocity = *moving(PlaneRole::Velocity);
+    GuessedVelocities velocities = guessed_velocities();
+    guess_ = told != nullptr ? *told : velocities.fit(velocity);
+    velocities.settle(guess_, velocity, velocity_steps_);
+  } else {
+    std::vector<glm::vec4> changes = no_changes(ground_.layout);
+    for_slices(ground_, rounding_, [&](uint32_t slice) {
+      visit_velocities(slice, changes, [&](size_t first, const glm::vec3& apart_mps) {
+        const std::array<int32_t, 3> found = steps_of(apart_mps, rule_of(rounding_));
+        std::copy(found.begin(), found.end(), &velocity_steps_[first]);
+        return found;
+      });
     });
-  });
+  }
   settle_planes();
   if (moving(PlaneRole::RodAxis) == nullptr) return;
   twist(
@@ -232,9 +247,44 @@ Predictor::TwistTurn Predictor::turn_of_fine_steps(int32_t steps) {
 
 /// Visits the steps of a slice's velocities in the order of the stream; code(i, part, beside) has a step's
 /// index, which of the three parts it is, and the sum of sizes beside it: of the two vertices before, of the
-/// neighbours there, and of the part before across the same edge.
+/// neighbours there, and of the other part across, there or at the vertex before.
 template <class Code>
 void Predictor::visit_steps_beside(uint32_t slice, Code code) const {
+  if (rounding_ != Rounding::Fine) return visit_earlier_steps_beside(slice, code);
+  constexpr std::array<size_t, 3> kOrder = {2, 0, 1};  // how far along an edge says how far across
+  const tangent::Layout& layout = ground_.layout;
+  const uint32_t vertex_count = model_.vertex_count;
+  const uint32_t first = guess_.are_roots_carried ? model_.pinned_root_count : 0;
+  const size_t begin = layout.slice_begin[slice];
+  for (size_t place = begin; place < begin + layout.strands_in[slice]; ++place) {
+    std::array<size_t, 2> near;
+    for (size_t i = 0; i < near.size(); ++i) {
+      near[i] = beside()[i][place];
+      if (near[i] == layout.no_neighbour()) near[i] = place > begin ? place - 1 : places_;
+    }
+    const auto size_at = [&](size_t other, uint32_t v, size_t part) {
+      return other < places_ ? fold_sign(velocity_steps_[3 * (other * vertex_count + v) + part]) : 0u;
+    };
+    for (uint32_t v = first; v < vertex_count; ++v)
+      for (const size_t part : kOrder) {
+        uint32_t sum = size_at(near[0], v, part) + size_at(near[1], v, part);
+        if (v >= 1) sum += 2 * size_at(place, v - 1, part);
+        if (v >= 2) sum += size_at(place, v - 2, part);
+        if (part == 0) {
+          sum += (size_at(near[0], v, 1) + size_at(near[1], v, 1)) / 2;
+          if (v >= 1) sum += size_at(place, v - 1, 1);
+        } else if (part == 1) {
+          sum += 2 * size_at(place, v, 0);
+          if (v >= 1) sum += size_at(place, v - 1, 0) / 2;
+        }
+        code(3 * (place * vertex_count + v) + part, part, sum);
+      }
+  }
+}
+
+/// As visit_steps_beside(), of numbers before.
+template <class Code>
+void Predictor::visit_earlier_steps_beside(uint32_t slice, Code code) const {
   const tangent::Layout& layout = ground_.layout;
   const size_t row = 3 * size_t{model_.vertex_count};
   const size_t begin = layout.slice_begin[slice];
@@ -259,6 +309,7 @@ void Predictor::visit_steps_beside(uint32_t slice, Code code) const {
 /// threads.
 void Predictor::write_fine(ValueWriter& writer) const {
   FineTables tables;
+  for (auto& kept : tables.component) kept.is_fine = rounding_ == Rounding::Fine;
   for (uint32_t slice = 0; slice < ground_.layout.slice_count(); ++slice) {
     visit_steps_beside(slice, [&](size_t i, size_t part, uint32_t beside) {
       tables.velocity[part].put_beside(velocity_steps_[i], beside, writer);
@@ -270,6 +321,7 @@ void Predictor::write_fine(ValueWriter& writer) const {
 void Predictor::read_fine(ValueReader& reader) {
   constexpr auto kMost = static_cast<int32_t>(kMostSteps);
   FineTables tables;
+  for (auto& kept : tables.component) kept.is_fine = rounding_ == Rounding::Fine;
   for (uint32_t slice = 0; slice < ground_.layout.slice_count(); ++slice) {
     if (rounding_ == Rounding::FirstFine) {
       const auto [begin, end] = vertices_of(ground_.layout, slice);
@@ -286,6 +338,8 @@ void Predictor::read_fine(ValueReader& reader) {
 
 void Predictor::place_velocities() {
   forget_history();
+  if (rounding_ == Rounding::Fine)
+    return guessed_velocities().place(guess_, velocity_steps_, *moving(PlaneRole::Velocity));
   std::vector<glm::vec4> changes = no_changes(ground_.layout);
   for_slices(ground_, rounding_, [&](uint32_t slice) {
     visit_velocities(slice, changes, [&](size_t first, const glm::vec3&) {

@@ -19,6 +19,7 @@
 #include "common/strands/step/component.h"
 #include "common/strands/step/step_reader.h"
 #include "common/strands/step/tip_mask.h"
+#include "common/strands/step/velocity_guess.h"
 #include "common/strands/step/wire.h"
 #include "common/strands/tangent/motion.h"
 #include "common/strands/value_coder.h"
@@ -89,8 +90,10 @@ class Predictor {
   /// Positions are set to the decoded ones.
   void settle(const tangent::Planes<int32_t>& decoded, float quantum_m);
   /// The same so finely that nobody sees it. What strands remember of the last substep is forgotten: the next
-  /// step finds it again.
-  void settle_finely(const tangent::Planes<int32_t>& decoded, float quantum_m, Rounding rounding);
+  /// step finds it again. `told`: null where the encoder has yet to tell it; it is guess() afterwards.
+  void settle_finely(const tangent::Planes<int32_t>& decoded, float quantum_m, Rounding rounding,
+                     const VelocityGuess* told);
+  const VelocityGuess& guess() const { return guess_; }
   /// Appends the state for joiners; call settle() or settle_finely() first.
   void write_state(std::vector<std::byte>& bytes) const;
   /// Reads what write_state() wrote, under this pose of the head. BadInput for malformed bytes. Call place()
@@ -161,6 +164,9 @@ class Predictor {
   void visit_velocities(uint32_t slice, std::vector<glm::vec4>& changes, Steps steps);
   template <class Code>
   void visit_steps_beside(uint32_t slice, Code code) const;
+  template <class Code>
+  void visit_earlier_steps_beside(uint32_t slice, Code code) const;
+  GuessedVelocities guessed_velocities() const;
   void place_velocities();
   void forget_history();
   void find_history(const StepInput& first);
@@ -194,6 +200,7 @@ class Predictor {
   State saved_;
   // By settle() or settle_finely(), for write_state().
   Rounding rounding_ = Rounding::Coarse;
+  VelocityGuess guess_;                  // of Rounding::Fine
   std::vector<int32_t> velocity_steps_;  // (places x vertex_count x 3), of settle_finely()
   std::vector<int32_t> twist_steps_;     // (places x vertex_count)
   float history_s_ = 0.0f;               // last substep of strands that remember it

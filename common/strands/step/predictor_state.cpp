@@ -167,6 +167,7 @@ void Predictor::write_state(std::vector<std::byte>& bytes) const {
     for (int row = 0; row < 3; ++row) to.put(state_.head.turn_per_s[column][row]);
   to.put(state_.head.step_index);
   to.put(history_s_);
+  if (rounding_ == Rounding::Fine) guess_.write(bytes);
   if (is_fine()) {
     ValueWriter writer;
     write_fine(writer);
@@ -258,6 +259,9 @@ Status Predictor::read_state(ByteReader& bytes, const Pose& pose, Rounding round
   are_usable &= history_s_ >= 0.0f && history_s_ <= static_cast<float>(kMostHistoryS);
   if (!bytes.ok() || !are_usable)
     return make_error(ErrorCode::BadInput, "the state that steps go on from is cut off or no numbers");
+  if (rounding_ == Rounding::Fine) {
+    ASSIGN_OR_RETURN(guess_, VelocityGuess::read(bytes));
+  }
   twist_steps_.assign(size_t{block_count()} * kBlockStrands * model_.vertex_count, 0);
   std::vector<ValueReader> readers(is_fine() ? 1 : ground_.layout.slice_count());
   for (ValueReader& reader : readers) {

@@ -27,13 +27,13 @@ inline constexpr uint8_t kTellingFlags = kStepFlag | kSceneFlag | kModelFlag | k
 inline constexpr uint8_t kFineFlag = 64;
 inline constexpr uint8_t kFlags = kTellingFlags | kSparseFlag | kFineFlag;
 
-/// How what joiners receive is rounded: finely so that nobody sees it. FirstFine is that of number 13,
-/// SecondFine that of 14, where neighbours were those of the slice; both are only read.
-enum class Rounding { Coarse, FirstFine, SecondFine, Fine };
+/// Rounding of what joiners receive: finely so that nobody sees it. Those of numbers 13, 14 (neighbours of the
+/// slice) and 15 (velocities beside those of neighbours that are not turned) are only read.
+enum class Rounding { Coarse, FirstFine, SecondFine, ThirdFine, Fine };
 
 /// What strands are expected beside.
 inline tangent::Neighbours tangent::Layout::*beside_of(Rounding rounding) {
-  return rounding == Rounding::Fine ? &tangent::Layout::alike : &tangent::Layout::neighbour;
+  return rounding >= Rounding::ThirdFine ? &tangent::Layout::alike : &tangent::Layout::neighbour;
 }
 
 /// Tick and pose of a frame that is predicted.

@@ -118,7 +118,8 @@ void Steps::settle(const tangent::History& history) {
   base_ = rounding_ != Rounding::Coarse ? base_of(last_, base_.chest) : TickBase{};
   if (!predictor_) return;
   if (rounding_ != Rounding::Coarse)
-    predictor_->settle_finely(history.lattice, history.quantum_m, rounding_);
+    predictor_->settle_finely(history.lattice, history.quantum_m, rounding_,
+                              told_guess_ ? &*told_guess_ : nullptr);
   else
     predictor_->settle(history.lattice, history.quantum_m);
 }
@@ -349,6 +350,7 @@ std::shared_ptr<SharedUpdate> EncoderSteps::take_shared(SharedStates which, cons
 void EncoderSteps::settle(const tangent::History& history) {
   own_state();
   Steps::settle(history);
+  if (predictor_ && rounding_ == Rounding::Fine) predictor_->guess().write(bytes_);
   is_disturbed_ = is_settled_ = true;
 }
 
@@ -397,6 +399,10 @@ Status DecoderSteps::begin(const Beginning& beginning, const Moment& now, const 
       return make_error(ErrorCode::LimitExceeded, "steps of {} rounds of vertices in a frame, at most {}",
                         work, kMostVertexRounds);
   }
+  std::optional<VelocityGuess> guess;
+  if ((flags & kFineFlag) != 0 && beginning.fine == Rounding::Fine) {
+    ASSIGN_OR_RETURN(guess, VelocityGuess::read(body));
+  }
   const uint16_t check = check_of(flags & kTellingFlags, all.first(all.size() - body.rest().size()));
   if ((flags & kTellingFlags) != 0 && check != announced)
     return make_error(ErrorCode::BadInput,
@@ -413,6 +419,7 @@ Status DecoderSteps::begin(const Beginning& beginning, const Moment& now, const 
   is_stepping_ = is_step;
   is_following_ = is_following;
   rounding_ = (flags & kFineFlag) != 0 ? beginning.fine : Rounding::Coarse;
+  told_guess_ = std::move(guess);
   if (!is_step && !is_following) return {};
   step(ticks, now, layout, history);
   if (is_step) std::swap(history.lattice, expected_);

@@ -49,9 +49,10 @@ class Steps {
   Moment last_;
   tangent::Planes<int32_t> expected_;
   bool is_stepping_ = false;
-  bool is_following_ = false;             // steps were taken, and predict nothing
-  Rounding rounding_ = Rounding::Coarse;  // of the anchor at work
-  uint32_t age_ = 0;                      // frames since strands started without velocities
+  bool is_following_ = false;                // steps were taken, and predict nothing
+  Rounding rounding_ = Rounding::Coarse;     // of the anchor at work
+  std::optional<VelocityGuess> told_guess_;  // of the same; the encoder's is found
+  uint32_t age_ = 0;                         // frames since strands started without velocities
 };
 
 class EncoderSteps : public Steps {

@@ -16,6 +16,7 @@
 #include "common/strands/step/steps.h"
 #include "common/strands/strand_payload.h"
 #include "common/strands/tangent/chain.h"
+#include "common/strands/tangent/fine_symbols.h"
 #include "common/strands/tangent/order.h"
 #include "common/strands/wrapping.h"
 #include "common/strands/zstd_block.h"
@@ -24,10 +25,10 @@ namespace strandcast::tangent {
 namespace {
 
 constexpr uint8_t kTangentNumber = 5;
-constexpr uint8_t kStepNumber = 15;
-/// The same, whose fine anchors have only neighbours of the same slice.
+constexpr uint8_t kStepNumber = 16;
+/// The same, whose fine anchors are told otherwise (Rounding).
+constexpr uint8_t kThirdFineNumber = 15;
 constexpr uint8_t kSecondFineNumber = 14;
-/// And with other steps of what they round.
 constexpr uint8_t kFirstFineNumber = 13;
 /// Of the release 0.2.0: the same without fine anchors and graded fields.
 constexpr uint8_t kFirstStepNumber = 12;
@@ -49,7 +50,8 @@ constexpr uint8_t codec_number(Prediction prediction) {
 
 constexpr step::Rounding fine_of(uint8_t number) {
   if (number == kFirstFineNumber) return step::Rounding::FirstFine;
-  return number == kSecondFineNumber ? step::Rounding::SecondFine : step::Rounding::Fine;
+  if (number == kSecondFineNumber) return step::Rounding::SecondFine;
+  return number == kThirdFineNumber ? step::Rounding::ThirdFine : step::Rounding::Fine;
 }
 
 /// Has the frame be an anchor that is rounded so.
@@ -267,7 +269,8 @@ class Encoder final : public StrandEncoder {
     const step::Rounding rounding = is_exact ? step::Rounding::Fine : step::Rounding::Coarse;
     be_anchor(frame_, rounding);
     if (steps_) steps_->begin_anchor(rounding);
-    frame_.shape_weights = fit_shape(layout_, layout_.*frame_.beside, snapshot.quantum_m, target_, workers_);
+    frame_.shape_weights =
+        fit_shape(set_, layout_, {layout_.*frame_.beside, is_exact}, snapshot.quantum_m, target_, workers_);
     for (auto& escapes : frame_.shape_codes.escapes) escapes.clear();
     Slices slices(layout_.slice_count());
     Slices shape_slices(layout_.slice_count());
@@ -292,7 +295,12 @@ class Encoder final : public StrandEncoder {
       }
       finish(first, count, shape_slices);
     });
-    if (is_exact) write_shapes_in_turn(shape_slices);
+    if (is_exact) {
+      chain_.forget_tables();
+      shape_slices.resize(1);
+      write_fine(layout_, frame_.shape_codes, writers_[0]);
+      writers_[0].finish(shape_slices[0]);
+    }
     end(snapshot);
     chain_.forget_motion(layout_);
     if (steps_) steps_->settle(chain_.history);
@@ -304,16 +312,6 @@ class Encoder final : public StrandEncoder {
       ++sequence_;
     frames.keyframe = make_keyframe(state, shape_slices);
     return frames;
-  }
-
-  /// Of a fine anchor: each slice with the tables that the one before ended with.
-  void write_shapes_in_turn(Slices& slices) {
-    chain_.forget_tables();
-    Tables tables = chain_.tables;
-    for (uint32_t slice = 0; slice < layout_.slice_count(); ++slice)
-      write_symbols(set_, {layout_, slice, frame_.shape_codes, no_sizes_, next_sizes_, tables,
-                           writers_[slice], frame_.beside});
-    finish(0, layout_.slice_count(), slices);
   }
 
   void finish(uint32_t first, uint32_t count, Slices& slices) {
@@ -512,7 +510,10 @@ class Decoder final : public StrandDecoder {
     RETURN_IF_ERROR(read_tables(packed, chain));
     const auto place = [&](uint32_t slice) { place_shape(set_, {layout_, chain.history, slice, frame_}); };
     Tables tables = chain.tables;
-    if (rounding != step::Rounding::Coarse) {
+    if (rounding == step::Rounding::Fine) {
+      RETURN_IF_ERROR(read_fine_shape(body.rest(), frame_.shape_codes));
+      for (uint32_t slice = 0; slice < layout_.slice_count(); ++slice) place(slice);
+    } else if (rounding != step::Rounding::Coarse) {
       RETURN_IF_ERROR(read_slices_in_turn(body.rest(), tables, frame_.shape_codes));
       for (uint32_t slice = 0; slice < layout_.slice_count(); ++slice) place(slice);
     } else {
@@ -674,7 +675,20 @@ class Decoder final : public StrandDecoder {
     return {};
   }
 
-  /// Reads `codes` of a fine anchor's slices, each with the tables that the one before ended with.
+  Status read_fine_shape(std::span<const std::byte> source, Codes& codes) {
+    ValueReader reader;
+    ASSIGN_OR_RETURN(const auto rest, reader.open(source));
+    if (!rest.empty())
+      return make_error(ErrorCode::BadInput, "{} bytes follow the last slice of a strand payload",
+                        rest.size());
+    read_fine(layout_, reader, codes);
+    if (!reader.is_spent())
+      return make_error(ErrorCode::BadInput, "a fine anchor does not end where its symbols end");
+    return {};
+  }
+
+  /// Reads `codes` of a fine anchor's slices as of numbers before today's, each with the tables that the one
+  /// before ended with.
   Status read_slices_in_turn(std::span<const std::byte> source, Tables& tables, Codes& codes) {
     std::vector<ValueReader> readers(layout_.slice_count());
     ASSIGN_OR_RETURN(const auto rest, open_slices(source, readers));

@@ -158,8 +158,12 @@ uint32_t motion_class_count(const Layout& layout);
 void fit_motion(simd::InstructionSet set, const Layout& layout, const History& history,
                 const Planes<int32_t>& target, WorkerPool& workers, Frame& frame);
 
+struct ShapeFit {
+  const Neighbours& beside;
+  bool is_fine;  // most strands are told well, and others cost what they cost
+};
 /// Fits the weights of the shape prediction to `target`.
-ShapeWeights fit_shape(const Layout& layout, const Neighbours& beside, float quantum_m,
+ShapeWeights fit_shape(simd::InstructionSet set, const Layout& layout, const ShapeFit& how, float quantum_m,
                        const Planes<int32_t>& target, WorkerPool& workers);
 
 /// Inputs of the work on one slice of a frame; `frame` is filled.

@@ -16,7 +16,7 @@ STRANDCAST_LANES void write_symbols_lanes(const SymbolWriting& of) {
   const size_t count = of.layout.strands_in[of.slice];
   const TableSet tables(of.tables);
   auto escape = of.codes.escapes[of.slice].begin();
-  SizeRows sizes(of.layout, of.layout.*of.beside, of.then, of.now);
+  SizeRows sizes(of.layout, of.layout.neighbour, of.then, of.now);
   for (uint32_t v = 0; v < of.layout.vertex_count; ++v) {
     const size_t at = v * static_cast<size_t>(of.layout.stride);
     const uint32_t* const first = of.codes.first.data() + at;

@@ -46,7 +46,6 @@ struct SymbolWriting {
   SymbolSizes& now;
   Tables& tables;
   ValueWriter& writer;
-  Neighbours Layout::*beside = &Layout::neighbour;
 };
 /// Writes a slice's integers and escapes. A kernel for every instruction set.
 void write_symbols(simd::InstructionSet set, const SymbolWriting& of);
