@@ -177,9 +177,10 @@ uint32_t find_moving_head(TextCursor rows, const BvhSkeleton& skeleton, uint32_t
   std::vector<BvhPath> others;
   std::vector<uint32_t> other_heads;
   for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
+    if (!is_head_name(skeleton.joints[i].name)) continue;
     const BvhPath other = path_to(skeleton, i);
     const auto [mine, theirs] = std::mismatch(way.begin(), way.end(), other.begin(), other.end());
-    if (!is_head_name(skeleton.joints[i].name) || mine == way.end() || theirs == other.end()) continue;
+    if (mine == way.end() || theirs == other.end()) continue;
     others.emplace_back(theirs, other.end());
     other_heads.push_back(i);
   }
