@@ -99,8 +99,8 @@ bool ClassChoice::has_standing_delay(const Question& question) const {
   return !delays_ns.empty() && median(std::move(delays_ns)) > kLowDelayNs;
 }
 
-/// The first choice, before any strand frame: by what the asset showed. A link seldom changes, and what was
-/// seen to be too much for it would be tried and taken back whenever that is forgotten.
+/// A link seldom changes, and what was seen to be too much for it would be tried and taken back whenever that
+/// is forgotten.
 size_t ClassChoice::begin(const Question& question, int64_t time_ns) {
   quiet_since_ns_ = time_ns;
   const size_t chosen = affordable_class(question.present, question.costs, question.allowed_bytes_per_s);

@@ -61,13 +61,14 @@ class ClassChoice {
     /// Decoding time of each class on this viewer, relative to the time between two frames; empty = unknown.
     std::span<const double> decode_shares = {};
   };
+  /// Returns the first class to use, by what is known of the link; what that excludes is seldom tried.
+  size_t begin(const Question& question, int64_t time_ns);
   /// Returns the class to use and notes it as the present one.
   size_t choose(const Question& question, int64_t time_ns);
   /// Returns whether a better class is being tried.
   bool is_trying(int64_t time_ns) const;
 
  private:
-  size_t begin(const Question& question, int64_t time_ns);
   size_t choose_lower(const Question& question, int64_t time_ns);
   size_t choose_better(const Question& question, int64_t time_ns);
   bool has_failed_try(int64_t time_ns) const;

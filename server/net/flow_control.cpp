@@ -91,8 +91,8 @@ double FlowControl::allowed_bytes_per_s(const Classes& classes, int64_t time_ns)
 size_t FlowControl::begin_codec(const Classes& classes, int64_t time_ns) {
   decodes_ns_.clear();
   choice_ = {};
-  choice_.start_over(time_ns);
-  return affordable_class(0, classes.costs, allowed_bytes_per_s(classes, time_ns));
+  return choice_.begin({.costs = classes.costs, .allowed_bytes_per_s = allowed_bytes_per_s(classes, time_ns)},
+                       time_ns);
 }
 
 size_t FlowControl::choose_class(const Classes& classes, int64_t time_ns) {

@@ -568,11 +568,11 @@ class Connection {
   }
   private takeAsset(header: FrameHeader, message: Uint8Array, received: number): void {
     const payload = message.subarray(kFrameHeaderBytes);
+    this.net.setAsset(payload); // who draws prepares it meanwhile
     this.now!.setAsset(payload);
     this.next?.setAsset(payload);
     this.assetPayload = payload;
     this.acknowledge(header, received);
-    this.net.setAsset(payload);
     this.net.post({ kind: 'asset' });
   }
 
