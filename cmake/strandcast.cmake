@@ -58,8 +58,8 @@ endif()
 # distinct within a target, and a test's file has a namespace of its own. What stays single: kernels marked `flatten`
 # (common/simd/variants.h), which would take in what else stands in the unit, and files that define macros of others.
 if(CMAKE_UNITY_BUILD)
-  target_compile_options(strandcast_flags INTERFACE -Wno-subobject-linkage)  # the "header" is a file of the unit
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")  # such a unit fills the usual 128 MB again and again: collecting took 7 %
+    target_compile_options(strandcast_flags INTERFACE -Wno-subobject-linkage)  # the "header" is a file of the unit
     target_compile_options(strandcast_flags INTERFACE "SHELL:--param ggc-min-expand=200" "SHELL:--param ggc-min-heapsize=524288")
   endif()
 endif()
@@ -78,44 +78,42 @@ function(strandcast_leave_kernels_single)
   endforeach()
 endfunction()
 
-# strandcast_library(NAME SOURCES a.cpp ... [LIGHT b.cpp ...] LIBS x y ... [PCH z] [LIGHT_PCH w]): a static library with
-# the project's flags. LIGHT: files that read options or wait for sockets, where -O3 costs more to compile than it ever
-# saves. PCH: whose precompiled headers its files begin with (strandcast_usual where nothing is said; `none`);
-# LIGHT_PCH: those of LIGHT, likewise.
+# How targets are optimised that do not say COMPUTES. Most files read options, write messages or wait for sockets: there
+# -O3 costs half as much again to compile, and saves nothing that shows.
+set(strandcast_light_options)
+if(CMAKE_BUILD_TYPE STREQUAL "Release" AND NOT STRANDCAST_SANITIZE AND NOT EMSCRIPTEN)
+  set(strandcast_light_options -O1)
+endif()
+
+# strandcast_library(NAME SOURCES a.cpp ... LIBS x y ... [COMPUTES] [PCH z]): a static library with the project's flags.
+# COMPUTES: it walks strands, vertices or pixels, and is optimised as the build type says. PCH: whose precompiled headers
+# its files begin with (strandcast_usual where nothing is said; `none`).
 function(strandcast_library name)
-  cmake_parse_arguments(ARG "" "PCH;LIGHT_PCH" "SOURCES;LIGHT;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "COMPUTES" "PCH" "SOURCES;LIBS" ${ARGN})
   if(NOT ARG_PCH)
     set(ARG_PCH strandcast_usual)
   endif()
   strandcast_leave_kernels_single(${ARG_SOURCES})
-  if(ARG_LIGHT)  # a target of its own: a file with options of its own takes no part in a unity build
-    if(NOT ARG_LIGHT_PCH)
-      set(ARG_LIGHT_PCH ${ARG_PCH})
-    endif()
-    add_library(${name}_light OBJECT ${ARG_LIGHT})
-    target_link_libraries(${name}_light PRIVATE strandcast_flags ${ARG_LIBS})
-    target_compile_options(${name}_light PRIVATE -O1)
-    target_precompile_headers(${name}_light REUSE_FROM ${ARG_LIGHT_PCH})
-    list(APPEND ARG_SOURCES $<TARGET_OBJECTS:${name}_light>)
-  endif()
   add_library(${name} STATIC ${ARG_SOURCES})
   target_link_libraries(${name} PUBLIC strandcast_flags ${ARG_LIBS})
+  if(NOT ARG_COMPUTES)
+    target_compile_options(${name} PRIVATE ${strandcast_light_options})
+  endif()
   if(NOT ARG_PCH STREQUAL "none")
     target_precompile_headers(${name} REUSE_FROM ${ARG_PCH})
   endif()
 endfunction()
 
-# strandcast_program(NAME SOURCES ... LIBS ... [PCH z] [LIGHT]): an executable in build/<preset>/bin. LIGHT: its own files
-# are lightly optimised.
+# strandcast_program(NAME SOURCES ... LIBS ... [COMPUTES] [PCH z]): an executable in build/<preset>/bin, likewise.
 function(strandcast_program name)
-  cmake_parse_arguments(ARG "LIGHT" "PCH" "SOURCES;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "COMPUTES" "PCH" "SOURCES;LIBS" ${ARGN})
   if(NOT ARG_PCH)
     set(ARG_PCH strandcast_usual)
   endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE strandcast_flags ${ARG_LIBS})
-  if(ARG_LIGHT)
-    target_compile_options(${name} PRIVATE -O1)
+  if(NOT ARG_COMPUTES)
+    target_compile_options(${name} PRIVATE ${strandcast_light_options})
   endif()
   target_precompile_headers(${name} REUSE_FROM ${ARG_PCH})
 endfunction()

@@ -23,7 +23,6 @@ namespace strandcast {
 namespace {
 
 constexpr double kMostBundleSeconds = 3'600.0;
-constexpr uint32_t kMostDamagedInARow = 1'000;  // after that nothing more is read
 
 /// Unpacks the parts and starts the page's script. Modules and script become files of this document alone.
 constexpr std::string_view kLoader = R"html(<script>

@@ -10,8 +10,6 @@
 namespace strandcast {
 namespace {
 
-constexpr uint32_t kMostDamagedInARow = 1'000;  // then nothing more is to be had of the file
-
 /// What holds at this time: the last that began no later, or the first.
 template <class Items>
 const auto& at_time(const Items& items, int64_t time_ns) {

@@ -27,6 +27,9 @@ struct RecordedFrame {
   bool is_keyframe() const { return frame->header.opcode == Opcode::StrandKeyframe; }
 };
 
+/// Damaged items, one after the other, after which a recording is read no further.
+inline constexpr uint32_t kMostDamagedInARow = 1'000;
+
 struct RecordedItem {
   int64_t time_ns = 0;  // server clock, about when the recorder got it
   std::variant<RecordedFrame, RecordedMessage> what;
