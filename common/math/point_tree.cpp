@@ -9,6 +9,7 @@ namespace {
 
 constexpr uint32_t kLeafSize = 8;
 constexpr float kBoxRounding = 1.0f - 1e-6f;
+constexpr uint8_t kNoAxis = 3;  // of points that coincide
 
 uint8_t widest_axis(std::span<const glm::vec3> points, std::span<const uint32_t> order) {
   glm::vec3 low = points[order.front()], high = low;
@@ -17,6 +18,7 @@ uint8_t widest_axis(std::span<const glm::vec3> points, std::span<const uint32_t>
     high = glm::max(high, points[index]);
   }
   const glm::vec3 extent = high - low;
+  if (extent == glm::vec3(0.0f)) return kNoAxis;
   if (extent.x >= extent.y && extent.x >= extent.z) return 0;
   return extent.y >= extent.z ? 1 : 2;
 }
@@ -34,15 +36,17 @@ struct PointTree::Search {
   bool wants_box() const {
     return heap.size() < count || kBoxRounding * glm::dot(away_m, away_m) <= heap.front().distance_squared;
   }
-  void offer(const Neighbour& candidate) {
+  /// Whether it is among the best.
+  bool offer(const Neighbour& candidate) {
     if (heap.size() == count) {
-      if (!(candidate < heap.front())) return;
+      if (!(candidate < heap.front())) return false;
       std::pop_heap(heap.begin(), heap.end());
       heap.back() = candidate;
     } else {
       heap.push_back(candidate);
     }
     std::push_heap(heap.begin(), heap.end());
+    return true;
   }
 };
 
@@ -64,12 +68,16 @@ void PointTree::build(uint32_t begin, uint32_t end) {
   if (end - begin <= kLeafSize) return;
   const uint8_t axis = widest_axis(points_, std::span(order_).subspan(begin, end - begin));
   const uint32_t middle = begin + (end - begin) / 2;
+  split_axis_[middle] = axis;
+  if (axis == kNoAxis) {
+    std::sort(order_.begin() + begin, order_.begin() + end);
+    return;
+  }
   std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end,
                    [&](uint32_t a, uint32_t b) {
                      const float at_a = points_[a][axis], at_b = points_[b][axis];
                      return at_a != at_b ? at_a < at_b : a < b;
                    });
-  split_axis_[middle] = axis;
   build(begin, middle);
   build(middle + 1, end);
 }
@@ -77,7 +85,7 @@ void PointTree::build(uint32_t begin, uint32_t end) {
 void PointTree::visit(uint32_t begin, uint32_t end, Search& search) const {
   const auto offer = [&](uint32_t slot) {
     const glm::vec3 offset = points_[order_[slot]] - search.center;
-    search.offer({glm::dot(offset, offset), order_[slot]});
+    return search.offer({glm::dot(offset, offset), order_[slot]});
   };
   if (end - begin <= kLeafSize) {
     for (uint32_t slot = begin; slot < end; ++slot) offer(slot);
@@ -85,6 +93,10 @@ void PointTree::visit(uint32_t begin, uint32_t end, Search& search) const {
   }
   const uint32_t middle = begin + (end - begin) / 2;
   const uint8_t axis = split_axis_[middle];
+  if (axis == kNoAxis) {
+    for (uint32_t slot = begin; slot < end && offer(slot); ++slot) continue;
+    return;
+  }
   const float offset = search.center[axis] - points_[order_[middle]][axis];
   const bool is_low_first = offset < 0.0f;
   visit(is_low_first ? begin : middle + 1, is_low_first ? middle : end, search);

@@ -33,7 +33,7 @@ class PointTree {
 
   std::span<const glm::vec3> points_;
   std::vector<uint32_t> order_;      // the median of each range is its node
-  std::vector<uint8_t> split_axis_;  // by position in order_
+  std::vector<uint8_t> split_axis_;  // by position in order_, of the range with this median
   glm::vec3 low_m_, high_m_;         // of all points
 };
 

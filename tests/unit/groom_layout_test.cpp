@@ -157,6 +157,8 @@ TEST(PointTree, FindsWhatAFullSearchFinds) {
   }
   for (int x = 0; x < 8; ++x)
     for (int y = 0; y < 8; ++y) points.emplace_back(0.1f * x, 0.1f * y, 0.5f);  // many are as far away
+  for (int i = 0; i < 60; ++i)
+    points.insert(points.begin() + 11 * i, {0.4f, 0.5f, 0.05f});  // more than a leaf holds
   const PointTree tree(points);
   std::vector<glm::vec3> centers;
   for (uint32_t i = 0; i < points.size(); i += 7) centers.push_back(points[i]);
