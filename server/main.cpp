@@ -102,7 +102,8 @@ int explain_head(const ServerOptions& options, ServerConfig config) {
   facts.strand_viewers = 1;
   facts.frame_viewers = options.explained_frame_viewers;
   const SceneAsset asset = make_scene_asset(content->groom, content->head);
-  const auto choice = choose_codec(config.scene, asset);
+  const auto choice =
+      choose_codec(config.scene, asset, {config.sim_device, config.gl_device, config.shader_folder});
   if (!choice) return fail(choice.error());
   config.scene.stream.codec = choice->codec;
   auto measured =

@@ -345,6 +345,10 @@ constexpr double kFullRepulsionPerS2 = 18'000.0;
 constexpr double kFullRestDensity = 1.5;
 // Cells as wide as a lock: finer ones cost more, and hair holds together less.
 constexpr uint32_t kFullResolution = 16;
+// Of fast quality, which has no air to brake its hair: a style as stiff as this, and no thrust from follower
+// to leader, keep hair that walks and turns from being thrown over the parting.
+constexpr std::pair<const char*, double> kFastParameters[] = {
+    {"style_stiffness_per_s2", 600.0}, {"style_tip_share", 0.4}, {"thrust_share", 0.0}};
 // Hair that is shaken needs steps no longer than this, whatever the scene's own are.
 constexpr double kFullStepHz = 60.0;
 constexpr double kMostFullSubsteps = 6.0;
@@ -365,6 +369,8 @@ void take_quality(v1::Scene& message) {
   solver.Clear();
   solver.set_name(is_fast ? "dftl" : kRodSolver);
   (*solver.mutable_parameters())["sag_free"] = 1.0;
+  if (is_fast)
+    for (const auto& [name, value] : kFastParameters) (*solver.mutable_parameters())[name] = value;
   message.clear_volume();
   message.clear_air();
   message.mutable_head()->set_collider(is_fast ? kSphereCollider : kFieldCollider);

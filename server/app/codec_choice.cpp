@@ -13,6 +13,7 @@
 #include "common/base/worker_pool.h"
 #include "common/math/pose.h"
 #include "common/strands/strand_codec.h"
+#include "server/sim/solver_registry.h"
 
 namespace strandcast {
 namespace {
@@ -96,7 +97,8 @@ CodecChoice choose_codec(const EncodeCost& cost) {
                                  measured, std::round(0.5 * cost.states_hz))};
 }
 
-Result<CodecChoice> choose_codec(const SceneDesc& scene, const SceneAsset& asset) {
+Result<CodecChoice> choose_codec(const SceneDesc& scene, const SceneAsset& asset,
+                                 const ExecutorConfig& executor) {
   const StreamDesc& stream = scene.stream;
   if (stream.has_codec || stream.codec != kFewestBits)
     return CodecChoice{stream.codec, fmt::format("Codec {}: the scene names it.", stream.codec)};
@@ -104,6 +106,10 @@ Result<CodecChoice> choose_codec(const SceneDesc& scene, const SceneAsset& asset
   if (vertices <= kAlwaysFewestBitsVertices || asset.vertex_count < 2)
     return CodecChoice{
         kFewestBits, fmt::format("Codec step: the fewest bits, and {} vertices are soon encoded.", vertices)};
+  ASSIGN_OR_RETURN(const SolverRow* solver, find_solver(scene.solver.name));
+  if (solver->has_kernel && likely_sim_device(executor) == SimDevice::Lanes)
+    return CodecChoice{
+        kFewestBits, "Codec step: viewers take the simulation's own steps, and nothing is encoded for them."};
   ASSIGN_OR_RETURN(const EncodeCost cost, measure(scene, asset));
   return choose_codec(cost);
 }

@@ -1,5 +1,6 @@
-// Chooses the strand codec of a scene that names none. It is "step", which takes the fewest bits, unless this
-// machine cannot encode the scene's vertices at its rate with time left for the simulation.
+// Chooses the strand codec of a scene that names none. It is "step", which takes the fewest bits, unless a
+// GPU simulates, whose states have to be encoded, and this machine has no time for that beside the
+// simulation.
 #pragma once
 
 #include <cstddef>
@@ -8,6 +9,7 @@
 #include "common/base/result.h"
 #include "common/scene/scene_desc.h"
 #include "common/strands/scene_asset.h"
+#include "server/sim/executor/executor.h"
 
 namespace strandcast {
 
@@ -33,7 +35,9 @@ struct EncodeCost {
 CodecChoice choose_codec(const EncodeCost& cost);
 
 /// Returns a scene's own codec if it names one. Otherwise chooses by size or, above
-/// kAlwaysFewestBitsVertices, by encoding some states, which takes about half a second.
-Result<CodecChoice> choose_codec(const SceneDesc& scene, const SceneAsset& asset);
+/// kAlwaysFewestBitsVertices, by what simulates: viewers share the states of lanes, and those of a GPU are
+/// encoded, some here, which takes about half a second.
+Result<CodecChoice> choose_codec(const SceneDesc& scene, const SceneAsset& asset,
+                                 const ExecutorConfig& executor);
 
 }  // namespace strandcast

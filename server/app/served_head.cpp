@@ -91,7 +91,9 @@ MakePicturePainter ServedHead::make_painter(const PainterConfig& painter, OtherH
 /// The codec of a scene that names none.
 Status ServedHead::choose_stream() {
   StreamDesc& stream = config_.scene.stream;
-  ASSIGN_OR_RETURN(const CodecChoice choice, choose_codec(config_.scene, *source_->asset()));
+  ASSIGN_OR_RETURN(const CodecChoice choice,
+                   choose_codec(config_.scene, *source_->asset(),
+                                {config_.sim_device, config_.gl_device, config_.shader_folder}));
   if (choice.codec != stream.codec)
     log_warn("app", "{}", choice.reason);
   else

@@ -52,7 +52,7 @@ TEST(DeployScenes, EveryFileParsesAndHasAName) {
 
 TEST(DeployScenes, DefaultIsTheBuiltInScene) {
   EXPECT_EQ(loaded("default"), built_in_scene_with({"quality=auto"}).value());
-  EXPECT_EQ(loaded("default", {"quality=fast"}).solver, built_in_scene().solver);
+  EXPECT_EQ(loaded("default", {"quality=fast"}).solver, built_in_scene_with({"quality=fast"})->solver);
 }
 
 TEST(DeployScenes, MinimalNeedsNothing) {

@@ -1,5 +1,5 @@
 // The built-in head of hair in full quality, all of it: it rests as it was groomed, keeps its shape in
-// a light breeze, and comes back after a shake.
+// a light breeze, and comes back after a shake. Fast quality keeps to its head on a walk.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "common/motion/motion_clip.h"
 #include "common/scene/scene_file.h"
 #include "server/report/coherence_study.h"
 #include "server/report/crowded_hair.h"
@@ -101,6 +102,36 @@ TEST_F(HeadOfHair, ComesBackAfterAShake) {
   EXPECT_LE(found.rms_m, 7.0 * kMm);
   EXPECT_LE(found.off_share, 0.015);
   EXPECT_GE(left({"volume.rest_density_scale=1"}).off_share, 0.05) << "at the groom's own density";
+}
+
+// Without air a limp style swings further with each step of a walk, until locks stand up beside the parting.
+TEST_F(HeadOfHair, FastQualityStandsUpNoMoreThanFullOnAWalk) {
+  constexpr int kBegin = 120, kEnd = 480;         // steps
+  constexpr uint32_t kFirstRow = 3, kEndRow = 7;  // vertices over the skull
+  const auto near_off_m = [&](std::vector<std::string> overrides) {
+    const std::vector<std::string> air = still_air();
+    overrides.insert(overrides.end(), air.begin(), air.end());
+    HairRun run = run_of(overrides);
+    const size_t first = kFirstRow * run.layout().strand_count, end = kEndRow * run.layout().strand_count;
+    double sum_m = 0.0;
+    for (int step = 1; step <= kEnd; ++step) {
+      run.step(built_in_motion(step / run.scene().step_rate_hz));
+      if (step <= kBegin) continue;
+      double sum_m2 = 0.0;
+      for (size_t v = first; v < end; ++v) {
+        const glm::dvec3 way_m = glm::dvec3(run.position_in_head_m()[v]) - glm::dvec3(run.layout().rest[v]);
+        sum_m2 += glm::dot(way_m, way_m);
+      }
+      sum_m += std::sqrt(sum_m2 / static_cast<double>(end - first));
+    }
+    return sum_m / (kEnd - kBegin);
+  };
+  const double full_m = near_off_m({});
+  EXPECT_LE(near_off_m({"quality=fast"}), full_m);
+  EXPECT_GE(near_off_m({"quality=fast", "solver.parameters.style_stiffness_per_s2=400",
+                        "solver.parameters.style_tip_share=0.25", "solver.parameters.thrust_share=1"}),
+            1.4 * full_m)
+      << "the model's own style";
 }
 
 }  // namespace

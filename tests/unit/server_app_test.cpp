@@ -644,7 +644,7 @@ TEST(CodecChoice, WhatASceneNamesStays) {
   asset.strand_count = 2;
   asset.vertex_count = 2;
   asset.rest_position_m.resize(4);
-  const auto chosen = [&](const SceneDesc& scene) { return choose_codec(scene, asset).value().codec; };
+  const auto chosen = [&](const SceneDesc& scene) { return choose_codec(scene, asset, {}).value().codec; };
   EXPECT_EQ(chosen(built_in_scene()), "step") << "few vertices are not measured";
   EXPECT_EQ(chosen(parse_scene("", "empty", {}).value()), "step") << "scene files too";
   for (const char* codec : {"delta", "raw", "step", "tangent"}) {
@@ -656,16 +656,22 @@ TEST(CodecChoice, WhatASceneNamesStays) {
   }
 }
 
-// Large enough to be measured; whichever wins, it is one of the two, with its figures.
-TEST(CodecChoice, MeasuresLargeScenes) {
+// Large enough to be measured; whichever wins, it is one of the two, with its figures. Lanes share their
+// states.
+TEST(CodecChoice, MeasuresLargeScenesOfAGpu) {
   SceneDesc scene = built_in_scene();
   std::get<ProceduralGroomDesc>(scene.groom).strand_count = 4'100;
   const auto content = load_scene_content(scene);
   ASSERT_TRUE(content.ok());
-  const auto choice = choose_codec(scene, make_scene_asset(content->groom, {}));
+  const SceneAsset asset = make_scene_asset(content->groom, {});
+  const auto choice = choose_codec(scene, asset, {"gl", "auto", {}});
   ASSERT_TRUE(choice.ok()) << choice.error().to_string();
   EXPECT_THAT(choice->codec, testing::AnyOf("step", "delta"));
   EXPECT_THAT(choice->reason, HasSubstr("ms of processor time a state here"));
+  const auto shared = choose_codec(scene, asset, {"lanes", "auto", {}});
+  ASSERT_TRUE(shared.ok()) << shared.error().to_string();
+  EXPECT_EQ(shared->codec, "step");
+  EXPECT_THAT(shared->reason, HasSubstr("the simulation's own steps"));
 }
 
 TEST(ServerMetrics, SayThatItIsSlow) {

@@ -4,6 +4,7 @@
 
 #include "common/base/profile.h"
 #include "common/base/units.h"
+#include "common/gl/egl_context.h"
 #include "common/gl/timer.h"
 #include "server/sim/executor/gl_executor.h"
 #include "server/sim/executor/lanes_executor.h"
@@ -37,6 +38,12 @@ const char* to_string(SimDevice device) {
 
 bool is_sim_device_name(const std::string& name) {
   return name == "auto" || name == "gl" || name == "lanes";
+}
+
+SimDevice likely_sim_device(const ExecutorConfig& config) {
+  if (config.sim_device == "lanes") return SimDevice::Lanes;
+  const bool names_gl = config.sim_device == "gl" || config.gl_device != "auto";
+  return names_gl || gl::EglContext::make("hardware").ok() ? SimDevice::Gl : SimDevice::Lanes;
 }
 
 Result<std::unique_ptr<Executor>> open_executor(const ExecutorConfig& config) {

@@ -165,6 +165,9 @@ struct ExecutorConfig {
 
 /// Returns whether ExecutorConfig::sim_device accepts this name: "auto", "gl" or "lanes".
 bool is_sim_device_name(const std::string& name);
+/// Returns what open_executor() would simulate on. Where that depends on the hardware, opens an OpenGL
+/// context for a moment.
+SimDevice likely_sim_device(const ExecutorConfig& config);
 /// Opens an executor and makes it current. If "gl" or a named OpenGL device is missing, returns Unavailable;
 /// BadInput for an unknown name.
 Result<std::unique_ptr<Executor>> open_executor(const ExecutorConfig& config);
