@@ -347,7 +347,7 @@ TEST_P(SharedStrands, TakeFewBitsAVertexForWhoJoins) {
   SceneDesc scene = scene_of(GetParam(), kCountedStrands);
   scene.head.collider = "spheres";
   for (const Head& head :
-       {Head{"walking", 0.0, is_full ? 21.9 : 33.65}, {"shaken", 0.96, is_full ? 35.6 : 33.4}}) {
+       {Head{"walking", 0.0, is_full ? 21.9 : 25.6}, {"shaken", 0.96, is_full ? 35.6 : 33.0}}) {
     Stream stream(scene, true);
     stream.corrected(0, 2 * kSettledFrames, head.most_rad);
     stream.send(shaken(2 * kSettledFrames, head.most_rad), true);
