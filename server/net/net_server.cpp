@@ -328,6 +328,12 @@ void NetServer::renew_asset(EncodedFramePtr asset, std::function<void()> then, s
                   });
 }
 
+void NetServer::send_away(std::string reason, size_t head) {
+  net::asio::post(state_->context.io, [state = state_.get(), reason = std::move(reason), head] {
+    state->for_head(head, [&](net::Session& session) { session.close(CloseCode::GoingAway, reason); });
+  });
+}
+
 void NetServer::begin_anew(std::vector<StrandClass> classes, std::vector<StrandByteModel> codecs,
                            std::string reason, std::function<void()> then, size_t head) {
   CHECK(!classes.empty() && !codecs.empty());

@@ -209,6 +209,8 @@ class NetServer {
   /// Changes the rest shape with the same number of vertices. Viewers of strands get this asset and then
   /// strands from a keyframe on; relays are asked to join again. `then` as above.
   void renew_asset(EncodedFramePtr asset, std::function<void()> then, size_t head = 0);
+  /// Ends all sessions with a sentence that asks them to come back.
+  void send_away(std::string reason, size_t head = 0);
   /// Begins another stream: ends all sessions with a sentence that asks them to come back. `then` as above.
   void begin_anew(std::vector<StrandClass> classes, std::vector<StrandByteModel> codecs, std::string reason,
                   std::function<void()> then, size_t head = 0);

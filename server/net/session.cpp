@@ -295,6 +295,7 @@ void Session::check_deadlines(int64_t time_ns) {
     if (in_state_ms >= limits.close_ms) abort();
     return;
   }
+  if (waiting_hello_) return guarded([&] { join(*std::exchange(waiting_hello_, std::nullopt)); });
   if (state_ == State::AwaitHello && in_state_ms >= limits.handshake_ms) {
     const std::string sentence = fmt::format("No Hello within {} ms.", limits.handshake_ms);
     context_.refuse(Refusal::Timeout, peer_, sentence);

@@ -12,6 +12,9 @@
 namespace strandcast::net {
 namespace {
 
+// Less than what a client doubts a silent server after (kDoubtedServer).
+constexpr int64_t kLongestJoinWaitNs = 1'000'000'000;
+
 CloseCode close_code_for(const Error& error) {
   switch (error.code) {
     case ErrorCode::LimitExceeded:
@@ -37,6 +40,8 @@ void Session::on_message(std::span<const std::byte> bytes, int64_t arrival_ns) {
     return context_.count(&NetCounters::unknown_messages);
   if (!message) return reject(CloseCode::BadData, message.error().to_string());
   if (state_ == State::AwaitHello) {
+    if (waiting_hello_)
+      return reject(CloseCode::Policy, fmt::format("{} comes before the Welcome.", message_name(*message)));
     const Hello* hello = std::get_if<Hello>(&*message);
     if (hello == nullptr)
       return reject(CloseCode::Policy,
@@ -85,6 +90,17 @@ void Session::check_stay() {
   close(close_code_for(may_stay.error()), sentence);
 }
 
+/// Whether somebody waits for what may be there in a moment, as a relay's server: to come again would take a
+/// client longer.
+bool Session::wait_with(const Hello& hello, const Error& trouble) {
+  if (waiting_since_ns_ == 0) waiting_since_ns_ = now_ns();
+  const int64_t waited_ns = now_ns() - waiting_since_ns_;
+  if (trouble.code != ErrorCode::Unavailable || context_.is_stopping || waited_ns >= kLongestJoinWaitNs)
+    return false;
+  waiting_hello_ = hello;
+  return true;
+}
+
 void Session::join(const Hello& hello) {
   if (!check_token(hello)) return;
   if (!context_.make_room(peer_.key)) return close_as_full();
@@ -94,6 +110,7 @@ void Session::join(const Hello& hello) {
   subscription_.begin(hello);
   Result<Admission> admission =
       head().handler.on_hello({id_, peer_.key, peer_.address, subscription_}, hello);
+  if (!admission && wait_with(hello, admission.error())) return;
   if (!admission) return close(close_code_for(admission.error()), admission.error().to_string());
   hello_ = hello;
   token_expires_unix_s_ = expiry_of(context_.tokens, hello.token);

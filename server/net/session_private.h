@@ -73,6 +73,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void on_message(std::span<const std::byte> bytes, int64_t arrival_ns);
   bool check_token(const Hello& hello);
   void join(const Hello& hello);
+  bool wait_with(const Hello& hello, const Error& trouble);
   void begin_media(const Hello& hello, const EncodedFramePtr& asset);
   void start_again(int64_t time_ns);
   void ask_for_anchor(int64_t time_ns);
@@ -119,9 +120,11 @@ class Session : public std::enable_shared_from_this<Session> {
   http::request<http::empty_body> request_;
   std::vector<std::byte> early_hello_;  // from the request; empty: it comes as a message
   State state_ = State::Handshake;
-  Hello hello_;                       // its token stays: it may be taken back
-  int64_t token_expires_unix_s_ = 0;  // 0 = never
-  size_t head_ = 0;                   // that it is about
+  std::optional<Hello> waiting_hello_;  // for what is away at the moment
+  int64_t waiting_since_ns_ = 0;        // 0: it has not waited
+  Hello hello_;                         // its token stays: it may be taken back
+  int64_t token_expires_unix_s_ = 0;    // 0 = never
+  size_t head_ = 0;                     // that it is about
   Subscription subscription_;
   std::string codec_;                        // name of that of its strands
   std::optional<ModeChange> untold_change_;  // goes right before the first frame of the next mode

@@ -19,6 +19,7 @@ constexpr auto kLookInterval = std::chrono::milliseconds(100);
 /// A server that knows relays sends the list of its streams right behind its Welcome.
 constexpr int64_t kListNs = 5'000'000'000;
 constexpr int64_t kStatusNs = 500'000'000;
+constexpr const char* kStartedAnew = "The server was started anew.";
 /// Frames that are older say that none come.
 constexpr double kMaxFrameAgeS = 2.0;
 
@@ -225,6 +226,11 @@ Status Upstream::check_way(const Welcome& welcome) const {
   return {};
 }
 
+/// Whether the server there is not the one whose strands were passed on.
+bool Upstream::is_another() const {
+  return relayed_ != nullptr && relayed_->welcome.session_id != next_.welcome.session_id;
+}
+
 Status Upstream::on_welcome(const StreamKey& key, const Welcome& welcome) {
   const std::lock_guard lock(mutex_);
   Stream* stream = find(key);
@@ -236,6 +242,8 @@ Status Upstream::on_welcome(const StreamKey& key, const Welcome& welcome) {
   if (key.stream_id != kFirstStream) return {};
   next_ = {welcome, nullptr, {}};
   welcome_ns_ = stream->asked_ns;
+  // Who comes back at once waits here for what the server sends now.
+  if (is_another()) net_->send_away(kStartedAnew, number_);
   return {};
 }
 
@@ -406,8 +414,7 @@ void Upstream::begin_if_complete() {
   is_connected_ = true;
   trouble_.reset();
   newest_frame_ns_ = now_ns();
-  if (relayed_ == nullptr || relayed_->welcome.session_id != next_.welcome.session_id)
-    return begin_anew("The server was started anew.");
+  if (relayed_ == nullptr || is_another()) return begin_anew(kStartedAnew);
   if (relayed_->asset->message != next_.asset->message) return begin_anew("The hair has another shape now.");
   ++counters_.reconnects;
   log_info("relay", "{} is back", server());

@@ -120,6 +120,7 @@ class Upstream {
   void repeat_away(int64_t time_ns);
   void on_first_event(ClientEvent event);
   void take_list(const StreamList& list);
+  bool is_another() const;
   void begin_if_complete();
   void begin_anew(const char* reason);
   void leave_server();

@@ -56,6 +56,31 @@ TEST_F(ServerLimits, MessageSize) {
   EXPECT_EQ(client->read_end().close_code, code(CloseCode::TooBig));
 }
 
+// What is away now, as a relay's server, may be there in a moment; a client that had to come again would take
+// longer.
+TEST_F(ServerLimits, WhoIsToTryLaterWaitsASecondWithTheConnectionOpen) {
+  start();
+  Hello later = hello();
+  later.name = "later";
+  join(later)->close();
+  EXPECT_EQ(app_.hellos, 4u) << "on one connection";
+
+  RawClient never(server_->port());
+  ASSERT_TRUE(never.handshake());
+  Hello no_place = hello();
+  no_place.name = "no place";
+  const int64_t begin_ns = now_ns();
+  never.send(no_place);
+  EXPECT_EQ(never.read_end().close_code, code(CloseCode::TryLater));
+  EXPECT_GE(now_ns() - begin_ns, 900'000'000);
+
+  RawClient hasty(server_->port());
+  ASSERT_TRUE(hasty.handshake());
+  hasty.send(no_place);
+  hasty.send(no_place);
+  EXPECT_EQ(hasty.read_end().close_code, code(CloseCode::Policy)) << "nothing comes before the Welcome";
+}
+
 TEST_F(ServerLimits, SessionsInAll) {
   NetConfig config;
   config.limits.sessions = 3;

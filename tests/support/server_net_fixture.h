@@ -47,7 +47,9 @@ class FakeApp : public NetHandler {
   Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) override {
     if (hello.name == "throw") throw std::runtime_error("handler failed on purpose");
     if (hello.name == "refuse") return make_error(ErrorCode::BadInput, "Refused on purpose.");
-    if (hello.name == "no place") return make_error(ErrorCode::Unavailable, "No place on purpose.");
+    ++hellos;
+    if (hello.name == "no place" || (hello.name == "later" && hellos < 4))
+      return make_error(ErrorCode::Unavailable, "No place on purpose.");
     const std::lock_guard lock(mutex_);
     joined_.insert(visitor.session);
     Admission admission;
@@ -113,8 +115,8 @@ class FakeApp : public NetHandler {
   size_t asset_bytes = 1'000;
   size_t strand_codec = 0;  // of who joins
   std::optional<Admission::Preview> preview;
-  std::atomic<uint64_t> motion{0}, wind{0}, commands{0}, parameters{0}, cameras{0}, keyframe_requests{0},
-      shut_downs{0};
+  std::atomic<uint64_t> hellos{0}, motion{0}, wind{0}, commands{0}, parameters{0}, cameras{0},
+      keyframe_requests{0}, shut_downs{0};
   std::atomic<bool> left_twice{false}, is_stepping{true};
 
  private:

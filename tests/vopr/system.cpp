@@ -193,7 +193,7 @@ class Viewer {
         world::fail(fmt::format("{} gives up for good: {}", party_.name, error->to_string()));
       const bool is_away = states_ > kPlantAt && !live->is_connected();
       if (is_away && plants_.take(Plant::StaysAway)) break;
-      if (!live->has_session() && !live->trouble().empty() && plants_.take(Plant::FirstIsFinal)) break;
+      if (!live->is_connected() && !live->trouble().empty() && plants_.take(Plant::FirstIsFinal)) break;
       if (states_ > kPlantAt && plants_.take(Plant::TokenInLog))
         spdlog::info("[net] token " + config.hello.token);
     }

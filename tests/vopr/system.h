@@ -19,7 +19,7 @@ enum class Plant {
   TokenInLog,
   Deaf,
   RelayEnds,      // at its first loss
-  FirstIsFinal,   // a viewer goes when its first attempt fails
+  FirstIsFinal,   // a viewer goes when an attempt fails
   FeederEnds,     // at its first loss
   OneQueue,       // the honest controller shares its session's budget with one that floods
   LongCommand,    // the simulation does something for a minute
