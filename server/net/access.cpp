@@ -68,7 +68,7 @@ bool is_origin_allowed(std::string_view origin_header, std::string_view host_hea
 bool RateLimit::take(int64_t time_ns) {
   if (last_ns_ != 0) {
     const double elapsed_s = static_cast<double>(std::max<int64_t>(time_ns - last_ns_, 0)) * 1e-9;
-    tokens_ = std::min(rate_per_s_, tokens_ + elapsed_s * rate_per_s_);
+    tokens_ = std::min(most_, tokens_ + elapsed_s * rate_per_s_);
   }
   last_ns_ = time_ns;
   if (tokens_ < 1.0) return false;

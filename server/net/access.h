@@ -29,15 +29,17 @@ bool is_host_allowed(std::string_view host_header, const std::string& local_addr
 bool is_origin_allowed(std::string_view origin_header, std::string_view host_header,
                        const std::vector<std::string>& allowed_origins);
 
-/// Token bucket that fills at `rate_per_s` and holds as many.
+/// Token bucket that fills at `rate_per_s` and holds those of `depth_s`.
 class RateLimit {
  public:
-  explicit RateLimit(double rate_per_s) : rate_per_s_(rate_per_s), tokens_(rate_per_s) {}
+  explicit RateLimit(double rate_per_s, double depth_s = 1.0)
+      : rate_per_s_(rate_per_s), most_(rate_per_s * depth_s), tokens_(most_) {}
   /// Takes a token; returns false if there is none.
   bool take(int64_t time_ns);
 
  private:
   double rate_per_s_;
+  double most_;
   double tokens_;
   int64_t last_ns_ = 0;
 };

@@ -19,6 +19,8 @@ namespace strandcast {
 inline constexpr uint32_t kMaxSessions = 256;
 static_assert(kMaxSessions <= kMaxListedSessions);
 inline constexpr uint32_t kMaxSessionsPerAddress = 64;
+/// Seconds of which a session's messages may come at once, as those of a feed do when a blocked way opens.
+inline constexpr double kMessagesAtOnceS = 5.0;
 
 using SessionId = uint64_t;  // never reused by one server
 
@@ -35,7 +37,7 @@ struct NetLimits {
   int64_t close_ms = 2'000;            // for Goodbye and the closing handshake
   int64_t link_interval_ms = 250;      // between two looks at a link for the choice of its mode
   int64_t link_memory_ms = 30'000;     // a capacity that was seen says nothing about the link after this long
-  double messages_per_s = 1'000.0;     // per session, and as many at once
+  double messages_per_s = 1'000.0;     // per session; at once those of kMessagesAtOnceS
   // Of one address, where it is not on trusted loopback.
   double connections_per_s = 10.0;  // and as many at once
   double requests_per_s = 50.0;     // HTTP, and as many at once

@@ -31,7 +31,7 @@ Session::Session(Context& context, SessionId id, NetStream stream, Peer peer)
       id_(id),
       socket_(std::move(stream)),
       peer_(std::move(peer)),
-      rate_(context.config.limits.messages_per_s),
+      rate_(context.config.limits.messages_per_s, kMessagesAtOnceS),
       state_since_ns_(peer_.accepted_ns) {}
 
 void Session::start(http::request<http::empty_body> request, bool has_room) {

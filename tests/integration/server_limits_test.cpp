@@ -216,6 +216,7 @@ TEST(NetLimitsByDefault, AreAsPromised) {
   EXPECT_EQ(limits.sessions, 256u);
   EXPECT_EQ(limits.sessions_per_address, 64u);
   EXPECT_EQ(limits.messages_per_s, 1'000.0);
+  EXPECT_EQ(kMessagesAtOnceS, 5.0);
   EXPECT_EQ(limits.connections_per_s, 10.0);
   EXPECT_EQ(limits.requests_per_s, 50.0);
   EXPECT_EQ(limits.wrong_tokens, 5u);

@@ -108,6 +108,15 @@ TEST(Access, RateLimitIsExact) {
   EXPECT_TRUE(limit.take(kSInNs + kSInNs / 20 + 1'000)) << "one comes back in a twentieth of a second";
 }
 
+TEST(Access, RateLimitHoldsWhatItsDepthSays) {
+  RateLimit limit(20.0, 5.0);
+  for (int i = 0; i < 100; ++i) EXPECT_TRUE(limit.take(kSInNs)) << i;
+  EXPECT_FALSE(limit.take(kSInNs)) << "one over";
+  int later = 0;
+  while (limit.take(60 * kSInNs)) ++later;
+  EXPECT_EQ(later, 100) << "no more than that, however long nothing came";
+}
+
 TEST(Access, RateLimitAllowsTheRateAndRefusesTwiceAsMuch) {
   RateLimit limit(100.0);
   int accepted = 0;
